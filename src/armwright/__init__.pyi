@@ -37,6 +37,7 @@ from .robot.srdf import to_srdf as to_srdf
 from .robot.urdf_reader import UrdfArm as UrdfArm, read_urdf as read_urdf
 from .robot.urdf_writer import to_urdf as to_urdf
 from .robot.xacro import to_xacro as to_xacro
+from .runs.cycle_export import CycleModel as CycleModel, cycle_model as cycle_model
 from .runs.folder import read_run as read_run
 from .runs.history import FrontMember as FrontMember, History as History
 from .runs.results import verify_run as verify_run

@@ -30,16 +30,17 @@ def parse_document(text: str, schema: type[Schema], error: type[Exception], wher
     except (yaml.YAMLError, RecursionError, ValueError) as fault:
         raise error(f"{where} is not valid YAML: {_yaml_fault(fault)}") from fault
     if not isinstance(data, dict):
-        raise error(f"{where} must hold keys and values ({', '.join(schema.model_fields)}), one a line")
+        raise error(f"{where} must hold keys and values ({', '.join(document_keys(schema))}), one a line")
     return check_document(cast("dict[Any, Any]", data), schema, error, where)
 
 
 def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str) -> Schema:
     """Validate `data` as a value of `schema`; `where` names it in messages."""
+    keys = document_keys(schema)
     for key in data:
-        if key not in schema.model_fields:
-            allowed = ", ".join(schema.model_fields)
-            hint = did_you_mean(str(key), schema.model_fields, RENAMED)
+        if key not in keys:
+            allowed = ", ".join(keys)
+            hint = did_you_mean(str(key), keys, RENAMED)
             raise error(f'{where}: unknown key "{key}". Allowed: {allowed}.{hint}')
     try:
         return schema.model_validate(data)
@@ -49,6 +50,11 @@ def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Excep
         message = first["msg"].removeprefix("Value error, ")
         got = "" if first["type"] in ("missing", "value_error") else f" (got {_shorten(first['input'])})"
         raise error(f"{where}: {at + ': ' if at else ''}{message}{got}") from fault
+
+
+def document_keys(schema: type[BaseModel]) -> dict[str, str]:
+    """Return the fields of a schema by the keys that a document states them under."""
+    return {field.alias or name: name for name, field in schema.model_fields.items()}
 
 
 def dump_document(content: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 import mujoco  # noqa: F401 (here, since its window library starts a process, which no fast test may)
 import numpy as np
@@ -43,8 +44,9 @@ def told(server: ChatServer) -> tuple[str, ...]:
 @pytest.mark.parametrize("task", TASKS, ids=lambda task: task.stem)
 @pytest.mark.slow
 def test_example_tasks_and_spaces_run(task: Path, tmp_path: Path) -> None:
-    space = TASKS[task]
+    space, evaluator = TASKS[task]
     spaces = ["--space", str(space)] if space else []
+    spaces += ["--evaluator", evaluator] if evaluator else []
     options = ["--n-init", "5", "--n-total", "10", "--no-figures", "--json", "--out", str(tmp_path / "run")]
     result = CliRunner().invoke(app, ["optimize", str(task), *spaces, *options])
     assert result.exit_code == 0, result.output
@@ -156,3 +158,43 @@ def test_mujoco_example_follows_the_ik_postures() -> None:
         distance, work = follow(problem.arm(design), problem.task)
         assert distance == pytest.approx(error, abs=0.02)  # m, of six to nine targets together
         assert work > 0.0
+
+
+def codesign() -> tuple[Any, aw.Problem, list[aw.Design]]:
+    """The module of the example of arm and controller, its problem, and designs that the controller keeps stable."""
+    evaluator = aw.load_evaluator(f"{EXAMPLES}/design_and_control.py:drive")
+    space = aw.load_space(EXAMPLES / "9-codesign-space.yaml")
+    task = aw.load_task(str(EXAMPLES / "9-codesign-task.yaml"))
+    calm = {"kp": 5.0, "kd": 0.1, "pace_loaded": 0.5, "pace_empty": 0.5}
+    sampled = space.sample(40, 0)
+    feasible = (aw.Problem(task, space).evaluate(sampled).violations <= 0.0).all(axis=1)
+    designs = [space.design({**design.params, **calm}) for design, ok in zip(sampled, feasible, strict=True) if ok]
+    return sys.modules[evaluator.measure.__module__], aw.Problem(task, space, evaluator=evaluator), designs[:3]
+
+
+@pytest.mark.slow
+def test_codesign_example_needs_softer_motion_for_smaller_errors() -> None:
+    """Slower and stiffer arms follow more closely; the same design has the same values each time."""
+    _, problem, designs = codesign()
+    for design in designs:
+        duration, energy, error = problem.evaluate([design]).values[0]
+        assert tuple(problem.evaluate([design]).values[0]) == (duration, energy, error)
+        fast = problem.space.design({**design.params, "pace_loaded": 1.5, "pace_empty": 1.5})
+        soft = problem.space.design({**design.params, "kp": 1.0})
+        assert problem.evaluate([fast]).values[0, 0] < duration
+        assert min(problem.evaluate([fast]).values[0, 2], problem.evaluate([soft]).values[0, 2]) > error > 0.0
+        assert energy > 0.0
+
+
+@pytest.mark.slow
+def test_gears_of_the_codesign_example_trade_torque_for_speed() -> None:
+    module, problem, designs = codesign()
+    arm = problem.arm(designs[0])
+    geared = module.Drives.of(module.geared(arm, designs[0]))
+    bare, gears = module.Drives.of(arm), [float(designs[0].params[f"gear_{j}"]) for j in (1, 2, 3)]
+    assert geared.peak == pytest.approx(bare.peak * gears * module.EFFICIENCY)
+    assert geared.no_load == pytest.approx(bare.no_load / gears)
+    torque = geared.limited(np.full(3, 1e3), geared.no_load / 2.0)
+    assert np.all(torque <= geared.peak)
+    assert geared.limited(np.full(3, 1e3), 2.0 * geared.no_load).tolist() == [0.0] * 3
+    assert geared.limited(np.full(3, -1e3), 2.0 * geared.no_load) == pytest.approx(-geared.peak)

@@ -16,6 +16,7 @@ from armwright.problem.objectives import QUANTITIES
 from armwright.robot.actuators import ActuatorRecord
 from armwright.robot.tubes import Material
 from armwright.spaces.column import ColumnKeys
+from armwright.spaces.custom_parameters import CustomParameter
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.link_mass import MassPerLink, MassPerMetre
 from armwright.spaces.link_section import LinkSection
@@ -23,13 +24,23 @@ from armwright.tasks.obstacles import Box, Cylinder, Ground, Sphere
 from armwright.tasks.targets import Target
 from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region
+from armwright.yaml_documents import document_keys
 from tests import ROOT
 from tests.support.browser import Tab
 from tests.support.documentation import code_spans
 
 KEYS: dict[str, tuple[type[BaseModel], ...]] = {
     "tasks.md": (Task, Target, Region, Box, Sphere, Cylinder, Ground),
-    "spaces.md": (DesignSpace, MassPerMetre, MassPerLink, LinkSection, Material, ColumnKeys, ActuatorRecord),
+    "spaces.md": (
+        DesignSpace,
+        MassPerMetre,
+        MassPerLink,
+        LinkSection,
+        Material,
+        ColumnKeys,
+        ActuatorRecord,
+        CustomParameter,
+    ),
     "experiments.md": (ExperimentPlan, MethodPlan, FigurePlan),
     "language-models.md": (aw.ModelOptions,),
 }
@@ -42,7 +53,7 @@ def names_in_code(page: str) -> set[str]:
 
 @pytest.mark.parametrize("page", KEYS)
 def test_file_keys_are_documented(page: str) -> None:
-    keys = {key for model in KEYS[page] for key in model.model_fields}
+    keys = {key for model in KEYS[page] for key in document_keys(model)}
     assert keys - names_in_code(page) == set()
 
 

@@ -21,6 +21,7 @@ from armwright.llm.prompt import MAX_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.problem.objectives import OBJECTIVES
 from armwright.robot.actuators import catalogue
+from armwright.yaml_documents import document_keys
 from tests.support import wire_formats as wires
 from tests.support.chat_server import Answer, ChatServer, Request
 from tests.support.command_line import PATIENCE, armwright, press_ctrl_c, refused
@@ -417,7 +418,7 @@ def test_ctrl_c_cancels_the_draft_and_writes_no_task(chat_server: ChatServer, in
 def test_draft_prompt_covers_all_file_keys() -> None:
     prompt, schema = draft_prompt(DESCRIPTION), draft_schema()
     for model in (aw.Task, aw.DesignSpace):
-        assert set(schema["$defs"][model.__name__]["properties"]) == set(model.model_fields)
+        assert set(schema["$defs"][model.__name__]["properties"]) == set(document_keys(model)) - {"parameters"}
     for objective in OBJECTIVES.values():
         assert f"- {objective.name} [{objective.unit}]: " in prompt
     names = schema["$defs"]["DesignSpace"]["properties"]["actuators"]["items"]["enum"]

@@ -12,12 +12,13 @@ from armwright.problem.checks.finding import PROVEN, SUSPECTED
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.checks.reach import longest_reach
 from armwright.problem.checks.sampling import SEED, check_by_sampling, random_designs, violations
+from armwright.problem.evaluators import load_evaluator
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace, default_space, load_space, paper_space
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task
-from tests.support.examples import example_tasks
+from tests.support.examples import With, example_tasks
 
 DOWN = [0, 0, -1]
 HERE = [0.4, 0.2, 0.3]
@@ -66,9 +67,11 @@ def test_builtin_tasks_have_no_findings(name: str) -> None:
     assert found(Problem(load_task(name), default_space(name))) == []
 
 
-@pytest.mark.parametrize(("task", "space"), example_tasks().items(), ids=lambda file: getattr(file, "stem", "paper"))
-def test_examples_have_no_findings(task: Path, space: Path | None) -> None:
-    assert found(Problem(load_task(task), load_space(space) if space else paper_space())) == []
+@pytest.mark.parametrize(("task", "given"), example_tasks().items(), ids=lambda file: getattr(file, "stem", ""))
+def test_examples_have_no_findings(task: Path, given: With) -> None:
+    evaluator = load_evaluator(given.evaluator) if given.evaluator else None
+    space = load_space(given.space) if given.space else paper_space()
+    assert found(Problem(load_task(task), space, evaluator=evaluator)) == []
 
 
 def test_random_tasks_have_no_findings() -> None:

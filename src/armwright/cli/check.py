@@ -176,6 +176,10 @@ def _describe_range(parameter: Parameter) -> str:
     if isinstance(parameter, CategoricalParameter):
         return " | ".join(parameter.choices)
     if _is_fixed(parameter):
-        return f"{parameter.low:g} {parameter.unit}"
+        return f"{parameter.low:g} {parameter.unit}".rstrip()
+    unit = f" {parameter.unit}" if parameter.unit else ""
+    scale = ", on a logarithmic scale" if parameter.log else ""
+    if parameter.integer and parameter.step == 1.0:
+        return f"{parameter.low:g} to {parameter.high:g}{unit}, whole numbers{scale}"
     step = f" in steps of {parameter.step:g}" if parameter.step else ""
-    return f"{parameter.low:g} to {parameter.high:g} {parameter.unit}{step}"
+    return f"{parameter.low:g} to {parameter.high:g}{unit}{step}{scale}"

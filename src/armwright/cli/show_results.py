@@ -23,6 +23,7 @@ from armwright.runs.infeasibility import describe_infeasibility
 from armwright.runs.path_report import describe_extremes
 from armwright.runs.results import REPORT
 from armwright.runs.supply_record import supply_of
+from armwright.spaces.custom_parameters import describe_custom
 from armwright.study.direct_search import FrontRun
 from armwright.study.progress import StudyResult
 from armwright.study.refine_run import RefinedRun
@@ -236,6 +237,8 @@ def show_picked(
         tubes = f", tubes {', '.join(member.design.tubes)}" if member.design.tubes else ""
         base = format_point([round(value, 3) for value in member.design.origin])
         console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}{tubes}")
+        if custom := describe_custom(history.problem.space.custom, member.design.params):
+            console.print(f"  {custom}")
         evaluation = history.evaluation([member.number])
         if along := describe_extremes(evaluation, 0):
             console.print(f"  worst along its cycle: {along}")

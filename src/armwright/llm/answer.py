@@ -17,6 +17,7 @@ from armwright.exceptions import DesignError
 from armwright.llm.answer_format import JOINT_NAMES, designs_in_lines, expand_lists, plain_number
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.problem import Problem
+from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, exact
 from armwright.text import one_line, without_thoughts
 
@@ -95,7 +96,7 @@ def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
     names = {"designs", "origin", "joints", "links", *(parameter.name for parameter in problem.space.parameters)}
     objects, incomplete = _objects(text, names)
     last_object = objects[-1][0] if objects else -1
-    last_line, lines = designs_in_lines(text)
+    last_line, lines = designs_in_lines(text, per_joint(problem.space))
     if incomplete > max(last_line, last_object):
         raise DesignError("the last JSON object is incomplete: give one value per parameter, and close its braces")
     if last_line > last_object:
@@ -122,13 +123,18 @@ def last_json_object(text: str) -> str:
     return last
 
 
+def per_joint(space: DesignSpace) -> dict[str, bool]:
+    """Return the names of the custom parameters, and whether each has a value per joint."""
+    return {name: custom.per is not None for name, custom in space.custom}
+
+
 def _property(parameter: Parameter) -> dict[str, Any]:
     if isinstance(parameter, CategoricalParameter):
         return {"type": "string", "enum": list(parameter.choices)}
-    description = f"{exact(parameter.low)} <= {parameter.name} <= {exact(parameter.high)} {parameter.unit}"
-    if parameter.step > 0.0:
+    description = f"{exact(parameter.low)} <= {parameter.name} <= {exact(parameter.high)} {parameter.unit}".rstrip()
+    if parameter.step > 0.0 and not (parameter.integer and parameter.step == 1.0):
         description += f", in steps of {exact(parameter.step)}"
-    return {"type": "number", "description": description}
+    return {"type": "integer" if parameter.integer else "number", "description": description}
 
 
 def response_schema(title: str, fields: Mapping[str, Any], options: PromptOptions) -> dict[str, Any]:
@@ -160,7 +166,8 @@ def _read_all(designs: Sequence[Any], problem: Problem) -> list[Answer]:
 
 
 def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
-    content = expand_lists({one_line(str(key), MAX_VALUE_LENGTH).lower(): value for key, value in content.items()})
+    lower = {one_line(str(key), MAX_VALUE_LENGTH).lower(): value for key, value in content.items()}
+    content = expand_lists(lower, per_joint(problem.space))
     reason = one_line(_as_text(content.pop("reason", None) or ""), MAX_REASON_LENGTH)
     names = [f"expected_{objective.name}" for objective in problem.objectives]
     values: Any = content.pop("expected", None)  # a list in place of the single values

@@ -5,6 +5,7 @@ A line is read only if all of it is understood; numbers mixed with other text ar
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
@@ -18,6 +19,7 @@ SINGLE = ("mount", "tube")  # choices of a whole arm, under the names of their p
 GROUPS = ("origin", *SINGLE, *LISTS)
 NOTHING = "-"  # in a list, for a module without such a value
 JOINT_NAMES = {description.partition(",")[0]: kind for kind, description in JOINT_DESCRIPTIONS.items()}  # "yaw": "Y"
+NO_CUSTOM: Mapping[str, bool] = {}
 MAX_LINE_LENGTH = 2000  # characters; longer lines are ignored
 
 _MINUS = str.maketrans({"−": "-", "﹣": "-", "-": "-", "＋": "+"})
@@ -32,13 +34,20 @@ _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
 _LEFT_OVER = re.compile(r"[\s,;|()\[\]{}$*_`~≈\"'.]*")  # allowed between values
 
-_KEYWORDS = "|".join([*(group.upper() for group in GROUPS), "EXPECTED", "REASON"])
-# At the start of a line with any list marker or emphasis; in capitals also within the line.
-_NAME = re.compile(
-    rf"(?:^[ \t>*_#`|•–-]{{0,20}}(?:\d+[.)] ?)?[*_`]{{0,3}}(?P<first>(?i:{_KEYWORDS}))"
-    rf"|(?<=[\s;,])[*_`]{{0,3}}(?P<later>{_KEYWORDS}))[ \t*_`]*[:=]",
-    re.MULTILINE,
-)
+
+@cache
+def _names(custom: Collection[str]) -> re.Pattern[str]:
+    """Return the pattern of a name with its colon.
+
+    It is at the start of a line with any list marker or emphasis; in capitals also within the line.
+    """
+    names = [*(group.upper() for group in (*GROUPS, *custom)), "EXPECTED", "REASON"]
+    keywords = "|".join(sorted(names, key=len, reverse=True) if custom else names)
+    return re.compile(
+        rf"(?:^[ \t>*_#`|•–-]{{0,20}}(?:\d+[.)] ?)?[*_`]{{0,3}}(?P<first>(?i:{keywords}))"
+        rf"|(?<=[\s;,])[*_`]{{0,3}}(?P<later>{keywords}))[ \t*_`]*[:=]",
+        re.MULTILINE,
+    )
 
 
 def module_lists(names: Collection[str]) -> dict[str, str]:
@@ -50,15 +59,21 @@ def module_lists(names: Collection[str]) -> dict[str, str]:
     return {group: kind for group, kind in LISTS.items() if group not in ("joints", "links") and f"{kind}_1" in names}
 
 
-def designs_in_lines(text: str) -> tuple[int, list[dict[str, Any]]]:
+def designs_in_lines(text: str, custom: Mapping[str, bool] = NO_CUSTOM) -> tuple[int, list[dict[str, Any]]]:
     """Return the position of the last design or -1, and the parameters of each design in order.
 
     A design begins with its ORIGIN, so that an unfinished one takes no values from another.
+
+    Args:
+        text: an answer.
+        custom: whether each custom parameter has a value per joint.
     """
     designs: list[dict[str, Any]] = []
     last = -1
-    for position, name, line in _named_lines(text):
-        values = _values(name, line) if len(line) <= MAX_LINE_LENGTH else None
+    for position, name, line in _named_lines(text, tuple(custom)):
+        if len(line) > MAX_LINE_LENGTH:
+            continue
+        values = _custom_values(name, line, custom[name]) if name in custom else _values(name, line)
         if values is None:
             continue
         if name == "origin":
@@ -67,18 +82,26 @@ def designs_in_lines(text: str) -> tuple[int, list[dict[str, Any]]]:
         if designs:
             for key, value in values.items():
                 before = designs[-1].setdefault(key, value)
-                if repr(before) != repr(value) and name in GROUPS:  # contradictory: refused later
+                if repr(before) != repr(value) and (name in GROUPS or name in custom):  # contradictory: refused later
                     designs[-1][key] = f"{before} and {value}"
     return last, designs
 
 
-def expand_lists(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an object's values by parameter; groups may be lists or text, as in "origin": [0, 0.1, 0]."""
+def expand_lists(content: Mapping[str, Any], custom: Mapping[str, bool] = NO_CUSTOM) -> dict[str, Any]:
+    """Return an object's values by parameter; groups may be lists or text, as in "origin": [0, 0.1, 0].
+
+    Args:
+        content: the object.
+        custom: whether each custom parameter has a value per joint.
+    """
+    lists = (*GROUPS, *(name for name, per_joint in custom.items() if per_joint))
     values: dict[str, Any] = {}
     for name, value in content.items():
         if name in GROUPS and isinstance(value, str):
             values.update(_values(name, value) or {name: value})
-        elif name in GROUPS and isinstance(value, (list, tuple)):
+        elif name in lists and isinstance(value, str):
+            values.update(_custom_values(name, value, True) or {name: value})
+        elif name in lists and isinstance(value, (list, tuple)):
             items: list[Any] = list(value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
             values.update({_parameter(name, i): item for i, item in enumerate(items) if item not in (None, NOTHING)})
         else:
@@ -92,9 +115,19 @@ def plain_number(text: str, unit: str = "") -> float | None:
     return float(text) if _PLAIN.fullmatch(text) else None
 
 
-def _named_lines(text: str) -> Iterator[tuple[int, str, str]]:
+def _custom_values(name: str, text: str, per_joint: bool) -> dict[str, Any] | None:
+    """Return the values of a line of a custom parameter, as text that still has to be checked."""
+    text = re.sub(rf"\b{name}_\d+\s*[:=]", "", _LATEX.sub(" ", text.translate(_MINUS))).strip(" \t*_`.;|$")
+    if not per_joint:
+        return {name: text} if text else None
+    inside = re.sub(r"[()\[\]{}]", " ", text)
+    items = [item.strip(" \t*_`") for item in re.split(r"[,;]" if re.search(r"[,;]", inside) else r"\s+", inside)]
+    return _listed(name, [item for item in items if item])
+
+
+def _named_lines(text: str, custom: tuple[str, ...]) -> Iterator[tuple[int, str, str]]:
     """Yield each name with its position and the rest of its line, or the next line if there is no rest."""
-    names = list(_NAME.finditer(text))
+    names = list(_names(custom).finditer(text))
     ends = [*(match.start() for match in names[1:]), len(text)]
     for match, end in zip(names, ends, strict=False):  # without names there is one end too many
         lines = text[match.end() : end].lstrip(" \t*_`").lstrip("\n").splitlines()

@@ -42,7 +42,7 @@ from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.catalogue import builtin_names
 from armwright.tasks.task import Task
 from armwright.text import map_text, one_line, visible
-from armwright.yaml_documents import check_document, dump_document, parse_document
+from armwright.yaml_documents import check_document, document_keys, dump_document, parse_document
 
 DRAFTS = "drafts.jsonl"  # transcript of the calls, next to the files
 ANSWER_TOKENS = 2000  # estimated length of an answer
@@ -277,11 +277,12 @@ def _document(content: Any, schema: type[Model], error: type[ArmwrightError], wh
     The YAML is read back like a file: what is written is what was checked.
     """
     if not isinstance(content, dict):
-        raise error(f"{where}: expected an object with the keys {', '.join(schema.model_fields)}")
+        raise error(f"{where}: expected an object with the keys {', '.join(document_keys(schema))}")
     given = {key: item for key, item in cast("dict[str, Any]", content).items() if item is not None}
     value = check_document(given, schema, error, where)
-    defaults = {key: field.get_default(call_default_factory=True) for key, field in schema.model_fields.items()}
-    text = dump_document({key: item for key, item in given.items() if getattr(value, key) != defaults[key]})
+    names = document_keys(schema)
+    defaults = {name: field.get_default(call_default_factory=True) for name, field in schema.model_fields.items()}
+    text = dump_document({k: item for k, item in given.items() if getattr(value, names[k]) != defaults[names[k]]})
     if parse_document(text, schema, error, where) != value:
         raise error(f"{where}: expected plain text and numbers")
     return value, text

@@ -68,6 +68,7 @@ def draft_schema() -> dict[str, Any]:
     actuators = schema["$defs"]["DesignSpace"]["properties"]["actuators"]
     actuators["items"] = {"type": "string", "enum": list(catalogue())}
     schema["$defs"]["LinkSection"]["properties"]["material"] = {"type": "string", "enum": list(MATERIALS)}
+    del schema["$defs"]["DesignSpace"]["properties"]["parameters"]  # only evaluators use them
     for record in ("ActuatorRecord", "Material"):
         del schema["$defs"][record]
     return schema

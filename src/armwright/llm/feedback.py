@@ -17,7 +17,7 @@ from armwright.runs.attribution import hypervolume_gains
 from armwright.runs.history import BBO, History
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.design_space import DesignSpace
-from armwright.spaces.parameters import Design
+from armwright.spaces.parameters import Design, ParameterValue
 from armwright.text import one_line
 
 N_PARETO = 5  # front members shown
@@ -240,7 +240,18 @@ def _extras(space: DesignSpace, design: Design, decimals: int) -> list[tuple[str
         values = [design.params.get(f"{kind}_{j}", NOTHING) for j in range(1, len(design.joints) + 1)]
         shown = [value if isinstance(value, str) else f"{value:.{decimals}f}" for value in values]
         extras.append((group.upper(), f"({', '.join(shown)})"))
+    for name, entry in space.custom:
+        if entry.per is None:
+            extras.append((name.upper(), _custom_text(design.params[name])))
+        else:
+            of_joints = [design.params.get(f"{name}_{j}", NOTHING) for j in range(1, len(design.joints) + 1)]
+            extras.append((name.upper(), f"({', '.join(map(_custom_text, of_joints))})"))
     return extras
+
+
+def _custom_text(value: ParameterValue) -> str:
+    """Return the value of a custom parameter with four digits."""
+    return value if isinstance(value, str) else f"{value:.4g}"
 
 
 def _joint_labels(history: History, number: int) -> list[str]:

@@ -24,6 +24,7 @@ from armwright.problem.objectives import (
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History
+from armwright.spaces.custom_parameters import CustomParameter
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
 from armwright.spaces.tolerance import length_columns
@@ -77,6 +78,8 @@ VARIABLES = {
     "straight": "true if all links form one vertical line in the start posture",
     "extra_groups": "parameters besides base, joints and links: name in capitals, and prefix of the parameters",
     "single": "names of the parameters that are choices of a whole arm",
+    "custom_parameters": "parameters that only the evaluator reads: name, per_joint, some (some joints do not have "
+    "it), unit, choices, range, integer, log",
     "bar_radius": "radius of the links, as text",
     "n_copies": "number of copies of a design that a build tolerance adds",
     "joint_descriptions": "description of each joint type, by its letter",
@@ -169,19 +172,36 @@ def _schedule_values(history: History, options: PromptOptions) -> dict[str, int 
 def _space_values(space: DesignSpace) -> dict[str, Any]:
     names = {parameter.name for parameter in space.parameters}
     lists = [(group.upper(), kind) for group, kind in module_lists(names).items()]
+    per_joint = [(name.upper(), name) for name, entry in space.custom if entry.per is not None]
+    single = (*SINGLE, *(name for name, entry in space.custom if entry.per is None))
     return {
         "space": space,
         "n_joints": str(space.max_joints) if space.min_joints == space.max_joints else "D",
         "revolute_types": [kind for kind in space.joint_types if MODULES[kind].is_revolute],
         "prismatic_types": [kind for kind in space.joint_types if MODULES[kind].is_prismatic],
         "straight": space.mount == ("floor",) and space.link_directions == ("+z",),
-        "extra_groups": [*((name.upper(), name) for name in SINGLE if name in names), *lists],
-        "single": SINGLE,
+        "extra_groups": [*((name.upper(), name) for name in single if name in names), *lists, *per_joint],
+        "single": single,
+        "custom_parameters": [_custom_record(space, name, entry) for name, entry in space.custom],
         "bar_radius": _describe_radius(space),
         "n_copies": len(length_columns(space)) * 2,
         "joint_descriptions": JOINT_DESCRIPTIONS,
         "mount_descriptions": MOUNT_DESCRIPTIONS,
         "restricted": [p for p in space.parameters if p.name in dict(space.restrict)],
+    }
+
+
+def _custom_record(space: DesignSpace, name: str, entry: CustomParameter) -> dict[str, Any]:
+    """Return a custom parameter as the templates read it."""
+    return {
+        "name": name,
+        "per_joint": entry.per is not None,
+        "some": not all(MODULES[letter].is_actuated for letter in space.joint_types),
+        "unit": entry.unit,
+        "choices": entry.choices,
+        "range": entry.range,
+        "integer": entry.integer,
+        "log": entry.scale == "log",
     }
 
 

@@ -4,12 +4,15 @@
 def simulate(arm, task):
     ...
     return error, energy
+
+A function with a third argument, `design`, also gets the parameters that do not change the arm: design.params["kp"].
 """
 
 import hashlib
 import importlib
 import importlib.abc
 import importlib.util
+import inspect
 import math
 import re
 import sys
@@ -32,11 +35,14 @@ from armwright.problem.failure import Failure
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import MAX_OBJECTIVES, OBJECTIVES
 from armwright.robot.arm import Arm
+from armwright.spaces.parameters import Design
 from armwright.tasks.task import Task
 from armwright.text import one_line
 
-Measure = Callable[[Arm, Task], Sequence[float] | float]
+Measure = Callable[[Arm, Task], Sequence[float] | float] | Callable[[Arm, Task, Design], Sequence[float] | float]
 Measurement = tuple[float, ...] | Failure  # the objectives of one arm, or why there are none
+
+DESIGN = "design"  # name of the argument of a function that takes the design, too
 
 NAMED = re.compile(r"([a-z][a-z0-9_]*)(?: \[([^\[\]]{1,40})\])?")  # such as "energy [J]"
 MAX_NAME_LENGTH = 40
@@ -72,18 +78,30 @@ class Evaluator:
             return load_evaluator, (f"{where}:{function}",)
         return Evaluator.__new__, (Evaluator,), self.__dict__
 
-    def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
-        """Return the objectives of an arm; EvaluatorError if the function fails or exits."""
-        measured = self.attempt(arm, task)
+    @property
+    def takes_design(self) -> bool:
+        """Whether the function has the argument `design`."""
+        return DESIGN in inspect.signature(self.measure).parameters
+
+    def __call__(self, arm: Arm, task: Task, design: Design | None = None) -> tuple[float, ...]:
+        """Return the objectives of an arm; EvaluatorError if the function fails or exits.
+
+        Args:
+            arm: The arm.
+            task: The task.
+            design: The design that the arm was built from, for a function that takes it.
+        """
+        measured = self.attempt(arm, task, design)
         if not isinstance(measured, Failure):
             return measured
         raise evaluator_error(f"{self.name}: {measured.description}", measured)
 
-    def attempt(self, arm: Arm, task: Task) -> Measurement:
-        """Return the objectives of an arm, or why there are none."""
+    def attempt(self, arm: Arm, task: Task, design: Design | None = None) -> Measurement:
+        """Return the objectives of an arm, or why there are none; the arguments are those of a call."""
+        given: dict[str, Any] = {DESIGN: design} if self.takes_design else {}
         try:
             with chdir("."):  # solvers change the working folder, to which the run's folder may be relative
-                made = self.measure(arm, task)
+                made = cast("Callable[..., object]", self.measure)(arm, task, **given)
         except (Exception, SystemExit) as fault:  # noqa: BLE001 (the failure is recorded)
             kind = type(fault).__name__
             reason = one_line(f"{kind}: {fault}", MAX_REASON_LENGTH)
@@ -112,7 +130,8 @@ def evaluator_error(message: str, failure: Failure) -> EvaluatorError:
 def evaluator(*objectives: str) -> Callable[[Measure], Evaluator]:
     """Make an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
 
-    An arm for which the function raises, or returns other than finite numbers, is infeasible.
+    An arm for which the function raises, or returns other than finite numbers, is infeasible. A function
+    `(arm, task, design) -> numbers` also gets the design, whose `params` hold the custom parameters.
 
     Args:
         objectives: Names, each with its unit in brackets if it has one: "energy [J]".

@@ -20,6 +20,7 @@ from armwright.problem.objectives import (
     ORIENTATION_ERROR,
     ORIENTATION_QUANTITIES,
     PAPER_OBJECTIVES,
+    QUANTITIES,
     RENAMED,
     named_objectives,
 )
@@ -140,6 +141,7 @@ class Problem:
             object.__setattr__(self, "objectives", self._default_objectives())
         if self.evaluator is not None and self.tolerance > 0.0:
             raise SettingsError(f"expected a tolerance or an evaluator, got both ({self.evaluator.name})")
+        self._check_custom_parameters()
         for objective in self.objectives:
             if objective in ORIENTATION_QUANTITIES and not self.task.target_arrays.oriented:
                 raise SettingsError(
@@ -181,6 +183,20 @@ class Problem:
                     f"({', '.join(names)}).{did_you_mean(name, names, RENAMED)}"
                 )
 
+    def _check_custom_parameters(self) -> None:
+        """Raise SettingsError for custom parameters that no evaluator reads, or that are named like a quantity."""
+        names = [name for name, _ in self.space.custom]
+        for name in names:
+            if name in QUANTITIES or name in {objective.name for objective in self.objectives}:
+                raise SettingsError(
+                    f'space {self.space.name}: parameters: "{name}" is the name of a quantity; try "my_{name}"'
+                )
+        if names and self.evaluator is not None and not self.evaluator.takes_design:
+            raise SettingsError(
+                f"{self.evaluator.name}: expected a function (arm, task, design), since the space has the parameters "
+                f"{', '.join(names)}, got one without design"
+            )
+
     @property
     def reference_point(self) -> tuple[float, ...] | None:
         """Return the worst values that count for the hypervolume, if the task states them."""
@@ -215,7 +231,7 @@ class Problem:
     def measure(self, design: Design) -> Measurement:
         """Return what the custom evaluator measures of a design, or why it fails."""
         assert self.evaluator is not None
-        return self.evaluator.attempt(self.arm(design), self.task)
+        return self.evaluator.attempt(self.arm(design), self.task, design)
 
     def outcomes_of(self, designs: Sequence[Design], measurements: Sequence[Measurement]) -> Outcomes:
         """Evaluate N designs, given what the custom evaluator measured of each; nothing without one."""

@@ -90,7 +90,8 @@ def _merged(space: DesignSpace, design: Design, i: int) -> dict[str, ParameterVa
     then lack the one before.
     """
     count = len(design.modules)
-    columns = {kind: [design.params.get(f"{kind}_{j}") for j in range(1, count + 1)] for kind in KINDS}
+    kinds = (*KINDS, *(name for name, custom in space.custom if custom.per is not None))
+    columns = {kind: [design.params.get(f"{kind}_{j}") for j in range(1, count + 1)] for kind in kinds}
     base, links, directions = list(design.origin), list(design.links), columns["direction"]
     if i == 0:
         first = DIRECTIONS[directions[0] or space.link_directions[0]]  # pyright: ignore[reportArgumentType]
@@ -103,7 +104,7 @@ def _merged(space: DesignSpace, design: Design, i: int) -> dict[str, ParameterVa
         for j, value in enumerate(values[:i] + values[i + 1 :], start=1)
         if value is not None
     }
-    names = {f"{kind}_{j}" for kind in KINDS for j in range(1, count + 1)}
+    names = {f"{kind}_{j}" for kind in kinds for j in range(1, count + 1)}
     arm = {name: value for name, value in design.params.items() if name not in names}
     arm |= {f"origin_{axis}": value for axis, value in zip("xyz", base, strict=True)}
     merged = {**arm, **numbered, "n_joints": str(count - 1)}

@@ -52,7 +52,9 @@ class Candidates:
         violate constraints is expected to do so again.
         """
         assert history.reference_point is not None
-        results = [(row, trial) for trial in history.proposed if (row := self._rows.get(trial.design)) is not None]
+        space = history.problem.space
+        rows = ((self._rows.get(space.with_custom(trial.design)), trial) for trial in history.proposed)
+        results = [(row, trial) for row, trial in rows if row is not None]
         values = np.column_stack([self.forecast.error, self.forecast.torque])
         feasible = np.ones(len(values))
         names = np.array([structure.name for structure in self.structures])

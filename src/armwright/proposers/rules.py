@@ -44,7 +44,8 @@ class RulesProposer(Proposer):
         if gain <= mean[rule] and (not inside or (not can_forecast(history) and opened < len(structures.names))):
             row, gain = next_structure(structures, opened, rng), np.inf
         if gain > mean[rule]:
-            rule, design, reason = STRUCTURE, structures.designs[row], explain(structures, row)
+            rule, reason = STRUCTURE, explain(structures, row)
+            design = with_custom(structures.designs[row], history, rng)
         else:
             design, reason = RULES[rule](history, inside, rng)
         return Proposal(distinct(design, history, rng), proposal_id(self.name, number, rule), reason)
@@ -54,6 +55,17 @@ class RulesProposer(Proposer):
         if self._known is None or self._known[0] is not problem:
             self._known = problem, candidates(problem)
         return self._known[1]
+
+
+def with_custom(design: Design, history: History, rng: np.random.Generator) -> Design:
+    """Return a structure with the custom parameters of a design of the front or, as often, of a random one."""
+    space = history.problem.space
+    if not space.custom:
+        return design
+    front = [member.design for member in history.front]
+    if front and rng.random() < 0.5:
+        return space.with_custom(design, front[rng.integers(len(front))])
+    return space.with_custom(design, space.sample(1, int(rng.integers(2**31)))[0])
 
 
 def can_forecast(history: History) -> bool:

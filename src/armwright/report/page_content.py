@@ -282,7 +282,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         ],
         "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
         "parameters": [
-            {"name": p.name, "needs": space.condition(p.name)}
+            {"name": p.name, "needs": space.condition(p.name), "custom": p.name in space.custom_names}
             | (
                 {"low": p.low, "high": p.high, "unit": p.unit}
                 if isinstance(p, FloatParameter)

@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,14 +11,29 @@ from armwright.exceptions import SettingsError
 from armwright.kinematics.arm_arrays import FIXED, carrying, stack_arms
 from armwright.kinematics.motion_path import MotionPath
 from armwright.kinematics.trajectory import Trajectory, sample_trajectory
-from armwright.problem.evaluation import Evaluation
+from armwright.problem.evaluation import Evaluation, evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
 from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
+from armwright.spaces.tool_mount import carrying_tool
+from armwright.tasks.task import Task
 
 MODEL, TRAJECTORY = "arm.xml", "trajectory.csv"
 QUANTITIES = ("q", "qd", "qdd", "tau")  # of joints, in a trajectory
 DIGITS = 9
+
+
+@dataclass(frozen=True)
+class CycleModel:
+    """An arm in its task.
+
+    Attributes:
+        mjcf: The model, as XML.
+        trajectory: Its motion through the cycle.
+    """
+
+    mjcf: str
+    trajectory: Trajectory
 
 
 def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, name: str) -> Mapping[str, str]:
@@ -33,12 +49,43 @@ def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, na
     if evaluation.plan is None:
         return {}
     try:
-        trajectory = trajectory_of(arm, evaluation, row)
+        model = _modelled(arm, problem.task.target_names, evaluation, row, name)
     except SettingsError:
         return {}
-    names = problem.task.target_names
-    model = task_model(arm, names, evaluation, row, np.abs(trajectory.tau).max(axis=0), name)
-    return {MODEL: model, TRAJECTORY: trajectory_csv(trajectory, names)}
+    return {MODEL: model.mjcf, TRAJECTORY: trajectory_csv(model.trajectory, problem.task.target_names)}
+
+
+def cycle_model(arm: Arm, task: Task) -> CycleModel:
+    """Return the model of an arm in its task for MuJoCo, and its trajectory through the cycle.
+
+    Steps without a duration take the least time that the actuators of the arm allow. In the model, moving joints are
+    joint_1, joint_2, …, each with the actuators servo_1, … (position) and ff_1, … (torque).
+
+    Args:
+        arm: The arm. The tool of the task is mounted on an arm that carries none.
+        task: A task with a cycle.
+
+    Raises:
+        SettingsError: The task has no cycle, or a step of unknown duration.
+
+    Examples:
+        >>> import armwright as aw
+        >>> task, space = aw.load_task("desk-sorting"), aw.load_space("desk-sorting")
+        >>> model = aw.cycle_model(space.arm(space.sample(1, 0)[0]), task)
+        >>> model.trajectory.q.shape[0] == len(model.trajectory.time)
+        True
+    """
+    if task.cycle is None:
+        raise SettingsError(f"task {task.name} has no cycle; try cycle: in_order")
+    equipped = carrying_tool(arm, task.tool)
+    return _modelled(equipped, task.target_names, evaluate(equipped, task), 0, task.name)
+
+
+def _modelled(arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, name: str) -> CycleModel:
+    """Return the model and the trajectory of an arm, which is row `row` of an evaluation; SettingsError without one."""
+    trajectory = trajectory_of(arm, evaluation, row)
+    peaks = np.abs(trajectory.tau).max(axis=0)
+    return CycleModel(task_model(arm, target_names, evaluation, row, peaks, name), trajectory)
 
 
 def task_model(

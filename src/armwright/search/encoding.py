@@ -29,6 +29,8 @@ class DesignEncoding:
         ranges = [(p.low, p.high) for p in parameters if isinstance(p, FloatParameter)]
         self._low, self._high = np.array(ranges).reshape(-1, 2).T
         self._step = np.array([p.step for p in parameters if isinstance(p, FloatParameter)])
+        self._log = np.flatnonzero([p.log for p in parameters if isinstance(p, FloatParameter)])
+        self._scaled_low, self._scaled_high = self._scaled(self._low), self._scaled(self._high)
 
         column = {parameter.name: i for i, parameter in enumerate(parameters)}
         joints = {column[p.name]: len(p.choices) for p in categories if p.name.startswith("joint_")}
@@ -49,14 +51,24 @@ class DesignEncoding:
         return matrix
 
     def units(self, matrix: Array) -> Array:
-        """Return the (N, R) real columns scaled to [0, 1]; 0 if a range is a single value."""
-        width = self._high - self._low
-        return (matrix[:, self.real] - self._low) / np.where(width > 0.0, width, 1.0)
+        """Return the (N, R) real columns scaled to [0, 1], logarithmic ones on their scale; 0 for a single value."""
+        width = self._scaled_high - self._scaled_low
+        return (self._scaled(matrix[:, self.real]) - self._scaled_low) / np.where(width > 0.0, width, 1.0)
 
     def from_units(self, units: Array) -> Array:
         """Return the (N, R) real columns of points on the unit cube; points outside it are reflected, then clipped."""
         reflected = 1.0 - np.abs(1.0 - np.abs(units))
-        return self._on_grid(np.clip(self._low + reflected * (self._high - self._low), self._low, self._high))
+        scaled = self._scaled_low + reflected * (self._scaled_high - self._scaled_low)
+        scaled[:, self._log] = np.exp(scaled[:, self._log])
+        return self._on_grid(np.clip(scaled, self._low, self._high))
+
+    def _scaled(self, reals: Array) -> Array:
+        """Return (..., R) real columns on the scales of their parameters."""
+        if not len(self._log):
+            return reals
+        scaled = reals.copy()
+        scaled[..., self._log] = np.log(scaled[..., self._log])
+        return scaled
 
     def structures(self, matrix: Array) -> NDArray[np.int64]:
         """Return the (N,) structures of designs, each as one number."""

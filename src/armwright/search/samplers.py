@@ -25,7 +25,7 @@ from armwright.runs.trial import FinishedTrial
 from armwright.seeding import SAMPLING, derived_seed
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.optuna_distributions import distributions, quietly
-from armwright.spaces.parameters import Design, FloatParameter, ParameterValue
+from armwright.spaces.parameters import Design, FloatParameter, Parameter, ParameterValue
 
 SamplerFactory = Callable[[int], BaseSampler]
 
@@ -239,12 +239,7 @@ class BlackBox:
         for parameter in self._space.parameters:
             if not self._space.is_free(parameter.name, self._space.from_free_values(params).params):
                 continue
-            if isinstance(parameter, FloatParameter):
-                params[parameter.name] = trial.suggest_float(
-                    parameter.name, parameter.low, parameter.high, step=parameter.step or None
-                )
-            else:
-                params[parameter.name] = trial.suggest_categorical(parameter.name, parameter.choices)
+            params[parameter.name] = _suggested(trial, parameter)
         return self._space.from_free_values(params)
 
     def _assign_generation(self, sampler: BaseSampler, trial: Trial) -> None:
@@ -255,6 +250,16 @@ class BlackBox:
         assign = getattr(sampler, "get_trial_generation", None)
         if assign is not None:
             assign(self._study, self._study.get_trials(deepcopy=False)[trial.number])
+
+
+def _suggested(trial: Trial, parameter: Parameter) -> ParameterValue:
+    """Return the value that a trial suggests for a parameter."""
+    if not isinstance(parameter, FloatParameter):
+        return trial.suggest_categorical(parameter.name, parameter.choices)
+    name, low, high = parameter.name, parameter.low, parameter.high
+    if parameter.integer:
+        return trial.suggest_int(name, round(low), round(high), step=round(parameter.step), log=parameter.log)
+    return trial.suggest_float(name, low, high, step=parameter.step or None, log=parameter.log)
 
 
 def _notes(attributes: Mapping[str, Any], constraints: Sequence[str]) -> dict[str, Any]:

@@ -64,7 +64,7 @@ def conditional_parameters(space: SpaceSchema) -> dict[str, ConditionalParameter
         parameter = entry.parameter
         if parameter.name in restrictions:
             parameter = _restrict(parameter, restrictions[parameter.name])
-        step = steps.get(parameter.name, steps.get(parameter.name.partition("_")[0], 0.0))
+        step = steps.get(parameter.name, steps.get(_kind(parameter.name), 0.0))
         if step > 0.0 and isinstance(parameter, FloatParameter):
             parameter = _on_grid(parameter, step)
         entries[entry.name] = replace(entry, parameter=parameter)
@@ -90,7 +90,18 @@ def _unrestricted(space: SpaceSchema) -> tuple[ConditionalParameter, ...]:
         entries += _per_module(space, "stroke", space.stroke, "m", prismatic)
     if space.limit is not None:
         entries += _per_module(space, "limit", space.limit, "rad", revolute)
-    return tuple(entries)
+    return (*entries, *_custom_parameters(space, revolute + prismatic))
+
+
+def _custom_parameters(space: SpaceSchema, moving: tuple[str, ...]) -> Iterator[ConditionalParameter]:
+    """Yield the custom parameters; those per joint for each module of a type that moves."""
+    types = () if set(space.joint_types) <= set(moving) else moving
+    for name, custom in space.custom:
+        if custom.per is None:
+            yield ConditionalParameter(custom.parameter(name))
+        else:
+            for j, always, used in _modules(space, types):
+                yield ConditionalParameter(custom.parameter(f"{name}_{j}"), None if always else j, used)
 
 
 def _arm_parameters(space: SpaceSchema) -> Iterator[ConditionalParameter]:
@@ -120,16 +131,30 @@ def _per_module(
         unit: The unit of a real parameter.
         types: The module types for which the parameters are active; empty for all.
     """
-    used = frozenset(letter for letter in space.joint_types if letter in types) if types else None
-    if used is not None and not used:
-        return
-    for j in range(1, space.max_joints + 1):
-        always = j <= space.min_joints and (used is None or len(used) == len(space.joint_types))
+    for j, always, used in _modules(space, types):
         if unit:
             parameter = FloatParameter(f"{kind}_{j}", float(values[0]), float(values[1]), unit)
         else:
             parameter = CategoricalParameter(f"{kind}_{j}", cast("tuple[str, ...]", values))
         yield ConditionalParameter(parameter, None if always else j, used)
+
+
+def _modules(space: SpaceSchema, types: tuple[str, ...]) -> Iterator[tuple[int, bool, frozenset[str] | None]]:
+    """Yield each module, counted from 1, for which a parameter may be active.
+
+    With it: whether the parameter is always active there, and the types for which it is; None for all.
+    """
+    used = frozenset(letter for letter in space.joint_types if letter in types) if types else None
+    if used is not None and not used:
+        return
+    for j in range(1, space.max_joints + 1):
+        yield j, j <= space.min_joints and (used is None or len(used) == len(space.joint_types)), used
+
+
+def _kind(name: str) -> str:
+    """Return the kind of a parameter that a grid may name: `link` of link_3; empty for a parameter without one."""
+    kind, _, suffix = name.rpartition("_")
+    return kind if suffix.isdigit() or kind == "origin" else ""
 
 
 def _restrict(parameter: Parameter, to: Restriction) -> Parameter:
@@ -148,7 +173,7 @@ def _restrict(parameter: Parameter, to: Restriction) -> Parameter:
         if not values:
             raise ValueError(f"restrict: {parameter.name} has no choice left")
         return CategoricalParameter(parameter.name, tuple(c for c in parameter.choices if c in values))
-    numbers = [value for value in values if not isinstance(value, str)]
+    numbers = [float(value) for value in values if not isinstance(value, str)]
     if not 1 <= len(numbers) == len(values) <= 2:
         raise ValueError(f"restrict: {parameter.name} = {to!r} is neither a number nor a range [{parameter.unit}]")
     low, high = numbers[0], numbers[-1]
@@ -157,7 +182,9 @@ def _restrict(parameter: Parameter, to: Restriction) -> Parameter:
             f"restrict: {parameter.name} = [{low:g}, {high:g}] {parameter.unit} is outside "
             f"[{parameter.low:g}, {parameter.high:g}]"
         )
-    return FloatParameter(parameter.name, low, high, parameter.unit)
+    if parameter.integer and not (low.is_integer() and high.is_integer()):
+        raise ValueError(f"restrict: {parameter.name} = [{low:g}, {high:g}]: expected whole numbers")
+    return replace(parameter, low=low, high=high)
 
 
 def _on_grid(parameter: FloatParameter, step: float) -> FloatParameter:
@@ -171,12 +198,23 @@ def check_parameters(space: SpaceSchema) -> None:
     names = [entry.name for entry in _unrestricted(space)]
     real = [entry.name for entry in _unrestricted(space) if isinstance(entry.parameter, FloatParameter)]
     _check_known("restrict", [name for name, _ in space.restrict], names)
-    _check_known("grid", [name for name, _ in space.grid], [*GRID_KINDS, *real])
+    kinds = [*GRID_KINDS, *(name for name, custom in space.custom if custom.per is not None)]
+    _check_known("grid", [name for name, _ in space.grid], [*kinds, *real])
     _check_known("tie", [name for pair in space.tie for name in pair], names)
     for name, step in space.grid:
         if not GRID_ERROR < step <= MAX_LENGTH:
             raise ValueError(f"grid: {name} = {step:g}: expected a step above 0")
+        for entry in _unrestricted(space):
+            if name in (entry.name, _kind(entry.name)) and isinstance(entry.parameter, FloatParameter):
+                _check_step(entry.parameter, step)
     _check_ties(space)
+
+
+def _check_step(parameter: FloatParameter, step: float) -> None:
+    if parameter.log:
+        raise ValueError(f"grid: {parameter.name}: expected a parameter on a linear scale, got scale: log")
+    if parameter.integer and not step.is_integer():
+        raise ValueError(f"grid: {parameter.name} = {step:g}: expected a whole number, as its values are")
 
 
 def _check_known(key: str, names: Iterable[str], known: Sequence[str]) -> None:

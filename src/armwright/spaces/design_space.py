@@ -17,6 +17,7 @@ from armwright.arrays import Array
 from armwright.exceptions import DesignError, SpaceError, did_you_mean
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import ArmBuilder
+from armwright.spaces.custom_parameters import NUMBERED
 from armwright.spaces.design_parameters import ConditionalParameter, check_parameters, conditional_parameters
 from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, ParameterValue
 from armwright.spaces.space_schema import SpaceSchema
@@ -43,6 +44,22 @@ class DesignSpace(SpaceSchema, frozen=True):
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters in their fixed order: origin, joint types, link lengths, …; tied ones, too."""
         return tuple(entry.parameter for entry in conditional_parameters(self).values())
+
+    @property
+    def custom_names(self) -> frozenset[str]:
+        """The names of the custom parameters, which do not change the arm."""
+        custom = dict(self.custom)
+        names = (parameter.name for parameter in self.parameters)
+        return frozenset(name for name in names if NUMBERED.sub("", name) in custom)
+
+    def with_custom(self, design: Design, like: Design | None = None) -> Design:
+        """Return a design with the custom parameters of another one, or with their defaults."""
+        own = self.custom_names
+        if not own:
+            return design
+        source: Mapping[str, ParameterValue] = {} if like is None else like.params
+        defaults: dict[str, ParameterValue] = {p.name: p.default for p in self.parameters if p.name in own}
+        return Design({name: source.get(name, defaults.get(name, value)) for name, value in design.params.items()})
 
     def is_free(self, name: str, params: Mapping[str, ParameterValue]) -> bool:
         """Return whether a parameter is active and not tied, given the values of the parameters before it."""

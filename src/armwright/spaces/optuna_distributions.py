@@ -5,7 +5,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 
 import optuna
-from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import FloatParameter, Parameter
@@ -20,8 +20,11 @@ def distributions(space: DesignSpace) -> dict[str, BaseDistribution]:
 
 
 def _distribution(parameter: Parameter) -> BaseDistribution:
+    if isinstance(parameter, FloatParameter) and parameter.integer:
+        low, high, step = (round(value) for value in (parameter.low, parameter.high, parameter.step))
+        return IntDistribution(low, high, log=parameter.log, step=step)
     if isinstance(parameter, FloatParameter):
-        return FloatDistribution(parameter.low, parameter.high, step=parameter.step or None)
+        return FloatDistribution(parameter.low, parameter.high, log=parameter.log, step=parameter.step or None)
     return CategoricalDistribution(parameter.choices)
 
 

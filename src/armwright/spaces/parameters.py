@@ -20,7 +20,7 @@ GRID_DIGITS = 12  # decimals of a value on a grid
 
 @dataclass(frozen=True, slots=True)
 class FloatParameter:
-    """A real parameter.
+    """A numeric parameter.
 
     Attributes:
         name: Its name.
@@ -28,6 +28,8 @@ class FloatParameter:
         high: The upper bound.
         unit: The unit.
         step: The step of its grid, which starts at `low`; 0 for none.
+        log: Whether it is drawn on a logarithmic scale; its values are above 0.
+        integer: Whether its values are whole numbers, as `int`; its step is one, too.
     """
 
     name: str
@@ -35,6 +37,8 @@ class FloatParameter:
     high: float
     unit: str
     step: float = 0.0
+    log: bool = False
+    integer: bool = False
 
     def __post_init__(self) -> None:
         """Replace -0.0 by 0.0: numpy sorts -0.0 below 0.0."""
@@ -43,11 +47,11 @@ class FloatParameter:
 
     @property
     def default(self) -> float:
-        """The middle of the range."""
-        return self.nearest((self.low + self.high) / 2)
+        """The middle of the range, on its scale."""
+        return self.nearest(math.sqrt(self.low * self.high) if self.log else (self.low + self.high) / 2)
 
     def check(self, value: Any) -> float:
-        """Return `value` as a float.
+        """Return `value` as a float, or as an int if values are whole numbers.
 
         Raises:
             DesignError: If it is not a number within the range, or not on the grid.
@@ -65,7 +69,7 @@ class FloatParameter:
                 f"{self.name} = {exact(value)} {self.unit} is not on its grid: "
                 f"{exact(self.low)} {self.unit} plus multiples of {exact(self.step)} {self.unit}"
             )
-        return float(value)
+        return round(value) if self.integer else float(value)
 
     def nearest(self, value: float) -> float:
         """Return the allowed value closest to `value`."""
@@ -80,11 +84,15 @@ class FloatParameter:
 
     def decode(self, number: float) -> float:
         """Return the value that an entry of a design matrix stands for."""
-        return number
+        return round(number) if self.integer else number
 
     def sample(self, rng: np.random.Generator) -> float:
-        """Return the matrix entry of a uniformly drawn value."""
-        return self.nearest(float(rng.uniform(self.low, self.high)))
+        """Return the matrix entry of a value that is drawn uniformly on its scale."""
+        margin = self.step / 2 if self.integer else 0.0  # the ends are as likely as any other number
+        low, high = self.low - margin, self.high + margin
+        if self.log:
+            return self.nearest(math.exp(rng.uniform(math.log(low), math.log(high))))
+        return self.nearest(float(rng.uniform(low, high)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field, field_serializer, field_validator, model_
 from armwright.robot.actuators import DIMENSIONS, ActuatorRecord, resolve_actuator, value_of
 from armwright.robot.arm import Actuator
 from armwright.spaces.column import ColumnKeys
+from armwright.spaces.custom_parameters import MAX_CUSTOM, CustomParameter, check_names, read_custom
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
 from armwright.spaces.link_mass import Length, MassModel, MassPerMetre
 from armwright.spaces.link_section import LinkSection
@@ -25,7 +26,16 @@ MIN_JOINT_RANGE = math.radians(3.0)  # [rad]
 MIN_STROKE = 3e-3  # [m]
 
 
-class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True):
+class SpaceSchema(
+    BaseModel,
+    frozen=True,
+    extra="forbid",
+    allow_inf_nan=False,
+    use_attribute_docstrings=True,
+    validate_by_name=True,
+    validate_by_alias=True,
+    serialize_by_alias=True,
+):
     """The keys of a space file, with the values of the paper as defaults."""
 
     name: str = Field(default="paper", min_length=1, max_length=100)
@@ -76,6 +86,17 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     """Step size of a real parameter (link_1: 0.01) or of all of a kind (link: 0.005)."""
     tie: tuple[tuple[str, str], ...] = Field(default=(), max_length=100)
     """Parameters that always equal another one (link_3: link_2)."""
+    custom: tuple[tuple[str, CustomParameter], ...] = Field(default=(), max_length=MAX_CUSTOM, alias="parameters")
+    """Custom parameters by name, which do not change the arm: an evaluator reads them."""
+
+    @field_validator("custom", mode="before")
+    @classmethod
+    def _read_custom(cls, value: Any) -> Any:
+        return read_custom(value)
+
+    @field_serializer("custom")
+    def _custom_to_mapping(self, value: tuple[tuple[str, CustomParameter], ...]) -> dict[str, Any]:
+        return {name: entry.model_dump(mode="json", exclude_defaults=True) for name, entry in value}
 
     @field_validator("restrict", "grid", "tie", mode="before")
     @classmethod
@@ -114,6 +135,7 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
         _check_motor_bodies(self)
         _check_mass(self)
         _check_support(self)
+        check_names(name for name, _ in self.custom)
         return self
 
     @property

@@ -33,5 +33,7 @@ def perturbed(space: DesignSpace, matrix: Array, tolerance: float = TOLERANCE) -
 
 
 def length_columns(space: DesignSpace) -> list[int]:
-    """Return the columns of a design matrix that hold lengths and base coordinates."""
-    return [i for i, p in enumerate(space.parameters) if isinstance(p, FloatParameter) and p.unit == "m"]
+    """Return the columns of a design matrix that hold lengths and base coordinates of the arm."""
+    own = space.custom_names
+    lengths = (i for i, p in enumerate(space.parameters) if isinstance(p, FloatParameter) and p.unit == "m")
+    return [i for i in lengths if space.parameters[i].name not in own]

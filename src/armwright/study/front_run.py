@@ -15,6 +15,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
+from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
@@ -68,6 +69,7 @@ def find_front(
         True
     """
     plan = budget if isinstance(budget, TimePlan) else TimePlan(SearchBudget.of(budget, evaluations))
+    refuse_unread_parameters(problem)
     stop_if_proven(check_instantly(problem))
     matrix, origin = _initial_matrix(problem, initial_designs)  # before a folder is made
     config = run_config(problem, FrontMethod(initial_designs=origin), seed)

@@ -14,6 +14,7 @@ from typing import Any
 
 from armwright.exceptions import ModelError, StoppedError
 from armwright.pareto import FrontTracker
+from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.evaluators import evaluator_error
 from armwright.problem.problem import Outcome, Problem
@@ -109,6 +110,7 @@ def optimize(
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
     evaluation = EvaluationOptions(workers, evaluation_timeout, allow_failures)
     check_settings(problem, method, evaluation, on_model_failure)
+    refuse_unread_parameters(problem)
     stop_if_proven(check_instantly(problem))
     config = run_config(problem, method, seed)
     with ExitStack() as stack:

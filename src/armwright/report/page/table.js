@@ -36,9 +36,12 @@ function columns() {
     if (!head.parameters.some((p) => p.name.startsWith(`${kind}_`))) continue;
     made.push({ key: kind, name: `${kind}s`, text: true, value: (i) => content.chosen(i, kind).join(", ") });
   }
+  for (const p of head.parameters.filter((p) => p.custom && p.choices)) {
+    made.push({ key: p.name, name: p.name.replaceAll("_", " "), text: true, value: (i) => content.param(i, p.name) });
+  }
   for (const p of head.parameters.filter((p) => !p.choices)) {
     const form = (value) => (value === undefined ? "–" : (p.unit === "m" ? metres : number)(value));
-    made.push({ key: p.name, name: `${p.name.replace("_", " ")} [${p.unit}]`, form, value: (i) => content.param(i, p.name) });
+    made.push({ key: p.name, name: p.name.replaceAll("_", " ") + (p.unit ? ` [${p.unit}]` : ""), form, value: (i) => content.param(i, p.name) });
   }
   return made;
 }
