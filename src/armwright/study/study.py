@@ -24,7 +24,7 @@ from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, REFINE, History
 from armwright.runs.results import complete_summary, discard_results, summarize, write_results
 from armwright.runs.verification import verify_front
 from armwright.search.refine import Refinement, refine_one
-from armwright.search.samplers import BlackBox, SamplerFactory
+from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
 from armwright.study.dask_backend import DaskBackend
@@ -43,7 +43,7 @@ def optimize(
     problem: Problem,
     *,
     proposer: str | Proposer | None = "auto",
-    sampler: str | SamplerFactory = "tpe",
+    sampler: str | SamplerFactory = "auto",
     n_init: int = 10,
     n_step: int = 10,
     n_total: int = 200,
@@ -62,7 +62,8 @@ def optimize(
     Args:
         problem: the problem.
         proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or a Proposer.
-        sampler: "tpe", "tpe-multivariate", "nsga2", "gp", "random", or a factory seed -> Optuna sampler.
+        sampler: "auto" (surrogate with an evaluator, else tpe), "surrogate", "tpe", "tpe-multivariate", "nsga2", "gp",
+            "random", or a factory seed -> Optuna sampler.
         n_init: random trials.
         n_step: trials of a block; its first is the proposer's.
         n_total: counted trials.
@@ -93,6 +94,7 @@ def optimize(
         True
     """
     proposer = check_proposer(proposer)
+    sampler = sampler_for(problem, sampler)
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
     check_settings(problem, method, workers, on_model_failure)
     stop_if_proven(check_instantly(problem))
