@@ -33,6 +33,7 @@ from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.pending_trial import PendingTrial, new_trial
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.sampler_advice import sampler_advice
 from armwright.study.schedule import ReplaySchedule, Schedule
 from armwright.study.settings import check_proposer, check_settings, run_config, study_method
 
@@ -341,7 +342,9 @@ class Study:
         if trial.fault:
             self._faults[trial.fault] += 1
         self._freeze_reference_point()
-        note = "" if pending.slot is None else pending.slot.note
+        note = sampler_advice(self._problem, self._method, self._trials)
+        if pending.slot is not None and pending.slot.note:
+            note = pending.slot.note
         if trial.failure:
             note = f"trial {trial.number}: {trial.failure}"
         self._report("finished", trial.number, trial.source, fault=trial.fault, note=note, reason=trial.reason)

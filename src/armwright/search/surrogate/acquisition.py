@@ -1,4 +1,4 @@
-"""Expected hypervolume gain of designs whose objectives are independent normal variables, or logarithms are.
+"""Expected hypervolume gain of designs whose objectives are independent normal variables.
 
 The region that a front does not dominate, bounded by the reference point, is a union of disjoint boxes. The expected
 gain is the integral of P(y <= z) over it, which is exact in closed form (Emmerich, Giannakoglou & Naujoks, IEEE Trans.
@@ -6,8 +6,7 @@ Evol. Comput. 10(4), 2006; boxes as in Yang et al., J. Global Optimization 75, 2
 
     E[gain] = Σ_boxes Π_m (I_m(upper) - I_m(lower)),   I_m(z) = E[max(0, z - y_m)]
 
-With one objective this is the expected improvement. Objectives keep their units, so that scaling one of them scales all
-gains alike.
+With one objective this is the expected improvement.
 """
 
 from dataclasses import dataclass
@@ -27,43 +26,23 @@ class Forecast:
     """Predicted objectives of N designs, independent.
 
     Attributes:
-        mean: (N, M) of each objective, or of log(objective + shift) where `is_log`.
-        deviation: (N, M) standard deviations of the same.
-        is_log: (M,) True for objectives whose logarithms are normal.
-        shift: (M,) added before the logarithm.
+        mean: (N, M) of each objective.
+        deviation: (N, M) standard deviations.
     """
 
     mean: Array
     deviation: Array
-    is_log: tuple[bool, ...]
-    shift: tuple[float, ...]
 
     def __len__(self) -> int:
         return len(self.mean)
 
-    @property
-    def medians(self) -> Array:
-        """(N, M) medians of the objectives."""
-        medians = self.mean.copy()
-        for column, (is_log, shift) in enumerate(zip(self.is_log, self.shift, strict=True)):
-            if is_log:
-                medians[:, column] = np.exp(medians[:, column]) - shift
-        return medians
-
     def shortfall(self, objective: int, bounds: Array) -> Array:
-        """Return (N, K) the expected excess E[max(0, z - y)] of K bounds z over an objective y."""
-        mean, deviation = self.mean[:, [objective]], self.deviation[:, [objective]]
-        if not self.is_log[objective]:
-            distance = (np.where(np.isfinite(bounds), bounds, 0.0) - mean) / deviation
-            density = np.exp(-0.5 * distance**2) / np.sqrt(2.0 * np.pi)
-            excess = deviation * (distance * ndtr(distance) + density)
-            return np.where(np.isfinite(bounds), excess, 0.0)
-        shifted = bounds + self.shift[objective]
-        positive = np.where(shifted > 0.0, shifted, 1.0)  # also 1 for -inf
-        distance = (np.log(positive) - mean) / deviation
-        average = np.exp(np.minimum(mean + 0.5 * deviation**2, 700.0))
-        excess = positive * ndtr(distance) - average * ndtr(distance - deviation)
-        return np.where(shifted > 0.0, np.maximum(excess, 0.0), 0.0)
+        """Return (N, K) the expectations of max(0, z - y) for K bounds z of an objective y."""
+        is_finite = np.isfinite(bounds)
+        deviation = self.deviation[:, [objective]]
+        distance = (np.where(is_finite, bounds, 0.0) - self.mean[:, [objective]]) / deviation
+        density = np.exp(-0.5 * distance**2) / np.sqrt(2.0 * np.pi)
+        return np.where(is_finite, deviation * (distance * ndtr(distance) + density), 0.0)
 
 
 def expected_gain(forecast: Forecast, values: Array, reference_point: Array) -> Array:

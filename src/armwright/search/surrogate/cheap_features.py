@@ -19,7 +19,7 @@ from armwright.spaces.parameters import CategoricalParameter, Design
 PHYSICS, PARAMETERS = "physics", "parameters"  # sets of inputs
 PROBES = 400  # random designs that scale the inputs
 HEAVY_TAIL = 8.0  # the largest value over the median, from which a quantity counts by its logarithm
-LOG_FLOOR = 1e-2  # of the median, added before a logarithm
+LOG_FLOOR = 3e-2  # of the median, added before a logarithm
 SAME = 0.9999  # correlation of two quantities from which one is left out
 
 FeatureFunction = Callable[[Design], Sequence[float]]

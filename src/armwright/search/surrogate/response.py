@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.search.surrogate.gaussian_process import GaussianProcess, Hyperparameters, fit
 
-SHIFT = 0.05  # of the median, added before the logarithm of values that may be 0
+SHIFT = 0.03  # of the median, added before a logarithm, so that a value near 0 does not stand out
 
 
 @dataclass(frozen=True)
@@ -30,14 +30,15 @@ class Transform:
     @classmethod
     def of(cls, values: Array, is_log: bool) -> "Transform":
         """Return the transform of values (N,) to mean 0 and variance 1."""
-        shift = SHIFT * float(np.median(values)) if is_log and values.min() <= 0.0 else 0.0
+        shift = SHIFT * float(np.median(values)) if is_log else 0.0
         shaped = np.log(values + shift) if is_log else values
         deviation = float(shaped.std())
         return cls(is_log, shift, float(shaped.mean()), deviation if deviation > 0.0 else 1.0)
 
     def __call__(self, values: Array) -> Array:
         """Return the (N,) transformed values."""
-        return ((np.log(values + self.shift) if self.is_log else values) - self.mean) / self.deviation
+        shaped = np.log(np.maximum(values, 0.0) + self.shift) if self.is_log else values
+        return (shaped - self.mean) / self.deviation
 
     def log_slopes(self, values: Array) -> float:
         """Return the sum of the logarithms of the transform's slopes at values (N,)."""
@@ -60,10 +61,6 @@ class ResponseModel:
     transform: Transform
     hyperparameters: Hyperparameters
     log_density: float
-
-    def condition(self, inputs: Mapping[str, Array], values: Array) -> GaussianProcess:
-        """Return the process that knows (N,) values at (N, F) inputs of each set."""
-        return GaussianProcess(inputs[self.inputs], self.transform(values), self.hyperparameters)
 
 
 def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:

@@ -14,22 +14,17 @@ from armwright.pareto import feasible_mask, total_violation
 from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import stated_bounds, with_bounds
 from armwright.runs.history import found_reference_point
-from armwright.search.encoding import DesignEncoding
 from armwright.search.surrogate.acquisition import Forecast, expected_gain
 from armwright.search.surrogate.candidates import Candidates
 from armwright.search.surrogate.cheap_features import PHYSICS, CheapFeatures, Description, FeatureFunction
 from armwright.search.surrogate.gaussian_process import GaussianProcess, fit
 from armwright.search.surrogate.response import ResponseModel, choose_model
-from armwright.search.variation import offspring
 from armwright.seeding import derived_seed
 
 FIRST = 10  # trials from which the reference point is found, as a study's random ones
 REFRESH = 20  # trials after which new designs are screened
 MUTANTS = 600  # variations of the present front
-ROUNDS = 2  # of variations of the best candidates
-BEST, CHILDREN = 40, 300  # candidates varied in a round, and variations of them
-EXACT_UNTIL = 50  # trials until which models are chosen anew for every trial; later for every fifth
-EVERY = 5
+GROWTH = 10  # models are chosen anew when the trials have grown by one tenth
 
 
 @dataclass(frozen=True)
@@ -72,7 +67,6 @@ class Surrogate:
         """Prepare inputs and sources of candidates."""
         self._features = CheapFeatures(self.problem, self.function)
         self._candidates = Candidates(self.problem)
-        self._encoding = DesignEncoding(self.problem.space.parameters)
 
     @property
     def input_names(self) -> Mapping[str, tuple[str, ...]]:
@@ -87,16 +81,7 @@ class Surrogate:
         mutants = self._mutants(observations, screen.feasible, rng)
         if len(mutants):
             matrix, known = np.vstack([matrix, mutants]), known + self._features.describe(mutants)
-        score = screen.score(matrix, known)
-        for _ in range(ROUNDS):
-            best = matrix[np.argsort(-score, kind="stable")[:BEST]]
-            order = np.argsort(self._encoding.structures(best), kind="stable")
-            parents = np.zeros(BEST, dtype=np.int64)[: len(best)]
-            children = offspring(best[order], parents, self._encoding, CHILDREN, rng)
-            children = self.problem.space.normalised(children)
-            matrix = np.vstack([matrix, children])
-            score = np.concatenate([score, screen.score(children, self._features.describe(children))])
-        return matrix[int(np.argmax(score))]
+        return matrix[int(np.argmax(screen.score(matrix, known)))]
 
     def describe(self, matrix: Array) -> Description:
         """Return the description of designs (N, P)."""
@@ -105,7 +90,7 @@ class Surrogate:
     def models(self, observations: Observations) -> tuple[ResponseModel, ...]:
         """Return the model of each objective, chosen with the evaluated designs."""
         n = len(observations.matrix)
-        used = observations.before(n if n <= EXACT_UNTIL else n - n % EVERY)
+        used = observations.before(n - n % max(1, n // GROWTH))
         kept = ~used.failed
         values = used.values[kept]
 
@@ -166,28 +151,25 @@ class Screen:
         kept = ~observations.failed
         self.feasible = kept & feasible_mask(known.violations)
         self._models = surrogate.models(observations)
-        self._reference_point = surrogate.reference_point(observations, known.violations)
+        self._reference_point = self._transformed(surrogate.reference_point(observations, known.violations)[None])[0]
         self._success = _success_process(known, observations.failed)
-        values = observations.values[kept]
+        values = self._transformed(observations.values[kept])
         inputs = known[np.flatnonzero(kept)].inputs
         self._processes = self._conditioned(inputs, values)
-        self._front = observations.values[self.feasible]
+        self._front = self._transformed(observations.values[self.feasible])
         if len(observations.pending):
             self._imagine(surrogate.describe(observations.pending), inputs, values)
 
     def forecast(self, known: Description) -> Forecast:
-        """Return the forecast of N designs."""
-        means: list[Array] = []
-        deviations: list[Array] = []
-        for model, process in zip(self._models, self._processes, strict=True):
-            mean, deviation = process.predict(known.inputs[model.inputs])
-            means.append(mean * model.transform.deviation + model.transform.mean)
-            deviations.append(deviation * model.transform.deviation)
-        logs, shifts = [m.transform.is_log for m in self._models], [m.transform.shift for m in self._models]
-        return Forecast(np.column_stack(means), np.column_stack(deviations), tuple(logs), tuple(shifts))
+        """Return the forecast of the transformed objectives of N designs."""
+        pairs = [
+            process.predict(known.inputs[model.inputs])
+            for model, process in zip(self._models, self._processes, strict=True)
+        ]
+        return Forecast(np.column_stack([mean for mean, _ in pairs]), np.column_stack([d for _, d in pairs]))
 
     def gain(self, known: Description) -> Array:
-        """Return (N,) expected gains of hypervolume times the probabilities that the evaluation succeeds.
+        """Return (N,) expected gains of transformed hypervolume, times the probabilities of success.
 
         Designs that violate constraints gain nothing.
         """
@@ -200,8 +182,7 @@ class Screen:
         Deb's rules order these: the least violation first, then the smallest predicted distance from the reference box.
         """
         gain = self.gain(known)
-        medians = self.forecast(known).medians
-        excess = np.maximum(medians - self._reference_point, 0.0) / (np.abs(self._reference_point) + 1e-12)
+        excess = np.maximum(self.forecast(known).mean - self._reference_point, 0.0)
         distance = excess.sum(axis=1) / self._probability(known)
         violation = total_violation(known.violations)
         behind = -np.where(violation > 0.0, 2.0 + violation, distance / (1.0 + distance)) - 1e-12
@@ -216,15 +197,23 @@ class Screen:
         mean, deviation = self._success.predict(known.inputs[PHYSICS])
         return np.maximum(ndtr(mean / deviation), 1e-3)
 
+    def _transformed(self, values: Array) -> Array:
+        """Return the (N, M) objectives as their models see them."""
+        return np.column_stack([m.transform(column) for m, column in zip(self._models, values.T, strict=True)])
+
     def _conditioned(self, inputs: Mapping[str, Array], values: Array) -> list[GaussianProcess]:
-        return [model.condition(inputs, column) for model, column in zip(self._models, values.T, strict=True)]
+        """Return the processes that know transformed objectives (N, M)."""
+        return [
+            GaussianProcess(inputs[model.inputs], column, model.hyperparameters)
+            for model, column in zip(self._models, values.T, strict=True)
+        ]
 
     def _imagine(self, pending: Description, inputs: Mapping[str, Array], values: Array) -> None:
         """Take pending designs for evaluated, with the values predicted.
 
         Kriging believer: Ginsbourger, Le Riche & Carraro, Kriging is well-suited to parallelize optimization, 2010.
         """
-        imagined = self.forecast(pending).medians
+        imagined = self.forecast(pending).mean
         both = {name: np.vstack([table, pending.inputs[name]]) for name, table in inputs.items()}
         self._processes = self._conditioned(both, np.vstack([values, imagined]))
         self._front = np.vstack([self._front, imagined[feasible_mask(pending.violations)]])
