@@ -16,8 +16,8 @@ from armwright.seeding import derived_seed
 RANDOM = 2000  # designs uniform in the space
 NEAR_FRONT = 1000  # variations of the front of the built-in objectives, besides at most 1000 of its designs
 FRONT_EVALUATIONS = 20_000  # evaluations of the built-in objectives to find their front
-CYCLE_EVALUATIONS = 2_000  # the same for tasks with a cycle, whose designs take longer
 SURVEY = 500  # random designs that bound the front of the built-in objectives
+CYCLE_SHARE = 0.05  # of all these numbers for tasks with a cycle, whose designs take a hundred times longer
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,18 @@ class Candidates:
 
     problem: Problem
 
+    def scaled(self, n: int) -> int:
+        """Return how many of n designs there is time for."""
+        return n if self.problem.task.cycle is None else round(CYCLE_SHARE * n)
+
     def screened(self, seed: int) -> Array:
         """Return (N, P) random designs, the front of the built-in objectives, and variations of it."""
         encoding = DesignEncoding(self.problem.space.parameters)
         rng = np.random.default_rng(derived_seed(seed, 1))
         front = self._front(derived_seed(seed, 2))
-        near = offspring(front, np.zeros(len(front), dtype=np.int64), encoding, NEAR_FRONT, rng)
-        return self.problem.space.normalised(np.vstack([encoding.random(RANDOM, rng), front, near]))
+        near = offspring(front, np.zeros(len(front), dtype=np.int64), encoding, self.scaled(NEAR_FRONT), rng)
+        random = encoding.random(self.scaled(RANDOM), rng)
+        return self.problem.space.normalised(np.vstack([random, front, near]))
 
     def variations(self, matrix: Array, values: Array, n: int, rng: np.random.Generator) -> Array:
         """Return (n, P) variations of designs (N, P), of which those of a low Pareto rank are more often parents."""
@@ -49,15 +54,14 @@ class Candidates:
         """Return the front of the built-in objectives, found with a fixed number of evaluations."""
         problem = self._built_in
         space = problem.space
-        survey = problem.evaluate_matrix(space.matrix(space.sample(SURVEY, seed)))
+        survey = problem.evaluate_matrix(space.matrix(space.sample(self.scaled(SURVEY), seed)))
         bound = found_reference_point(survey.values, survey.violations)
 
         def evaluate(matrix: Array) -> Array:
             return problem.evaluate_matrix(matrix).penalised
 
         search = FrontSearch(space.parameters, evaluate, bound, seed)
-        budget = FRONT_EVALUATIONS if problem.task.cycle is None else CYCLE_EVALUATIONS
-        while search.evaluations < budget:
+        while search.evaluations < self.scaled(FRONT_EVALUATIONS):
             search.step()
         return search.matrix
 

@@ -62,6 +62,7 @@ class Surrogate:
     problem: Problem
     function: FeatureFunction | None = None
     _memory: dict[str, tuple[Any, Any]] = field(default_factory=dict[str, "tuple[Any, Any]"])
+    _known: dict[bytes, Description] = field(default_factory=dict[bytes, Description])
 
     def __post_init__(self) -> None:
         """Prepare inputs and sources of candidates."""
@@ -87,6 +88,17 @@ class Surrogate:
         """Return the description of designs (N, P)."""
         return self._features.describe(matrix)
 
+    def describe_known(self, matrix: Array) -> Description:
+        """Return the description of evaluated or pending designs (N, P), each of which is computed once and alone."""
+        found: list[Description] = []
+        for row in matrix:
+            key = row.tobytes()
+            if key not in self._known:
+                self._known[key] = self._features.describe(row[None])
+            found.append(self._known[key])
+        inputs = {name: np.vstack([one.inputs[name] for one in found]) for name in found[0].inputs}
+        return Description(inputs, np.vstack([one.violations for one in found]))
+
     def models(self, observations: Observations) -> tuple[ResponseModel, ...]:
         """Return the model of each objective, chosen with the evaluated designs."""
         n = len(observations.matrix)
@@ -95,7 +107,7 @@ class Surrogate:
         values = used.values[kept]
 
         def chosen() -> tuple[ResponseModel, ...]:
-            inputs = self.describe(used.matrix[kept]).inputs
+            inputs = self.describe_known(used.matrix[kept]).inputs
             return tuple(choose_model(inputs, column) for column in values.T)
 
         return self._remembered("models", (used.matrix.tobytes(), values.tobytes()), chosen)
@@ -127,7 +139,7 @@ class Surrogate:
         matrix, values = observations.matrix[feasible], observations.values[feasible]
         if not len(matrix):
             return observations.matrix[:0]
-        return self._candidates.variations(matrix, values, MUTANTS, rng)
+        return self._candidates.variations(matrix, values, self._candidates.scaled(MUTANTS), rng)
 
     def _remembered(self, name: str, key: Any, compute: Any) -> Any:
         """Return what `compute` returns, or what it returned for the same key last time."""
@@ -147,7 +159,7 @@ class Screen:
     def __init__(self, surrogate: Surrogate, observations: Observations) -> None:
         self._surrogate = surrogate
         self._tried = {row.tobytes() for row in np.vstack([observations.matrix, observations.pending])}
-        known = surrogate.describe(observations.matrix)
+        known = surrogate.describe_known(observations.matrix)
         kept = ~observations.failed
         self.feasible = kept & feasible_mask(known.violations)
         self._models = surrogate.models(observations)
@@ -158,7 +170,7 @@ class Screen:
         self._processes = self._conditioned(inputs, values)
         self._front = self._transformed(observations.values[self.feasible])
         if len(observations.pending):
-            self._imagine(surrogate.describe(observations.pending), inputs, values)
+            self._imagine(surrogate.describe_known(observations.pending), inputs, values)
 
     def forecast(self, known: Description) -> Forecast:
         """Return the forecast of the transformed objectives of N designs."""
