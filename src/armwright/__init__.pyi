@@ -43,6 +43,7 @@ from .runs.history import FrontMember as FrontMember, History as History
 from .runs.results import verify_run as verify_run
 from .runs.task_mjcf import to_mjcf as to_mjcf
 from .runs.trial import FinishedTrial as FinishedTrial
+from .search.surrogate.sampler import surrogate_sampler as surrogate_sampler
 from .spaces.design_space import DesignSpace as DesignSpace, load_space as load_space, paper_space as paper_space
 from .spaces.parameters import Design as Design
 from .study.cluster import Workers as Workers

@@ -139,10 +139,11 @@ def optimize(
     sampler: Annotated[
         str,
         typer.Option(
-            help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.",
+            help="Black-box sampler: auto (surrogate with an evaluator, else tpe), surrogate, tpe, tpe-multivariate, "
+            "nsga2, gp (needs the extra gp) or random.",
             rich_help_panel=SEARCH,
         ),
-    ] = "tpe",
+    ] = "auto",
     n_total: Annotated[int, typer.Option(help="Counted trials.", rich_help_panel=SEARCH)] = 200,
     n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.", rich_help_panel=SEARCH)] = 10,
     n_step: Annotated[
@@ -214,7 +215,7 @@ def optimize(
     choice = choose_proposer(proposer, given)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
-    is_method_chosen = proposer != "auto" or model is not None or sampler != "tpe" or refine_every is not None
+    is_method_chosen = proposer != "auto" or model is not None or sampler != "auto" or refine_every is not None
     if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
         console.print(note)
     check_before_search(console, problem, check_files(task, space), folder)

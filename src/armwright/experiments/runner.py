@@ -17,7 +17,7 @@ from armwright.problem.problem import Problem
 from armwright.runs.config import check_same_run
 from armwright.runs.folder import read_config
 from armwright.runs.results import read_summary
-from armwright.search.samplers import sampler_factory
+from armwright.search.samplers import sampler_factory, sampler_for
 from armwright.spaces.design_space import default_space, load_space
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.study.cluster import MAX_LOSSES, Cluster, Finished, Workers
@@ -96,7 +96,7 @@ def finished_before(cell: Cell) -> CellOutcome | None:
         proposer = plan.choose_proposer(cell.replay).proposer
         method = study_method(
             proposer,
-            plan.sampler,
+            sampler_for(_problem(cell), plan.sampler),
             cell.n_init,
             plan.n_step,
             cell.n_total,
@@ -112,7 +112,7 @@ def finished_before(cell: Cell) -> CellOutcome | None:
 def _check_extras(cells: Sequence[Cell]) -> None:
     """Raise MissingExtraError before any cell is run, rather than in each."""
     for cell in cells:
-        sampler_factory(cell.plan.sampler)
+        sampler_factory(sampler_for(_problem(cell), cell.plan.sampler))
         if cell.plan.needs_a_model and cell.replay is None:
             import_module("armwright.llm.client")
 

@@ -20,8 +20,10 @@ from optuna.trial import Trial, create_trial
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.extras import check_extra
+from armwright.problem.problem import Problem
 from armwright.runs.history import RANDOM
 from armwright.runs.trial import FinishedTrial
+from armwright.search.surrogate.sampler import surrogate_sampler
 from armwright.seeding import SAMPLING, derived_seed
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.optuna_distributions import distributions, quietly
@@ -54,10 +56,22 @@ SAMPLERS: dict[str, SamplerFactory] = {
     "gp": _gp,
     "random": lambda seed: RandomSampler(seed=seed),
 }
+AUTO, SURROGATE = "auto", "surrogate"  # names of samplers that depend on the problem
+NAMES = (AUTO, SURROGATE, *SAMPLERS)
+
+
+def sampler_for(problem: Problem, sampler: str | SamplerFactory) -> str | SamplerFactory:
+    """Return the sampler of a problem: the factory of `surrogate`, and for `auto` this one or `tpe`.
+
+    Evaluators take long as a rule, which is when the surrogate pays; the built-in physics does not.
+    """
+    if sampler == AUTO:
+        sampler = "tpe" if problem.evaluator is None else SURROGATE
+    return surrogate_sampler(problem) if sampler == SURROGATE else sampler
 
 
 def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
-    """Return the factory `seed -> Optuna sampler` of a name, or the given factory.
+    """Return the factory `seed -> Optuna sampler` of a name that needs no problem, or the given factory.
 
     Raises:
         SettingsError: the name is unknown, or `sampler` is not a factory.
@@ -65,15 +79,13 @@ def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
     """
     if isinstance(sampler, BaseSampler) or not (isinstance(sampler, str) or callable(sampler)):
         raise SettingsError(
-            f"expected a sampler name ({', '.join(SAMPLERS)}) or a factory seed -> sampler, got {sampler!r}; every "
+            f"expected a sampler name ({', '.join(NAMES)}) or a factory seed -> sampler, got {sampler!r}; every "
             "trial needs a new sampler"
         )
     if not isinstance(sampler, str):
         return sampler
     if sampler not in SAMPLERS:
-        raise SettingsError(
-            f'unknown sampler "{sampler}".{did_you_mean(sampler, SAMPLERS)} Available: {", ".join(SAMPLERS)}'
-        )
+        raise SettingsError(f'unknown sampler "{sampler}".{did_you_mean(sampler, NAMES)} Available: {", ".join(NAMES)}')
     if sampler == "gp":
         check_extra("gp", "the sampler gp")
     return SAMPLERS[sampler]

@@ -26,7 +26,7 @@ from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, REFINE, History
 from armwright.runs.results import complete_summary, discard_results, summarize, write_results
 from armwright.runs.verification import verify_front
 from armwright.search.refine import Refinement, refine_one
-from armwright.search.samplers import BlackBox, SamplerFactory
+from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
 from armwright.study.dask_backend import DaskBackend
@@ -42,6 +42,7 @@ from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.pending_trial import PendingTrial, new_trial
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.sampler_advice import sampler_advice
 from armwright.study.schedule import ReplaySchedule, Schedule
 from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, run_config, study_method
 
@@ -52,7 +53,7 @@ def optimize(
     problem: Problem,
     *,
     proposer: str | Proposer | None = "auto",
-    sampler: str | SamplerFactory = "tpe",
+    sampler: str | SamplerFactory = "auto",
     n_init: int = 10,
     n_step: int = 10,
     n_total: int = 200,
@@ -73,7 +74,8 @@ def optimize(
     Args:
         problem: the problem.
         proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or a Proposer.
-        sampler: "tpe", "tpe-multivariate", "nsga2", "gp", "random", or a factory seed -> Optuna sampler.
+        sampler: "auto" (surrogate with an evaluator, else tpe), "surrogate", "tpe", "tpe-multivariate", "nsga2", "gp",
+            "random", or a factory seed -> Optuna sampler.
         n_init: random trials.
         n_step: trials of a block; its first is the proposer's.
         n_total: counted trials.
@@ -107,6 +109,7 @@ def optimize(
         True
     """
     proposer = check_proposer(proposer)
+    sampler = sampler_for(problem, sampler)
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
     evaluation = EvaluationOptions(workers, evaluation_timeout, allow_failures)
     check_settings(problem, method, evaluation, on_model_failure)
@@ -366,7 +369,9 @@ class Study:
         if trial.fault:
             self._faults[trial.fault] += 1
         self._freeze_reference_point()
-        note = "" if pending.slot is None else pending.slot.note
+        note = sampler_advice(self._problem, self._method, self._trials)
+        if pending.slot is not None and pending.slot.note:
+            note = pending.slot.note
         self._report("finished", trial.number, trial.source, fault=trial.fault, note=note, reason=trial.reason)
 
     def _stop_failing(self, pending: PendingTrial) -> None:

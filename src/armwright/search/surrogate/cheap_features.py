@@ -1,0 +1,215 @@
+"""Inputs of the surrogate: quantities of a design that the built-in physics gives, and its parameters."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.exceptions import ArmwrightError
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import CLEARANCE_QUANTITIES, JOINTS, QUANTITIES
+from armwright.problem.problem import Problem
+from armwright.search.encoding import DesignEncoding
+from armwright.spaces.parameters import CategoricalParameter, Design
+
+PHYSICS, PARAMETERS = "physics", "parameters"  # sets of inputs
+PROBES = 400  # random designs that scale the inputs
+HEAVY_TAIL = 8.0  # the largest value over the median, from which a quantity counts by its logarithm
+LOG_FLOOR = 3e-2  # of the median, added before a logarithm
+SAME = 0.9999  # correlation of two quantities from which one is left out
+
+FeatureFunction = Callable[[Design], Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Scaling of inputs to mean 0 and variance 1 over random designs.
+
+    Attributes:
+        kept: (K,) columns that differ and are no copies of others.
+        floors: (K,) added before the logarithm; NaN for columns that have none.
+        mean: (K,) after it.
+        deviation: (K,) after it.
+    """
+
+    kept: NDArray[np.intp]
+    floors: Array
+    mean: Array
+    deviation: Array
+
+    @classmethod
+    def of(cls, columns: Array) -> "Scaling":
+        """Return the scaling of columns (N, F)."""
+        floors = np.array([_log_floor(column) for column in columns.T])
+        shaped = _logarithms(columns, floors)
+        deviation = shaped.std(axis=0)
+        varying = np.flatnonzero(deviation > 1e-9 * (1.0 + np.abs(shaped).max(axis=0, initial=0.0)))
+        kept: list[int] = []
+        units = (shaped - shaped.mean(axis=0)) / np.where(deviation > 0.0, deviation, 1.0)
+        for column in varying.tolist():
+            if not kept or np.abs(units[:, kept].T @ units[:, column]).max() < SAME * len(units):
+                kept.append(column)
+        index = np.array(kept, dtype=np.intp)
+        return cls(index, floors[index], shaped[:, index].mean(axis=0), deviation[index])
+
+    def __call__(self, columns: Array) -> Array:
+        """Return the (N, K) scaled inputs of columns (N, F)."""
+        return (_logarithms(columns[:, self.kept], self.floors) - self.mean) / self.deviation
+
+
+def _log_floor(column: Array) -> float:
+    """Return what is added to a column before its logarithm is taken; NaN if it is not positive with a heavy tail."""
+    positive = column[column > 0.0]
+    if column.min() < 0.0 or len(np.unique(column)) < 20:
+        return np.nan
+    median = float(np.median(positive))
+    return (
+        LOG_FLOOR * median if positive.max() > HEAVY_TAIL * median or positive.min() < median / HEAVY_TAIL else np.nan
+    )
+
+
+def _logarithms(columns: Array, floors: Array) -> Array:
+    """Return the columns, the logarithm taken of those with a floor."""
+    has = ~np.isnan(floors)
+    shaped = columns.copy()
+    shaped[:, has] = np.log(np.maximum(columns[:, has], 0.0) + floors[has])
+    return shaped
+
+
+@dataclass(frozen=True)
+class Description:
+    """What is known of N designs without evaluating them.
+
+    Attributes:
+        inputs: (N, F) scaled inputs of each set: `physics` and `parameters`.
+        violations: (N, C) of the constraints, which the built-in physics alone decides.
+    """
+
+    inputs: Mapping[str, Array]
+    violations: Array
+
+    def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Description":
+        """Return the description of some of the designs."""
+        return Description({name: table[rows] for name, table in self.inputs.items()}, self.violations[rows])
+
+    def __add__(self, other: "Description") -> "Description":
+        """Return the description of both sets of designs."""
+        inputs = {name: np.vstack([table, other.inputs[name]]) for name, table in self.inputs.items()}
+        return Description(inputs, np.vstack([self.violations, other.violations]))
+
+
+class CheapFeatures:
+    """Inputs of the surrogate for designs of a problem.
+
+    Args:
+        problem: the problem; its evaluator is never called.
+        function: further inputs of a design; None for none.
+    """
+
+    def __init__(self, problem: Problem, function: FeatureFunction | None = None) -> None:
+        self._problem = problem
+        self._function = function
+        self._encoding = DesignEncoding(problem.space.parameters)
+
+    def describe(self, matrix: Array) -> Description:
+        """Return the description of designs (N, P)."""
+        physics, violations = self._physics(matrix)
+        inputs = {PHYSICS: self._scalings[0](physics), PARAMETERS: self._scalings[1](self._parameters(matrix))}
+        return Description(inputs, violations)
+
+    @cached_property
+    def names(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the columns of each set of inputs."""
+        parameters = self._problem.space.parameters
+        physics: list[str] = [quantity.name for quantity in self._quantities]
+        physics += [parameters[column].name for column in self._base]
+        physics += [f"{letter} joints" for letter in self._problem.space.joint_types]
+        if self._function is not None:
+            n = self._physics(self._probes[:1])[0].shape[1] - len(physics)
+            physics += [f"feature {i + 1}" for i in range(n)]
+        real: list[str] = [parameters[column].name for column in self._encoding.real]
+        categorical = [p for p in parameters if isinstance(p, CategoricalParameter)]
+        choices = [f"{p.name} {choice}" for p in categorical for choice in p.choices]
+        kept: list[list[int]] = [scaling.kept.tolist() for scaling in self._scalings]
+        return {
+            PHYSICS: tuple(physics[column] for column in kept[0]),
+            PARAMETERS: tuple([*real, *choices][column] for column in kept[1]),
+        }
+
+    def _physics(self, matrix: Array) -> tuple[Array, Array]:
+        """Return quantities, base position, counts of joint types and custom inputs of designs, and violations."""
+        tables: list[Array] = []
+        violations = np.empty((len(matrix), len(self._problem.constraints)))
+        for rows in self._problem.chunks(len(matrix)):
+            evaluation = self._problem.physics(matrix[rows])
+            tables.append(np.column_stack([quantity(evaluation) for quantity in self._quantities]))
+            violations[rows] = self._worst_violations(matrix[rows], evaluation)
+        columns = [np.concatenate(tables), matrix[:, self._base], self._joint_counts(matrix)]
+        if self._function is not None:
+            rows = [np.atleast_1d(self._function(design)) for design in self._problem.space.designs(matrix)]
+            columns.append(np.array(rows, dtype=np.float64))
+        return np.column_stack(columns), violations
+
+    def _worst_violations(self, matrix: Array, evaluation: Evaluation) -> Array:
+        """Return the (N, C) violations of designs in the worst case of the task."""
+        problem = self._problem
+        cases = [problem.violations(evaluation)]
+        for case in range(1, len(problem.scenes)):
+            cases.append(problem.violations(problem.physics_of_arms(problem.arms(matrix), case)))
+        return np.max(cases, axis=0)
+
+    def _parameters(self, matrix: Array) -> Array:
+        """Return (N, R) the parameters of designs: real ones on the unit cube, choices as indicators."""
+        choices: list[Array] = [
+            (matrix[:, [column]] == np.arange(n)).astype(np.float64)
+            for column, n in zip(self._encoding.categorical, self._encoding.choices, strict=True)
+        ]
+        return np.column_stack([self._encoding.units(matrix), *choices])
+
+    def _joint_counts(self, matrix: Array) -> Array:
+        """Return (N, L) how many joints of each type designs have."""
+        parameters = self._problem.space.parameters
+        columns = [i for i, p in enumerate(parameters) if p.name.startswith("joint_")]
+        present = np.arange(len(columns)) < self._encoding.n_joints(matrix)[:, None]
+        counts = np.zeros((len(matrix), len(self._problem.space.joint_types)))
+        for position, column in enumerate(columns):
+            parameter = parameters[column]
+            assert isinstance(parameter, CategoricalParameter)
+            letters = np.array(parameter.choices)[matrix[:, column].astype(np.intp)]
+            for i, letter in enumerate(self._problem.space.joint_types):
+                counts[:, i] += present[:, position] & (letters == letter)
+        return counts
+
+    @cached_property
+    def _base(self) -> list[int]:
+        """Return the columns of a design matrix that mean the same in every structure: the base position."""
+        return [i for i, p in enumerate(self._problem.space.parameters) if p.name.startswith("origin_")]
+
+    @cached_property
+    def _probes(self) -> Array:
+        return self._problem.space.normalised(self._encoding.random(PROBES, np.random.default_rng(0)))
+
+    @cached_property
+    def _scalings(self) -> tuple[Scaling, Scaling]:
+        return Scaling.of(self._physics(self._probes)[0]), Scaling.of(self._parameters(self._probes))
+
+    @cached_property
+    def _quantities(self) -> tuple[Objective, ...]:
+        """Return the quantities that the task allows; clearances only if they matter, because they take long."""
+        problem = self._problem
+        without = () if problem.task.obstacles or problem.uses(*CLEARANCE_QUANTITIES) else CLEARANCE_QUANTITIES
+        evaluation = problem.physics(self._probes[:8])
+        left_out = {JOINTS.name, *(quantity.name for quantity in without)}
+        return tuple(q for q in QUANTITIES.values() if q.name not in left_out and _is_defined(q, evaluation))
+
+
+def _is_defined(quantity: Objective, evaluation: Evaluation) -> bool:
+    """Return whether a quantity exists for such arms and such a task."""
+    try:
+        return bool(np.all(np.isfinite(quantity(evaluation))))
+    except ArmwrightError:
+        return False

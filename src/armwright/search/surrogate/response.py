@@ -1,0 +1,88 @@
+"""Models of one objective: which inputs, which transform, and what they predict."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.search.surrogate.gaussian_process import GaussianProcess, Hyperparameters, fit
+
+SHIFT = 0.03  # of the median, added before a logarithm, so that a value near 0 does not stand out
+
+
+@dataclass(frozen=True)
+class Transform:
+    """Standardised values, or standardised logarithms of them.
+
+    Attributes:
+        is_log: whether the logarithm is taken.
+        shift: added before.
+        mean: subtracted after it.
+        deviation: divided by after that.
+    """
+
+    is_log: bool
+    shift: float
+    mean: float
+    deviation: float
+
+    @classmethod
+    def of(cls, values: Array, is_log: bool) -> "Transform":
+        """Return the transform of values (N,) to mean 0 and variance 1."""
+        shift = SHIFT * float(np.median(values)) if is_log else 0.0
+        shaped = np.log(values + shift) if is_log else values
+        deviation = float(shaped.std())
+        return cls(is_log, shift, float(shaped.mean()), deviation if deviation > 0.0 else 1.0)
+
+    def __call__(self, values: Array) -> Array:
+        """Return the (N,) transformed values."""
+        shaped = np.log(np.maximum(values, 0.0) + self.shift) if self.is_log else values
+        return (shaped - self.mean) / self.deviation
+
+    def log_slopes(self, values: Array) -> float:
+        """Return the sum of the logarithms of the transform's slopes at values (N,)."""
+        slopes = -np.log(self.deviation) * len(values)
+        return float(slopes - np.log(values + self.shift).sum() if self.is_log else slopes)
+
+
+@dataclass(frozen=True)
+class ResponseModel:
+    """A model of one objective.
+
+    Attributes:
+        inputs: name of its set of inputs.
+        transform: of its values.
+        hyperparameters: of its process.
+        log_density: of the values left out one by one, their average.
+    """
+
+    inputs: str
+    transform: Transform
+    hyperparameters: Hyperparameters
+    log_density: float
+
+
+def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:
+    """Return the model that predicts values best, each left out in turn.
+
+    The transform is chosen with the first set of inputs, then the set.
+
+    Args:
+        inputs: (N, F) of each set of inputs by name.
+        values: (N,) of an objective.
+    """
+    first, *others = inputs
+    transforms = [Transform.of(values, is_log=False)]
+    if values.min() >= 0.0 and np.median(values) > 0.0:
+        transforms.append(Transform.of(values, is_log=True))
+    best = max((_fitted(first, inputs, values, t) for t in transforms), key=lambda model: model.log_density)
+    models = [best, *(_fitted(name, inputs, values, best.transform) for name in others)]
+    return max(models, key=lambda model: model.log_density)
+
+
+def _fitted(name: str, inputs: Mapping[str, Array], values: Array, transform: Transform) -> ResponseModel:
+    observations = transform(values)
+    process = GaussianProcess(inputs[name], observations, fit(inputs[name], observations))
+    density = (process.log_density_left_out + transform.log_slopes(values)) / len(values)
+    return ResponseModel(name, transform, process.hyperparameters, density)

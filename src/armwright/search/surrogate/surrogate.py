@@ -1,0 +1,242 @@
+"""The surrogate of a problem: models fitted to evaluated designs, and the design with the largest expected gain."""
+
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from armwright.arrays import Array
+from armwright.pareto import feasible_mask, total_violation
+from armwright.problem.problem import Problem
+from armwright.problem.stated_bounds import stated_bounds, with_bounds
+from armwright.runs.history import found_reference_point
+from armwright.search.surrogate.acquisition import Forecast, expected_gain
+from armwright.search.surrogate.candidates import Candidates
+from armwright.search.surrogate.cheap_features import PHYSICS, CheapFeatures, Description, FeatureFunction
+from armwright.search.surrogate.gaussian_process import GaussianProcess, fit
+from armwright.search.surrogate.response import ResponseModel, choose_model
+from armwright.seeding import derived_seed
+
+FIRST = 10  # trials from which the reference point is found, as a study's random ones
+REFRESH = 20  # trials after which new designs are screened
+MUTANTS = 600  # variations of the present front
+GROWTH = 10  # models are chosen anew when the trials have grown by one tenth
+
+
+@dataclass(frozen=True)
+class Observations:
+    """The designs of a study so far.
+
+    Attributes:
+        matrix: (N, P) evaluated designs, by trial number.
+        values: (N, M) objectives, minimised.
+        failed: (N,) True if the evaluation failed, so that the values mean nothing.
+        pending: (K, P) designs that are being evaluated.
+    """
+
+    matrix: Array
+    values: Array
+    failed: NDArray[np.bool_]
+    pending: Array
+
+    def before(self, n: int) -> "Observations":
+        """Return the first n evaluated designs."""
+        return Observations(self.matrix[:n], self.values[:n], self.failed[:n], self.pending[:0])
+
+
+@dataclass
+class Surrogate:
+    """Models of the objectives of a problem, and a search for the design with the largest expected gain.
+
+    All results depend on the arguments only. What is kept in memory saves time.
+
+    Attributes:
+        problem: the problem; its evaluator is never called.
+        function: custom inputs of a design; None for none.
+    """
+
+    problem: Problem
+    function: FeatureFunction | None = None
+    _memory: dict[str, tuple[Any, Any]] = field(default_factory=dict[str, "tuple[Any, Any]"])
+    _known: dict[bytes, Description] = field(default_factory=dict[bytes, Description])
+
+    def __post_init__(self) -> None:
+        """Prepare inputs and sources of candidates."""
+        self._features = CheapFeatures(self.problem, self.function)
+        self._candidates = Candidates(self.problem)
+
+    @property
+    def input_names(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the inputs of each set."""
+        return self._features.names
+
+    def choose(self, observations: Observations, seed: int) -> Array:
+        """Return the (P,) design to evaluate next."""
+        rng = np.random.default_rng(seed)
+        screen = Screen(self, observations)
+        matrix, known = self._screened(observations)
+        mutants = self._mutants(observations, screen.feasible, rng)
+        if len(mutants):
+            matrix, known = np.vstack([matrix, mutants]), known + self._features.describe(mutants)
+        return matrix[int(np.argmax(screen.score(matrix, known)))]
+
+    def describe(self, matrix: Array) -> Description:
+        """Return the description of designs (N, P)."""
+        return self._features.describe(matrix)
+
+    def describe_known(self, matrix: Array) -> Description:
+        """Return the description of evaluated or pending designs (N, P), each of which is computed once and alone."""
+        found: list[Description] = []
+        for row in matrix:
+            key = row.tobytes()
+            if key not in self._known:
+                self._known[key] = self._features.describe(row[None])
+            found.append(self._known[key])
+        inputs = {name: np.vstack([one.inputs[name] for one in found]) for name in found[0].inputs}
+        return Description(inputs, np.vstack([one.violations for one in found]))
+
+    def models(self, observations: Observations) -> tuple[ResponseModel, ...]:
+        """Return the model of each objective, chosen with the evaluated designs."""
+        n = len(observations.matrix)
+        used = observations.before(n - n % max(1, n // GROWTH))
+        kept = ~used.failed
+        values = used.values[kept]
+
+        def chosen() -> tuple[ResponseModel, ...]:
+            inputs = self.describe_known(used.matrix[kept]).inputs
+            return tuple(choose_model(inputs, column) for column in values.T)
+
+        return self._remembered("models", (used.matrix.tobytes(), values.tobytes()), chosen)
+
+    def reference_point(self, observations: Observations, violations: Array) -> Array:
+        """Return the (M,) bound of the hypervolume, as a study with 10 random trials finds it."""
+        stated = self.problem.reference_point
+        n_objectives = observations.values.shape[1]
+        if stated is not None and len(stated) == n_objectives:
+            return np.array(stated)
+        first = np.flatnonzero(~observations.failed)[:FIRST]
+        found = found_reference_point(observations.values[first], violations[first])
+        same = n_objectives == len(self.problem.objectives)
+        return np.array(with_bounds(found, stated_bounds(self.problem)) if same else found)
+
+    def _screened(self, observations: Observations) -> tuple[Array, Description]:
+        """Return the candidates of the present twenty trials, and their description."""
+        n = len(observations.matrix) + len(observations.pending)
+        # Runs differ in their first design, so that they do not share their candidates.
+        first = zlib.crc32(observations.matrix[0].tobytes())
+
+        def screened() -> tuple[Array, Description]:
+            matrix = self._candidates.screened(derived_seed(first, n // REFRESH))
+            return matrix, self._features.describe(matrix)
+
+        return self._remembered("screened", (first, n // REFRESH), screened)
+
+    def _mutants(self, observations: Observations, feasible: NDArray[np.bool_], rng: np.random.Generator) -> Array:
+        matrix, values = observations.matrix[feasible], observations.values[feasible]
+        if not len(matrix):
+            return observations.matrix[:0]
+        return self._candidates.variations(matrix, values, self._candidates.scaled(MUTANTS), rng)
+
+    def _remembered(self, name: str, key: Any, compute: Any) -> Any:
+        """Return what `compute` returns, or what it returned for the same key last time."""
+        if name not in self._memory or self._memory[name][0] != key:
+            self._memory[name] = key, compute()
+        return self._memory[name][1]
+
+
+class Screen:
+    """Forecasts and expected gains of designs, given those evaluated so far.
+
+    Args:
+        surrogate: of the problem.
+        observations: with at least two designs whose evaluation did not fail.
+    """
+
+    def __init__(self, surrogate: Surrogate, observations: Observations) -> None:
+        self._surrogate = surrogate
+        self._tried = {row.tobytes() for row in np.vstack([observations.matrix, observations.pending])}
+        known = surrogate.describe_known(observations.matrix)
+        kept = ~observations.failed
+        self.feasible = kept & feasible_mask(known.violations)
+        self._models = surrogate.models(observations)
+        self._reference_point = self._transformed(surrogate.reference_point(observations, known.violations)[None])[0]
+        self._success = _success_process(known, observations.failed)
+        values = self._transformed(observations.values[kept])
+        inputs = known[np.flatnonzero(kept)].inputs
+        self._processes = self._conditioned(inputs, values)
+        self._front = self._transformed(observations.values[self.feasible])
+        if len(observations.pending):
+            self._imagine(surrogate.describe_known(observations.pending), inputs, values)
+
+    def forecast(self, known: Description) -> Forecast:
+        """Return the forecast of the transformed objectives of N designs."""
+        pairs = [
+            process.predict(known.inputs[model.inputs])
+            for model, process in zip(self._models, self._processes, strict=True)
+        ]
+        return Forecast(np.column_stack([mean for mean, _ in pairs]), np.column_stack([d for _, d in pairs]))
+
+    def gain(self, known: Description) -> Array:
+        """Return (N,) expected gains of transformed hypervolume, times the probabilities of success.
+
+        Designs that violate constraints gain nothing.
+        """
+        gain = expected_gain(self.forecast(known), self._front, self._reference_point)
+        return np.where(feasible_mask(known.violations), gain * self._probability(known), 0.0)
+
+    def score(self, matrix: Array, known: Description) -> Array:
+        """Return (N,) scores of designs: their gain; below 0 for those that gain nothing, in order of preference.
+
+        Deb's rules order these: the least violation first, then the smallest predicted distance from the reference box.
+        """
+        gain = self.gain(known)
+        excess = np.maximum(self.forecast(known).mean - self._reference_point, 0.0)
+        distance = excess.sum(axis=1) / self._probability(known)
+        violation = total_violation(known.violations)
+        behind = -np.where(violation > 0.0, 2.0 + violation, distance / (1.0 + distance)) - 1e-12
+        score = np.where(gain > 0.0, gain, behind)
+        tried = np.array([row.tobytes() in self._tried for row in matrix], dtype=bool)
+        return np.where(tried, -np.inf, score)
+
+    def _probability(self, known: Description) -> Array:
+        """Return (N,) the probabilities that evaluations succeed."""
+        if self._success is None:
+            return np.ones(len(known.violations))
+        mean, deviation = self._success.predict(known.inputs[PHYSICS])
+        return np.maximum(ndtr(mean / deviation), 1e-3)
+
+    def _transformed(self, values: Array) -> Array:
+        """Return the (N, M) objectives as their models see them."""
+        return np.column_stack([m.transform(column) for m, column in zip(self._models, values.T, strict=True)])
+
+    def _conditioned(self, inputs: Mapping[str, Array], values: Array) -> list[GaussianProcess]:
+        """Return the processes that know transformed objectives (N, M)."""
+        return [
+            GaussianProcess(inputs[model.inputs], column, model.hyperparameters)
+            for model, column in zip(self._models, values.T, strict=True)
+        ]
+
+    def _imagine(self, pending: Description, inputs: Mapping[str, Array], values: Array) -> None:
+        """Take pending designs for evaluated, with the values predicted.
+
+        Kriging believer: Ginsbourger, Le Riche & Carraro, Kriging is well-suited to parallelize optimization, 2010.
+        """
+        imagined = self.forecast(pending).mean
+        both = {name: np.vstack([table, pending.inputs[name]]) for name, table in inputs.items()}
+        self._processes = self._conditioned(both, np.vstack([values, imagined]))
+        self._front = np.vstack([self._front, imagined[feasible_mask(pending.violations)]])
+
+
+def _success_process(known: Description, failed: NDArray[np.bool_]) -> GaussianProcess | None:
+    """Return a process of success (1) and failure (-1); None if nothing failed.
+
+    Least-squares classification: Rasmussen & Williams, section 6.5.
+    """
+    if not failed.any():
+        return None
+    labels = np.where(failed, -1.0, 1.0)
+    return GaussianProcess(known.inputs[PHYSICS], labels, fit(known.inputs[PHYSICS], labels))

@@ -1,0 +1,186 @@
+"""The surrogate as a sampler: resuming, conditional spaces, constraints, failures, several trials at a time."""
+
+from pathlib import Path
+
+import numpy as np
+import optuna
+import pytest
+from optuna.trial import TrialState, create_trial
+
+import armwright as aw
+from armwright.exceptions import SettingsError
+from armwright.problem.evaluators import Evaluator
+from armwright.problem.problem import Problem
+from armwright.runs.history import BBO, RANDOM
+from armwright.search.samplers import BlackBox, sampler_factory, sampler_for, sampler_name
+from armwright.search.surrogate import candidates
+from armwright.search.surrogate.sampler import surrogate_sampler
+from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
+from armwright.spaces.design_space import DesignSpace, load_space, paper_space
+from armwright.spaces.optuna_distributions import distributions
+from armwright.spaces.parameters import Design
+from armwright.tasks.catalogue import load_task
+
+TASK = load_task("target-1")
+
+
+@aw.evaluator("height [m]", "span [m]")
+def measure(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+    """how high the base is, and how long the arm"""
+    return abs(arm.base[2]), 0.1 + sum(link.length for link in arm.links)
+
+
+@pytest.fixture(autouse=True)
+def _few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(candidates, "RANDOM", 100)
+    monkeypatch.setattr(candidates, "NEAR_FRONT", 50)
+    monkeypatch.setattr(candidates, "FRONT_EVALUATIONS", 600)
+
+
+def problem(space: DesignSpace | None = None, evaluator: Evaluator = measure, **changes: object) -> Problem:
+    task = TASK.model_copy(update={"reference_point": None, **changes})
+    return Problem(task, space or paper_space(), evaluator=evaluator)
+
+
+def observed(problem: Problem, n: int, pending: int = 0) -> Observations:
+    designs = problem.space.sample(n + pending, 5)
+    values = np.array([measure(problem.arm(design), problem.task) for design in designs[:n]])
+    matrix = problem.space.matrix(designs)
+    return Observations(matrix[:n], values, np.zeros(n, dtype=bool), matrix[n:])
+
+
+@pytest.mark.slow
+def test_resumed_run_equals_uninterrupted_one(tmp_path: Path) -> None:
+    def run(n_total: int, out: Path | None = None) -> aw.StudyResult:
+        return aw.optimize(problem(), proposer="rules", n_init=6, n_step=4, n_total=n_total, out=out)
+
+    whole = run(7)
+    run(3, tmp_path)
+    resumed = run(7, tmp_path)
+    assert [t.design for t in resumed.trials] == [t.design for t in whole.trials]
+    assert {t.source for t in whole.trials} == {RANDOM, BBO, "rules"}
+
+
+@pytest.mark.slow
+def test_memory_changes_no_choice() -> None:
+    p = problem()
+    used = Surrogate(p)
+    for n in (6, 12, 9):
+        known = observed(p, n)
+        assert np.array_equal(used.choose(known, 3), Surrogate(p).choose(known, 3))
+
+
+def test_auto_is_the_surrogate_for_evaluators_only() -> None:
+    assert sampler_name(sampler_for(problem(), "auto")) == "surrogate"
+    assert sampler_for(Problem(TASK), "auto") == "tpe"
+    assert sampler_for(problem(), "nsga2") == "nsga2"
+
+
+def test_custom_features_are_part_of_the_name() -> None:
+    found = surrogate_sampler(problem(), features=longest_link)
+    assert sampler_name(found) == "surrogate(features=tests.search.surrogate.test_sampler.longest_link)"
+
+
+def longest_link(design: Design) -> list[float]:
+    return [max(design.links)]
+
+
+def test_custom_features_are_inputs() -> None:
+    names = Surrogate(problem(), longest_link).input_names["physics"]
+    assert names[-1] == "feature 1"
+
+
+def test_unknown_name_lists_the_surrogate() -> None:
+    with pytest.raises(SettingsError, match=r'Did you mean "surrogate"'):
+        sampler_factory("surogate")
+
+
+@pytest.mark.parametrize("pending", [0, 3])
+def test_choice_is_a_new_design_of_the_space(pending: int) -> None:
+    p = problem()
+    known = observed(p, 12, pending)
+    row = Surrogate(p).choose(known, 0)
+    p.space.design(p.space.designs(row[None])[0].params)
+    assert not any(np.array_equal(row, other) for other in np.vstack([known.matrix, known.pending]))
+
+
+def test_pending_design_gains_less() -> None:
+    p = problem()
+    known, surrogate = observed(p, 12), Surrogate(problem())
+    best = surrogate.choose(known, 0)[None]
+    waiting = Observations(known.matrix, known.values, known.failed, best)
+    before, after = (Screen(surrogate, k).gain(surrogate.describe(best))[0] for k in (known, waiting))
+    assert 0.0 < after < before
+
+
+def test_choice_does_not_depend_on_the_unit_of_an_objective() -> None:
+    p = problem()
+    known = observed(p, 12)
+    scaled = Observations(known.matrix, known.values * np.array([1024.0, 1.0]), known.failed, known.pending)
+    assert np.array_equal(Surrogate(p).choose(known, 0), Surrogate(p).choose(scaled, 0))
+
+
+def test_choice_beats_random_designs() -> None:
+    p = problem()
+    known = observed(p, 15)
+    chosen = p.space.designs(Surrogate(p).choose(known, 0)[None])[0]
+    values = np.array(measure(p.arm(chosen), p.task))
+    assert not np.any(np.all(known.values <= values, axis=1))  # it is on the front at once
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n_objectives", [1, 2, 3, 4, 5])
+def test_one_to_five_objectives(n_objectives: int) -> None:
+    @aw.evaluator(*(f"f{i}" for i in range(n_objectives)))
+    def several(arm: aw.Arm, task: aw.Task) -> tuple[float, ...]:
+        return tuple((0.01 * i + arm.base[i % 3]) ** 2 + arm.links[0].length for i in range(n_objectives))
+
+    run = aw.optimize(problem(evaluator=several), proposer="none", n_init=6, n_total=2)
+    assert run.config.study.sampler == "surrogate"
+    assert [trial.source for trial in run.trials[-2:]] == [BBO, BBO]
+
+
+@pytest.mark.slow
+def test_conditional_parameters_and_motors() -> None:
+    space = load_space("desk-sorting")
+    run = aw.optimize(problem(space), proposer="none", sampler="surrogate", n_init=8, n_total=5)
+    assert all(space.design(trial.design.params) == trial.design for trial in run.trials)
+    assert len({trial.design for trial in run.trials}) == 13
+
+
+def test_constraints_are_known_without_an_evaluation() -> None:
+    p = problem(constraints=("length <= 0.5",))
+    run = aw.optimize(p, proposer="none", sampler="surrogate", n_init=6, n_total=4)
+    assert not any(trial.is_feasible for trial in run.trials[:6])
+    assert all(trial.is_feasible for trial in run.trials[6:])
+
+
+def test_failures_are_avoided() -> None:
+    """Evaluations fail where the base is at x < 0.3 m, where all the values are best."""
+    p = problem()
+    known = observed(p, 24)
+    failed = known.matrix[:, 0] < 0.3
+    values = np.where(failed[:, None], np.inf, known.values)
+    surrogate = Surrogate(p)
+    row = surrogate.choose(Observations(known.matrix, values, failed, known.pending), 0)
+    assert failed.any()
+    assert row[0] > 0.2
+
+
+def test_failed_trials_of_a_script_are_not_learned_from() -> None:
+    p = problem()
+    study = optuna.create_study(directions=["minimize", "maximize"])
+    space = distributions(p.space)
+    for number, design in enumerate(p.space.sample(8, 1)):
+        state = TrialState.FAIL if number == 3 else TrialState.COMPLETE
+        values = None if number == 3 else [design.links[0], -design.links[1]]
+        study.add_trial(create_trial(params=dict(design.params), distributions=space, values=values, state=state))
+    study.sampler = surrogate_sampler(p)(0)
+    trial = study.ask(space)
+    assert p.space.design(trial.params)
+
+
+def test_first_trials_of_a_study_are_random() -> None:
+    p = problem()
+    box, plain = BlackBox(p.space, surrogate_sampler(p), 0), BlackBox(p.space, "random", 0)
+    assert box.draw(0, BBO)[1] == plain.draw(0, BBO)[1]
