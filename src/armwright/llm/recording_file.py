@@ -87,7 +87,9 @@ def pack_recording(recording: Recording) -> bytes:
 
 
 def _without_defaults(values: dict[str, Any], model: type[BaseModel]) -> dict[str, Any]:
-    defaults = {name: field.get_default(call_default_factory=True) for name, field in model.model_fields.items()}
+    defaults = {
+        field.alias or name: field.get_default(call_default_factory=True) for name, field in model.model_fields.items()
+    }
     plain = TypeAdapter(dict[str, Any]).dump_python(defaults, mode="json", warnings=False, fallback=lambda _: None)
     return {name: value for name, value in values.items() if value != plain[name]}
 
