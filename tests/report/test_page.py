@@ -101,8 +101,20 @@ def test_what_the_surrogate_learned_is_a_table(run: Path, tab: Tab, tmp_path: Pa
     copy = shutil.copytree(run, tmp_path / "run")
     summary = json.loads((copy / "summary.json").read_text())
     effects = [{"name": "peak_torque", "share": 0.89}]
-    work = {"name": "work", "explained": 0.93, "relative_error": 0.0123, "inputs": "physics", "effects": effects}
-    constant = {"name": "steps", "explained": None, "relative_error": None, "inputs": "parameters", "effects": []}
+    work: dict[str, Any] = {
+        "name": "work",
+        "explained": 0.93,
+        "relative_error": 0.0123,
+        "inputs": "physics",
+        "effects": effects,
+    }
+    constant: dict[str, Any] = {
+        "name": "steps",
+        "explained": None,
+        "relative_error": None,
+        "inputs": "parameters",
+        "effects": [],
+    }
     objectives = [work | {"correction": "work is 1.4 times our peak torque"}, constant | {"correction": ""}]
     summary["surrogate"] = {"designs": 30, "objectives": objectives}
     (copy / "summary.json").write_text(json.dumps(summary))

@@ -113,6 +113,12 @@ def test_long_and_short_arms_have_different_ratios() -> None:
     assert f"times our peak torque on arms longer than {np.median(lengths):.2g} m and" in text
 
 
+def test_small_addition_is_a_difference() -> None:
+    error = np.concatenate([np.full(20, 1e-4), np.linspace(0.1, 4.0, 20)])
+    text = describe_correction(objective("m"), error + 0.07, {POSITION_ERROR: error, LENGTH: lognormal(9, 40)})
+    assert text == "energy is within 0.074 m of our position error on 100 % of designs"
+
+
 def test_other_units_give_a_trend_only() -> None:
     torque = lognormal(3)
     assert "energy grows with our peak torque" in describe_correction(objective("J"), torque**2, {PEAK_TORQUE: torque})

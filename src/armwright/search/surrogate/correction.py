@@ -3,7 +3,8 @@
 Statements describe the evaluated designs and are made only on strong evidence:
 
 1. The objective over a quantity of the same unit is nearly constant, for all designs or apart for short and long arms.
-2. Its ranks and those of a quantity are nearly the same or the opposite.
+2. The objective is within a small distance of such a quantity.
+3. Its ranks and those of a quantity are nearly the same or the opposite.
 """
 
 from collections.abc import Mapping
@@ -22,6 +23,8 @@ SPREAD = 1.5  # the largest 90 % quantile of ratios over their 10 % quantile
 LEAST_VARIATION = 0.2  # interquartile range of the objective's logarithm
 UNEXPLAINED = 0.5  # the largest interquartile range of the ratio's logarithm over that of the objective
 LEAST_DIFFERENCE = 1.1  # of median ratios of short and long arms
+LEAST_WITHIN = 0.9  # of the designs, whose difference from a quantity is stated
+DIFFERENCE = 0.1  # the largest such difference over the range of 80 % of the objective's values
 RANK_CORRELATION = 0.8  # the least one that is stated
 
 Quantities = Mapping[Objective, Array]
@@ -65,7 +68,8 @@ def describe_correction(objective: Objective, values: Array, quantities: Quantit
     """
     if len(values) < FEWEST:
         return ""
-    return _describe_ratio(objective, values, quantities) or _describe_trend(objective, values, quantities)
+    rules = (_describe_ratio, _describe_difference, _describe_trend)
+    return next(filter(None, (rule(objective, values, quantities) for rule in rules)), "")
 
 
 def _describe_ratio(objective: Objective, values: Array, quantities: Quantities) -> str:
@@ -114,6 +118,26 @@ def _describe_by_length(objective: str, quantity: str, ratios: Array, lengths: A
     )
     rest = np.log(ratios) - np.log(np.where(is_long, np.median(long.values), np.median(short.values)))
     return text, _interquartile(rest)
+
+
+def _describe_difference(objective: Objective, values: Array, quantities: Quantities) -> str:
+    """Return how close an objective is to the nearest quantity of its unit; empty if that is not close."""
+    found: list[tuple[float, str]] = []
+    low, high = np.quantile(values, [0.1, 0.9])
+    for quantity, column in quantities.items():
+        factor = _factor(quantity.unit, objective.unit)
+        if factor is None:
+            continue
+        off = np.abs(values - column * factor)
+        bound = float(np.quantile(off, LEAST_WITHIN))
+        shown = float(f"{1.05 * bound:.2g}")  # rounding never makes it smaller than the bound
+        text = (
+            f"{objective.name} is within {shown:g} {objective.unit} of our {_in_words(quantity)} on "
+            f"{100.0 * np.mean(off <= shown):.0f} % of designs"
+        )
+        if bound <= DIFFERENCE * (high - low) and np.ptp(column) > 0.0:
+            found.append((bound, text))
+    return min(found)[1] if found else ""
 
 
 def _describe_trend(objective: Objective, values: Array, quantities: Quantities) -> str:
