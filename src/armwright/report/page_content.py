@@ -334,6 +334,7 @@ def _result(history: History, summary: Mapping[str, Any] | None) -> dict[str, An
         "recommended": parts.get("recommended", []),
         "robust": (parts.get("verification") or {}).get("robust_numbers"),
         "search": search.get("hypervolume_history"),
+        "surrogate": parts.get("surrogate"),
     }
 
 

@@ -30,6 +30,7 @@ from armwright.runs.infeasibility import ViolationTally, feasibility_record
 from armwright.runs.proposer_bias import proposer_bias
 from armwright.runs.recommendation import HasTime, recommend, unlimited
 from armwright.runs.summary import ProposerSummary, parse_summary
+from armwright.runs.surrogate_summary import SurrogateSummary
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify_front
 
@@ -70,7 +71,7 @@ def rewrite_results(
     if isinstance(config.method, FrontMethod):
         new = {**summary, "verification": _verification_record(history, verification)}
     else:
-        known = {key: summary[key] for key in ("proposer", "proposer_bias", "refine") if key in summary}
+        known = {key: summary[key] for key in ("proposer", "proposer_bias", "refine", "surrogate") if key in summary}
         new = summarize(history, config, None, verification) | known
         if new["refine"] is not None:
             new["evaluations"] += new["refine"]["in_vain"]
@@ -120,6 +121,7 @@ def summarize(
     config: RunConfig,
     proposer: ProposerSummary | None,
     verification: Verification | None = None,
+    surrogate: SurrogateSummary | None = None,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a study."""
     curve = history.hypervolume
@@ -137,6 +139,7 @@ def summarize(
         "evaluations": sum(trial.evaluations for trial in history),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **_failure_record(history, config),
+        **({} if surrogate is None else {"surrogate": asdict(surrogate)}),
         "refine": None,
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),

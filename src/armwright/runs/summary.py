@@ -11,6 +11,7 @@ from armwright.files import replace_surrogates
 from armwright.runs.attribution import Attribution
 from armwright.runs.front_gap import FrontGap
 from armwright.runs.proposer_bias import ProposerBias
+from armwright.runs.surrogate_summary import SurrogateSummary
 from armwright.runs.trial import Count
 
 
@@ -152,6 +153,7 @@ class StudySummary(_Summary):
     evaluations: Count
     duplicates: Count
     failures: dict[str, Count] = {}
+    surrogate: SurrogateSummary | None = None
     refine: _Refinement | None
     attribution: dict[str, Attribution]
     proposer: _Proposer | None

@@ -1,17 +1,21 @@
 """The surrogate as a sampler: resuming, conditional spaces, constraints, failures, several trials at a time."""
 
+import io
 from pathlib import Path
 
 import numpy as np
 import optuna
 import pytest
 from optuna.trial import TrialState, create_trial
+from rich.console import Console
 
 import armwright as aw
+from armwright.cli.show_results import show_result
 from armwright.exceptions import SettingsError
 from armwright.problem.evaluators import Evaluator
 from armwright.problem.problem import Problem
 from armwright.runs.history import BBO, RANDOM
+from armwright.runs.results import read_summary
 from armwright.search.samplers import BlackBox, sampler_factory, sampler_for, sampler_name
 from armwright.search.surrogate import candidates
 from armwright.search.surrogate.sampler import surrogate_sampler
@@ -59,6 +63,25 @@ def test_resumed_run_equals_uninterrupted_one(tmp_path: Path) -> None:
     resumed = run(7, tmp_path)
     assert [t.design for t in resumed.trials] == [t.design for t in whole.trials]
     assert {t.source for t in whole.trials} == {RANDOM, BBO, "rules"}
+
+
+@pytest.mark.slow
+def test_summary_and_terminal_report_what_was_learned(tmp_path: Path) -> None:
+    run = aw.optimize(problem(), proposer="none", n_init=10, n_total=2, out=tmp_path)
+    summary = read_summary(tmp_path)
+    assert summary is not None
+    assert summary["surrogate"]["designs"] == 12
+    assert [one["name"] for one in summary["surrogate"]["objectives"]] == ["height", "span"]
+    output = io.StringIO()
+    show_result(Console(file=output, width=200), run, [])
+    assert "span: " in output.getvalue()
+    assert "% of the variance explained, most by " in output.getvalue()
+
+
+@pytest.mark.slow
+def test_other_samplers_learn_nothing() -> None:
+    run = aw.optimize(problem(), proposer="none", sampler="tpe", n_init=10, n_total=2)
+    assert "surrogate" not in run.summary
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import { fileFetcher, openLive } from "./live.js";
 import { growPareto, openPareto } from "./pareto.js";
 import { drawPick, forget, openPick, ranked } from "./pick.js";
 import { fromAddress, keepAddress, set, state } from "./state.js";
+import { drawSurrogate } from "./surrogate.js";
 import { drawTable, openTable } from "./table.js";
 import { drawTranscript, openTranscript } from "./transcript.js";
 import { $ } from "./format.js";
@@ -32,6 +33,7 @@ function open() {
   openPareto(content);
   openTable(content);
   openPick(content);
+  drawSurrogate(content);
   openTranscript(content);
   keepAddress();
   begin();
@@ -48,6 +50,7 @@ function grow() {
   growPareto();
   drawTable();
   drawPick();
+  drawSurrogate(content);
   drawTranscript();
   drawConfiguration();
 }

@@ -121,6 +121,11 @@ class CheapFeatures:
         inputs = {PHYSICS: self._scalings[0](physics), PARAMETERS: self._scalings[1](self._parameters(matrix))}
         return Description(inputs, violations)
 
+    def quantities(self, matrix: Array) -> Mapping[Objective, Array]:
+        """Return (N,) each quantity of the built-in physics of designs (N, P), not scaled."""
+        physics, _ = self._physics(matrix)
+        return dict(zip(self._quantities, physics.T, strict=False))  # further columns follow the quantities
+
     @cached_property
     def names(self) -> Mapping[str, tuple[str, ...]]:
         """Names of the columns of each set of inputs."""

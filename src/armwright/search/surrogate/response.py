@@ -40,6 +40,11 @@ class Transform:
         shaped = np.log(np.maximum(values, 0.0) + self.shift) if self.is_log else values
         return (shaped - self.mean) / self.deviation
 
+    def restored(self, transformed: Array) -> Array:
+        """Return the (N,) values of transformed ones."""
+        shaped = transformed * self.deviation + self.mean
+        return np.exp(shaped) - self.shift if self.is_log else shaped
+
     def log_slopes(self, values: Array) -> float:
         """Return the sum of the logarithms of the transform's slopes at values (N,)."""
         slopes = -np.log(self.deviation) * len(values)

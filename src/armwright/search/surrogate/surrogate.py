@@ -11,6 +11,7 @@ from scipy.special import ndtr
 
 from armwright.arrays import Array
 from armwright.pareto import feasible_mask, total_violation
+from armwright.problem.objective import Objective
 from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import stated_bounds, with_bounds
 from armwright.runs.history import found_reference_point
@@ -73,6 +74,10 @@ class Surrogate:
     def input_names(self) -> Mapping[str, tuple[str, ...]]:
         """Names of the inputs of each set."""
         return self._features.names
+
+    def quantities(self, matrix: Array) -> Mapping[Objective, Array]:
+        """Return (N,) each quantity of the built-in physics of designs (N, P)."""
+        return self._features.quantities(matrix)
 
     def choose(self, observations: Observations, seed: int) -> Array:
         """Return the (P,) design to evaluate next."""
