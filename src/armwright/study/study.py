@@ -27,6 +27,7 @@ from armwright.runs.results import complete_summary, discard_results, summarize,
 from armwright.runs.verification import verify_front
 from armwright.search.refine import Refinement, refine_one
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for
+from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
 from armwright.study.dask_backend import DaskBackend
@@ -54,6 +55,7 @@ def optimize(
     *,
     proposer: str | Proposer | None = "auto",
     sampler: str | SamplerFactory = "auto",
+    features: FeatureFunction | None = None,
     n_init: int = 10,
     n_step: int = 10,
     n_total: int = 200,
@@ -76,6 +78,7 @@ def optimize(
         proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or a Proposer.
         sampler: "auto" (surrogate with an evaluator, else tpe), "surrogate", "tpe", "tpe-multivariate", "nsga2", "gp",
             "random", or a factory seed -> Optuna sampler.
+        features: function of a design that gives the surrogate further numbers to learn from; None for none.
         n_init: random trials.
         n_step: trials of a block; its first is the proposer's.
         n_total: counted trials.
@@ -109,7 +112,7 @@ def optimize(
         True
     """
     proposer = check_proposer(proposer)
-    sampler = sampler_for(problem, sampler)
+    sampler = sampler_for(problem, sampler, features)
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
     evaluation = EvaluationOptions(workers, evaluation_timeout, allow_failures)
     check_settings(problem, method, evaluation, on_model_failure)

@@ -11,7 +11,9 @@ from optuna.samplers import BaseSampler, RandomSampler
 from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
+from armwright.exceptions import SettingsError
 from armwright.problem.problem import Problem
+from armwright.search.callable_names import name_of
 from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.search.surrogate.surrogate import Observations, Surrogate
 from armwright.spaces.optuna_distributions import distributions
@@ -50,6 +52,9 @@ def surrogate_sampler(problem: Problem, features: FeatureFunction | None = None)
         problem: the problem; the sampler never calls its evaluator.
         features: further numbers that may predict the objectives, from a design.
 
+    Raises:
+        SettingsError: `features` is not a function.
+
     Examples:
         >>> import armwright as aw
         >>> problem = aw.Problem(aw.load_task("target-1"))
@@ -59,7 +64,9 @@ def surrogate_sampler(problem: Problem, features: FeatureFunction | None = None)
     """
     name = "surrogate"
     if features is not None:
-        name += f"(features={features.__module__}.{features.__qualname__})"
+        if not callable(features):
+            raise SettingsError(f"features: expected a function of a design, got {features!r}")
+        name += f"(features={name_of(features)})"
     return SurrogateFactory(Surrogate(problem, features), name)
 
 
