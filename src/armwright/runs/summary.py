@@ -152,6 +152,7 @@ class StudySummary(_Summary):
     evaluations: Count
     duplicates: Count
     failures: dict[str, Count] = {}
+    screened_out: dict[str, Count] = {}
     refine: _Refinement | None
     attribution: dict[str, Attribution]
     proposer: _Proposer | None

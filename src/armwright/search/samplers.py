@@ -22,7 +22,8 @@ from armwright.runs.history import RANDOM
 from armwright.runs.trial import FinishedTrial
 from armwright.search.callable_names import name_of
 from armwright.search.surrogate.cheap_features import FeatureFunction
-from armwright.search.surrogate.sampler import surrogate_sampler
+from armwright.search.surrogate.proposal_screen import Rejection
+from armwright.search.surrogate.sampler import SurrogateFactory, surrogate_sampler
 from armwright.seeding import SAMPLING, derived_seed
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.optuna_distributions import distributions, quietly
@@ -200,6 +201,12 @@ class BlackBox:
         self._suggest(trial)
         self._assign_generation(sampler, trial)
         return trial, checked
+
+    def rejection(self, design: Design, number: int) -> Rejection | None:
+        """Return why the surrogate advises against evaluating a design in trial `number`; None for other samplers."""
+        if not isinstance(self._factory, SurrogateFactory):
+            return None
+        return self._factory(derived_seed(self._seed, SAMPLING, number)).rejection(self._study, design)
 
     def tell(
         self, trial: Trial, values: Iterable[float], violations: Iterable[float] = (), has_failed: bool = False

@@ -62,6 +62,7 @@ def optimize(
     in_flight: int | None = None,
     refine_every: int | None = None,
     initial_designs: Sequence[Design] = (),
+    screen: bool = True,
     on_model_failure: str = "stop",
     verify: bool = True,
     workers: Workers | None = None,
@@ -85,6 +86,7 @@ def optimize(
         in_flight: requests to the proposer that run while black-box trials go on; None: the study waits for each.
         refine_every: after so many counted trials, the next free one refines a design of the front.
         initial_designs: designs of the first of the n_init trials, such as an existing arm.
+        screen: whether the surrogate decides which proposals are evaluated; the sampler replaces the others.
         on_model_failure: if the model fails before the first trial, "stop" raises ModelError, and "continue" runs
             black-box trials only. A run that has started always continues.
         verify: whether the final front is verified (`runs/verification.py`); never with an evaluator.
@@ -113,7 +115,7 @@ def optimize(
     """
     proposer = check_proposer(proposer)
     sampler = sampler_for(problem, sampler, features)
-    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
+    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs, screen)
     evaluation = EvaluationOptions(workers, evaluation_timeout, allow_failures)
     check_settings(problem, method, evaluation, on_model_failure)
     refuse_unread_parameters(problem)
@@ -279,7 +281,7 @@ class Study:
     def _start_trial(self, number: int) -> None:
         """Choose the design of a trial and start its evaluation; a duplicate takes the values of the first."""
         started = time.perf_counter()
-        slot = self._schedule.next(number)
+        slot = self._screened(self._schedule.next(number), number)
         self._channel.report("evaluating", number, None if slot is None else slot.fault_message)
         proposed = time.perf_counter()
         refinement = self._refine_next(number) if slot is None else None
@@ -299,6 +301,14 @@ class Study:
         known = self._pending[first].trial if first in self._pending else self._trials[first]
         if known.values:
             self._tell(pending, Evaluated(Outcome(known.values, known.violations, known.failure), 0.0))
+
+    def _screened(self, slot: ProposalSlot | None, number: int) -> ProposalSlot | None:
+        """Return a slot without its proposal if the surrogate expects too little of it; else the slot."""
+        if not self._method.screen or slot is None or slot.proposal is None:
+            return slot
+        assert self._proposer is not None
+        rejection = self._black_box.rejection(slot.proposal.design, number)
+        return slot if rejection is None else slot.screened_out(self._proposer.name, rejection)
 
     def _refine_next(self, number: int) -> Refinement | None:
         """Refine a design of the front, if one is due."""
