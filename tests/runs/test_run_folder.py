@@ -73,6 +73,7 @@ def test_config_reproduces_the_run(run: StudyResult) -> None:
         "in_flight": None,
         "refine_every": None,
         "initial_designs": [],
+        "screen": False,
     }
     assert config["seed"] == 0
     assert {"armwright", "optuna", "warp-lang", "python"} <= set(config["versions"])

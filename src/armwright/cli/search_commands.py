@@ -163,6 +163,14 @@ def optimize(
             rich_help_panel=SEARCH,
         ),
     ] = None,
+    screen: Annotated[
+        bool,
+        typer.Option(
+            "--screen/--no-screen",
+            help="Skip proposals of which the sampler surrogate expects little.",
+            rich_help_panel=SEARCH,
+        ),
+    ] = True,
     seed: Seed = 0,
     model: ModelName = None,
     prompt: PromptName = None,
@@ -235,6 +243,7 @@ def optimize(
                 in_flight=choice.options.in_flight,
                 refine_every=refine_every,
                 initial_designs=initial_designs,
+                screen=screen,
                 on_model_failure=choice.options.on_failure,
                 workers=select_workers(workers, scheduler),
                 evaluation_timeout=evaluation_timeout,

@@ -76,7 +76,7 @@ class PromptedProposer(LlmSession, Proposer):
 
     def unused(self, history: History) -> Sequence[Proposal]:
         """Return recorded designs of a killed run that no trial has used yet."""
-        used = {trial.proposal for trial in history}
+        used = {trial.answer for trial in history}
         recorded: dict[str, Proposal] = {}
         for call in self._transcript.calls:
             if call.step in LAST_STEPS and call.fault is None:

@@ -41,6 +41,8 @@ class RulesProposer(Proposer):
         rule = max(mean, key=lambda rule: mean[rule])
         row, gain = most_promising(structures, history)
         opened = sum(t.source == self.name and rule_of(t.proposal) == STRUCTURE for t in history.proposed)
+        screened = [t.screened for t in history if t.screened is not None and t.screened.source == self.name]
+        opened += sum(rule_of(s.proposal) == STRUCTURE for s in screened)
         if gain <= mean[rule] and (not inside or (not can_forecast(history) and opened < len(structures.names))):
             row, gain = next_structure(structures, opened, rng), np.inf
         if gain > mean[rule]:

@@ -55,6 +55,8 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     given = {key: value for key, value in settings.items() if value is not None and value != DEFAULTS.get(key)}
     options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
     options += [text for n in range(n_designs) for text in ("--initial-design", f"DESIGN-{n + 1}.json")]
+    if isinstance(config.method, Method) and _is_screen_off(config.method):
+        options.append("--no-screen")
     options += ["--robust"] * (config.tolerance > 0.0)
     line = shlex.join(["armwright", command, name if is_builtin else CUSTOM_TASK, *options, "--seed", str(config.seed)])
     return f"{line} && armwright refine RUN" if refined else line
@@ -79,6 +81,10 @@ def _study_options(method: Method) -> dict[str, Any]:
         "n_total": method.n_total,
         "refine_every": method.refine_every,
     }
+
+
+def _is_screen_off(method: Method) -> bool:
+    return method.proposer is not None and method.sampler == "surrogate" and not method.screen
 
 
 def _is_known(method: Method) -> bool:

@@ -43,6 +43,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
         in_flight: Requests to the proposer that run while black-box trials continue; None to wait for each.
         refine_every: Counted trials between refinements of a design of the front; None for no refinement.
         initial_designs: Designs of the first of the n_init trials.
+        screen: Whether the surrogate decides which proposals are evaluated.
     """
 
     proposer: dict[str, Any] | None
@@ -53,6 +54,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     in_flight: int | None = Field(default=None, ge=1)
     refine_every: int | None = Field(default=None, ge=1)
     initial_designs: tuple[dict[str, float | str], ...] = ()
+    screen: bool = False
 
     @field_validator("proposer")
     @classmethod

@@ -140,6 +140,7 @@ def summarize(
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **_failure_record(history, config),
         **({} if surrogate is None else {"surrogate": asdict(surrogate)}),
+        **_screening_record(history, config),
         "refine": None,
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
@@ -264,6 +265,13 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
         "from_any_start": "yes" if verdict["from_any_start"] else "no",
         **{f"{name}_{case}": value for case in CASES for name, value in verdict[case].items()},
     }
+
+
+def _screening_record(history: History, config: RunConfig) -> dict[str, Any]:
+    """Return how many proposals were not evaluated, by proposer, if proposals were screened."""
+    if not config.study.screen:
+        return {}
+    return {"screened_out": dict(Counter(trial.screened.source for trial in history if trial.screened is not None))}
 
 
 def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:

@@ -154,6 +154,7 @@ class StudySummary(_Summary):
     duplicates: Count
     failures: dict[str, Count] = {}
     surrogate: SurrogateSummary | None = None
+    screened_out: dict[str, Count] = {}
     refine: _Refinement | None
     attribution: dict[str, Attribution]
     proposer: _Proposer | None

@@ -30,6 +30,23 @@ _Text = Annotated[str, PlainSerializer(replace_surrogates)]
 
 
 @dataclass(frozen=True)
+class ScreenedOut:
+    """A proposal that was not evaluated, because the surrogate expected too little of it.
+
+    Attributes:
+        source: name of the proposer.
+        proposal: its id.
+        gain: expected gain of hypervolume, as a share of the best candidate's.
+        predicted: objectives that the surrogate predicted.
+    """
+
+    source: str
+    proposal: str
+    gain: float
+    predicted: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class FinishedTrial:
     """Hold one evaluated design.
 
@@ -51,6 +68,7 @@ class FinishedTrial:
         sampler_notes: attributes that the sampler set on its trial and study, needed to resume.
         violations: of each constraint; satisfied at <= 0.
         failure: why the custom evaluator gave no values, which makes the design infeasible.
+        screened: the proposal in whose place this design was drawn, because the surrogate expected little of it.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
@@ -72,11 +90,17 @@ class FinishedTrial:
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     violations: tuple[float, ...] = ()
     failure: Failure | None = None
+    screened: ScreenedOut | None = None
+
+    @property
+    def answer(self) -> str | None:
+        """The id of the proposal that the trial used up, evaluated or not."""
+        return self.proposal if self.screened is None else self.screened.proposal
 
     @property
     def request(self) -> tuple[int, int] | None:
         """The trial that a proposal was requested for and the number of finished trials known then, if one was."""
-        if self.proposal is None and self.fault is None:
+        if self.answer is None and self.fault is None:
             return None
         asked, feedback = (self.number if value is None else value for value in (self.asked, self.feedback))
         return asked, feedback

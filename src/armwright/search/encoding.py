@@ -23,7 +23,7 @@ class DesignEncoding:
     def __init__(self, parameters: Sequence[Parameter]) -> None:
         kinds = [isinstance(parameter, CategoricalParameter) for parameter in parameters]
         self.categorical = np.flatnonzero(kinds)
-        self.real = np.flatnonzero(~np.array(kinds))
+        self.real = np.flatnonzero(~np.array(kinds, dtype=bool))
         categories = [p for p in parameters if isinstance(p, CategoricalParameter)]
         self.choices = np.array([len(p.choices) for p in categories], dtype=int)
         ranges = [(p.low, p.high) for p in parameters if isinstance(p, FloatParameter)]

@@ -5,11 +5,8 @@ would repeat its first draws after a resume.
 """
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
-from types import CodeType, FunctionType, MethodType
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
-from zlib import crc32
 
 import optuna
 from optuna.exceptions import ExperimentalWarning
@@ -23,7 +20,10 @@ from armwright.extras import check_extra
 from armwright.problem.problem import Problem
 from armwright.runs.history import RANDOM
 from armwright.runs.trial import FinishedTrial
-from armwright.search.surrogate.sampler import surrogate_sampler
+from armwright.search.callable_names import name_of
+from armwright.search.surrogate.cheap_features import FeatureFunction
+from armwright.search.surrogate.proposal_screen import Rejection
+from armwright.search.surrogate.sampler import SurrogateFactory, surrogate_sampler
 from armwright.seeding import SAMPLING, derived_seed
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.optuna_distributions import distributions, quietly
@@ -60,14 +60,31 @@ AUTO, SURROGATE = "auto", "surrogate"  # names of samplers that depend on the pr
 NAMES = (AUTO, SURROGATE, *SAMPLERS)
 
 
-def sampler_for(problem: Problem, sampler: str | SamplerFactory) -> str | SamplerFactory:
+def sampler_for(
+    problem: Problem, sampler: str | SamplerFactory, features: FeatureFunction | None = None
+) -> str | SamplerFactory:
     """Return the sampler of a problem: the factory of `surrogate`, and for `auto` this one or `tpe`.
 
     Evaluators take long as a rule, which is when the surrogate pays; the built-in physics does not.
+
+    Args:
+        problem: the problem.
+        sampler: name of a sampler, or a factory seed -> sampler.
+        features: further inputs of the surrogate, from a design.
+
+    Raises:
+        SettingsError: there are features, and the sampler is not the surrogate.
     """
     if sampler == AUTO:
         sampler = "tpe" if problem.evaluator is None else SURROGATE
-    return surrogate_sampler(problem) if sampler == SURROGATE else sampler
+    if sampler == SURROGATE:
+        return surrogate_sampler(problem, features)
+    if features is not None:
+        raise SettingsError(
+            f'features: expected the sampler "{SURROGATE}", which alone reads them, got {sampler_name(sampler)}; try '
+            f'sampler="{SURROGATE}", or aw.surrogate_sampler(problem, features=...) as the sampler'
+        )
+    return sampler
 
 
 def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
@@ -98,38 +115,7 @@ def sampler_name(sampler: str | SamplerFactory) -> str:
     line and a checksum of its code and of the values it captures.
     """
     factory = sampler_factory(sampler)
-    return sampler if isinstance(sampler, str) else _name_of(factory)
-
-
-def _name_of(value: Any) -> str:
-    """Name a factory, or a value that it captures, so that the name is equal in every process."""
-    if isinstance(value, partial):
-        arguments = [_name_of(argument) for argument in value.args]
-        arguments += [f"{name}={_name_of(argument)}" for name, argument in value.keywords.items()]
-        return f"partial({', '.join([_name_of(value.func), *arguments])})"
-    if isinstance(value, MethodType):
-        return f"{_name_of(value.__self__)}.{value.__name__}"
-    if isinstance(value, FunctionType) and ("<lambda>" in value.__qualname__ or "<locals>" in value.__qualname__):
-        captured = [*(value.__defaults__ or ()), *(cell.cell_contents for cell in value.__closure__ or ())]
-        # Captured functions by their constants only: a function that captures itself would recurse without end.
-        names = [list(_constants(v.__code__)) if isinstance(v, FunctionType) else _name_of(v) for v in captured]
-        checksum = crc32(repr([*_constants(value.__code__), *names]).encode())
-        line = f"line {value.__code__.co_firstlineno} ({checksum:08x})"
-        return f"{line} of {value.__module__}, {value.__qualname__}"  # the line first: long settings are shown cut
-    if hasattr(value, "__qualname__"):  # functions and classes
-        return f"{getattr(value, '__module__', None)}.{value.__qualname__}"
-    has_own_repr = type(value).__repr__ is not object.__repr__  # the default one holds an address
-    return repr(value) if has_own_repr else f"{_name_of(type(value))}()"
-
-
-def _constants(code: CodeType) -> Iterator[str]:
-    """Yield the names that the code of a function uses, and its constants."""
-    yield from code.co_names
-    for value in code.co_consts:
-        if isinstance(value, CodeType):
-            yield from _constants(value)
-        else:
-            yield repr(value)
+    return sampler if isinstance(sampler, str) else name_of(factory)
 
 
 class BlackBox:
@@ -215,6 +201,12 @@ class BlackBox:
         self._suggest(trial)
         self._assign_generation(sampler, trial)
         return trial, checked
+
+    def rejection(self, design: Design, number: int) -> Rejection | None:
+        """Return why the surrogate advises against evaluating a design in trial `number`; None for other samplers."""
+        if not isinstance(self._factory, SurrogateFactory):
+            return None
+        return self._factory(derived_seed(self._seed, SAMPLING, number)).rejection(self._study, design)
 
     def tell(
         self, trial: Trial, values: Iterable[float], violations: Iterable[float] = (), has_failed: bool = False

@@ -174,6 +174,13 @@ class DesignSpace(SpaceSchema, frozen=True):
                 rows[~self._is_active(entry, rows, column), column[name]] = default
         return rows
 
+    def active(self, name: str, matrix: Array) -> NDArray[np.bool_]:
+        """Return the (N,) designs of a matrix for which a parameter is active."""
+        entries = conditional_parameters(self)
+        if entries[name].module is None:
+            return np.ones(len(matrix), dtype=bool)
+        return self._is_active(entries[name], matrix, {other: i for i, other in enumerate(entries)})
+
     def _is_active(self, entry: ConditionalParameter, matrix: Array, column: Mapping[str, int]) -> NDArray[np.bool_]:
         """Return the (N,) designs for which a parameter with a condition is active."""
         active = np.ones(len(matrix), dtype=bool)

@@ -66,6 +66,7 @@ def new_trial(number: int, source: str, design: Design, slot: ProposalSlot | Non
         reason="" if proposal is None else proposal.reason,
         expected=None if proposal is None else proposal.expected,
         fault=slot.fault,
+        screened=slot.screened,
         asked=None if slot.asked == number else slot.asked,
         feedback=None if slot.feedback == number else slot.feedback,
     )

@@ -2,11 +2,13 @@
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armwright.exceptions import DesignError, ProposalError
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.history import History
+from armwright.runs.trial import ScreenedOut
+from armwright.search.surrogate.proposal_screen import Rejection
 from armwright.seeding import PROPOSING, derived_seed
 
 
@@ -20,6 +22,7 @@ class ProposalSlot:
         proposal: the design, if there is one.
         fault: kind of the fault, if there is none.
         note: message for the user.
+        screened: the proposal, if it is not evaluated because the surrogate expects too little of it.
     """
 
     asked: int
@@ -27,11 +30,19 @@ class ProposalSlot:
     proposal: Proposal | None = None
     fault: str | None = None
     note: str = ""
+    screened: ScreenedOut | None = None
 
     @property
     def fault_message(self) -> str | None:
         """Reason for a missing design: empty if there is a design, None if the reason was reported before."""
-        return "" if self.proposal is not None else self.note or None
+        return "" if self.proposal is not None or self.screened is not None else self.note or None
+
+    def screened_out(self, source: str, rejection: Rejection) -> "ProposalSlot":
+        """Return the slot without its proposal, which is not evaluated."""
+        assert self.proposal is not None
+        note = f"{self.proposal.id} is not evaluated: expected gain {rejection.gain:.1%} of the best candidate's"
+        screened = ScreenedOut(source, self.proposal.id, rejection.gain, rejection.predicted)
+        return replace(self, proposal=None, note=note, screened=screened)
 
 
 class ProposalRequests:

@@ -87,11 +87,11 @@ class ReplaySchedule(Schedule):
         if recorded.request is None:
             return None
         asked, feedback = recorded.request
-        if (asked, recorded.proposal) not in self._ready and asked not in self._asked:
+        if (asked, recorded.answer) not in self._ready and asked not in self._asked:
             self._add(self._requests.request(self._history().before(feedback), asked))
         self._asked.add(asked)
         missing = ProposalSlot(asked, feedback, fault="missing", note=f"no design is left of call {asked}")
-        return self._ready.pop((asked, recorded.proposal), self._ready.pop((asked, None), missing))
+        return self._ready.pop((asked, recorded.answer), self._ready.pop((asked, None), missing))
 
     def _add(self, slots: Iterable[ProposalSlot]) -> None:
         for slot in slots:

@@ -13,6 +13,7 @@ from armwright.proposers.factory import choose_proposer
 from armwright.proposers.proposer import Proposer
 from armwright.runs.config import FrontMethod, Method, RunConfig, record_objectives, versions
 from armwright.search.samplers import SamplerFactory, sampler_name
+from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
 
@@ -44,6 +45,7 @@ def study_method(
     in_flight: int | None,
     refine_every: int | None,
     initial_designs: Sequence[Design] = (),
+    screen: bool = True,
 ) -> Method:
     """Return the search settings of `optimize` with these arguments.
 
@@ -66,6 +68,7 @@ def study_method(
         in_flight=None if in_flight is None else check_integer("in_flight", in_flight, 1),
         refine_every=None if refine_every is None else check_integer("refine_every", refine_every, 1),
         initial_designs=tuple(dict(design.params) for design in initial_designs),
+        screen=screen and proposer is not None and isinstance(sampler, SurrogateFactory),
     )
 
 

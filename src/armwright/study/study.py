@@ -28,6 +28,7 @@ from armwright.runs.surrogate_summary import SurrogateSummary
 from armwright.runs.verification import verify_front
 from armwright.search.refine import Refinement, refine_one
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for
+from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.search.surrogate.findings import summarize_surrogate
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
@@ -57,12 +58,14 @@ def optimize(
     *,
     proposer: str | Proposer | None = "auto",
     sampler: str | SamplerFactory = "auto",
+    features: FeatureFunction | None = None,
     n_init: int = 10,
     n_step: int = 10,
     n_total: int = 200,
     in_flight: int | None = None,
     refine_every: int | None = None,
     initial_designs: Sequence[Design] = (),
+    screen: bool = True,
     on_model_failure: str = "stop",
     verify: bool = True,
     workers: Workers | None = None,
@@ -79,12 +82,14 @@ def optimize(
         proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or a Proposer.
         sampler: "auto" (surrogate with an evaluator, else tpe), "surrogate", "tpe", "tpe-multivariate", "nsga2", "gp",
             "random", or a factory seed -> Optuna sampler.
+        features: function of a design that gives the surrogate further numbers to learn from; None for none.
         n_init: random trials.
         n_step: trials of a block; its first is the proposer's.
         n_total: counted trials.
         in_flight: requests to the proposer that run while black-box trials go on; None: the study waits for each.
         refine_every: after so many counted trials, the next free one refines a design of the front.
         initial_designs: designs of the first of the n_init trials, such as an existing arm.
+        screen: whether the surrogate decides which proposals are evaluated; the sampler replaces the others.
         on_model_failure: if the model fails before the first trial, "stop" raises ModelError, and "continue" runs
             black-box trials only. A run that has started always continues.
         verify: whether the final front is verified (`runs/verification.py`); never with an evaluator.
@@ -112,8 +117,8 @@ def optimize(
         True
     """
     proposer = check_proposer(proposer)
-    sampler = sampler_for(problem, sampler)
-    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
+    sampler = sampler_for(problem, sampler, features)
+    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs, screen)
     evaluation = EvaluationOptions(workers, evaluation_timeout, allow_failures)
     check_settings(problem, method, evaluation, on_model_failure)
     refuse_unread_parameters(problem)
@@ -280,7 +285,7 @@ class Study:
     def _start_trial(self, number: int) -> None:
         """Choose the design of a trial and start its evaluation; a duplicate takes the values of the first."""
         started = time.perf_counter()
-        slot = self._schedule.next(number)
+        slot = self._screened(self._schedule.next(number), number)
         self._channel.report("evaluating", number, None if slot is None else slot.fault_message)
         proposed = time.perf_counter()
         refinement = self._refine_next(number) if slot is None else None
@@ -300,6 +305,14 @@ class Study:
         known = self._pending[first].trial if first in self._pending else self._trials[first]
         if known.values:
             self._tell(pending, Evaluated(Outcome(known.values, known.violations, known.failure), 0.0))
+
+    def _screened(self, slot: ProposalSlot | None, number: int) -> ProposalSlot | None:
+        """Return a slot without its proposal if the surrogate expects too little of it; else the slot."""
+        if not self._method.screen or slot is None or slot.proposal is None:
+            return slot
+        assert self._proposer is not None
+        rejection = self._black_box.rejection(slot.proposal.design, number)
+        return slot if rejection is None else slot.screened_out(self._proposer.name, rejection)
 
     def _refine_next(self, number: int) -> Refinement | None:
         """Refine a design of the front, if one is due."""

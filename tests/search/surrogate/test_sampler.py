@@ -16,7 +16,7 @@ from armwright.problem.evaluators import Evaluator
 from armwright.problem.problem import Problem
 from armwright.runs.history import BBO, RANDOM
 from armwright.runs.results import read_summary
-from armwright.search.samplers import BlackBox, sampler_factory, sampler_for, sampler_name
+from armwright.search.samplers import BlackBox, SamplerFactory, sampler_factory, sampler_for, sampler_name
 from armwright.search.surrogate import candidates
 from armwright.search.surrogate.sampler import surrogate_sampler
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
@@ -111,6 +111,47 @@ def longest_link(design: Design) -> list[float]:
 def test_custom_features_are_inputs() -> None:
     names = Surrogate(problem(), longest_link).input_names["physics"]
     assert names[-1] == "feature 1"
+
+
+def test_features_of_optimize_are_those_of_the_surrogate() -> None:
+    run = aw.optimize(problem(), proposer="none", features=longest_link, n_init=6, n_total=1)
+    same = surrogate_sampler(problem(), features=longest_link)
+    other = aw.optimize(problem(), proposer="none", sampler=same, n_init=6, n_total=1)
+    assert run.config.study.sampler == sampler_name(same)
+    assert [trial.design for trial in run.trials] == [trial.design for trial in other.trials]
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "random", surrogate_sampler(problem())])
+def test_features_with_another_sampler_are_refused(sampler: str | SamplerFactory) -> None:
+    with pytest.raises(SettingsError, match=r'features: expected the sampler "surrogate".*try sampler="surrogate"'):
+        aw.optimize(problem(), proposer="none", sampler=sampler, features=longest_link)
+
+
+def test_features_without_an_evaluator_need_the_surrogate_by_name() -> None:
+    with pytest.raises(SettingsError, match="got tpe"):
+        aw.optimize(Problem(TASK), proposer="none", features=longest_link)
+
+
+def test_features_that_are_no_function_are_refused() -> None:
+    with pytest.raises(SettingsError, match="expected a function of a design, got 3"):
+        sampler_for(problem(), "surrogate", 3)  # pyright: ignore[reportArgumentType]
+
+
+def test_lambdas_as_features_are_told_apart() -> None:
+    first = surrogate_sampler(problem(), features=lambda design: [design.links[0]])
+    second = surrogate_sampler(problem(), features=lambda design: [design.links[1]])
+    assert sampler_name(first) != sampler_name(second)
+
+
+@pytest.mark.parametrize("value", [[np.nan], [np.inf, 1.0], [[1.0]]])
+def test_features_that_are_not_finite_numbers_are_refused(value: list[float]) -> None:
+    with pytest.raises(SettingsError, match=r"features: expected \d finite numbers for every design, got"):
+        _ = Surrogate(problem(), lambda design: value).input_names
+
+
+def test_features_of_varying_length_are_refused() -> None:
+    with pytest.raises(SettingsError, match="expected 4 finite numbers for every design"):
+        _ = Surrogate(problem(load_space("desk-sorting")), lambda design: design.links).input_names
 
 
 def test_unknown_name_lists_the_surrogate() -> None:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.exceptions import ArmwrightError
+from armwright.exceptions import ArmwrightError, SettingsError
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import CLEARANCE_QUANTITIES, JOINTS, QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
+from armwright.search.surrogate.custom_inputs import CustomInputs
 from armwright.spaces.parameters import CategoricalParameter, Design
 
 PHYSICS, PARAMETERS = "physics", "parameters"  # sets of inputs
@@ -114,6 +115,7 @@ class CheapFeatures:
         self._problem = problem
         self._function = function
         self._encoding = DesignEncoding(problem.space.parameters)
+        self._custom = CustomInputs(problem.space)
 
     def describe(self, matrix: Array) -> Description:
         """Return the description of designs (N, P)."""
@@ -133,6 +135,7 @@ class CheapFeatures:
         physics: list[str] = [quantity.name for quantity in self._quantities]
         physics += [parameters[column].name for column in self._base]
         physics += [f"{letter} joints" for letter in self._problem.space.joint_types]
+        physics += self._custom.names
         if self._function is not None:
             n = self._physics(self._probes[:1])[0].shape[1] - len(physics)
             physics += [f"feature {i + 1}" for i in range(n)]
@@ -146,17 +149,16 @@ class CheapFeatures:
         }
 
     def _physics(self, matrix: Array) -> tuple[Array, Array]:
-        """Return quantities, base position, counts of joint types and custom inputs of designs, and violations."""
+        """Return the unscaled inputs of designs that come from their arms and custom parameters, and violations."""
         tables: list[Array] = []
         violations = np.empty((len(matrix), len(self._problem.constraints)))
         for rows in self._problem.chunks(len(matrix)):
             evaluation = self._problem.physics(matrix[rows])
             tables.append(np.column_stack([quantity(evaluation) for quantity in self._quantities]))
             violations[rows] = self._worst_violations(matrix[rows], evaluation)
-        columns = [np.concatenate(tables), matrix[:, self._base], self._joint_counts(matrix)]
+        columns = [np.concatenate(tables), matrix[:, self._base], self._joint_counts(matrix), self._custom(matrix)]
         if self._function is not None:
-            rows = [np.atleast_1d(self._function(design)) for design in self._problem.space.designs(matrix)]
-            columns.append(np.array(rows, dtype=np.float64))
+            columns.append(_features(self._function, self._problem.space.designs(matrix)))
         return np.column_stack(columns), violations
 
     def _worst_violations(self, matrix: Array, evaluation: Evaluation) -> Array:
@@ -210,6 +212,18 @@ class CheapFeatures:
         evaluation = problem.physics(self._probes[:8])
         left_out = {JOINTS.name, *(quantity.name for quantity in without)}
         return tuple(q for q in QUANTITIES.values() if q.name not in left_out and _is_defined(q, evaluation))
+
+
+def _features(function: FeatureFunction, designs: Sequence[Design]) -> Array:
+    """Return (N, F) the custom features of designs."""
+    rows = [np.atleast_1d(np.asarray(function(design), dtype=np.float64)) for design in designs]
+    for row, design in zip(rows, designs, strict=True):
+        if row.shape != rows[0].shape or row.ndim != 1 or not np.all(np.isfinite(row)):
+            raise SettingsError(
+                f"features: expected {rows[0].size} finite numbers for every design, got {row.tolist()} for "
+                f"{dict(design.params)}"
+            )
+    return np.array(rows)
 
 
 def _is_defined(quantity: Objective, evaluation: Evaluation) -> bool:

@@ -62,7 +62,7 @@ def quality(model: ResponseModel, inputs: Array, values: Array) -> tuple[float |
     if variance == 0.0:
         return None, None
     explained = 1.0 - float(np.mean((predicted - process.observations) ** 2)) / variance
-    off = np.abs(model.transform.restored(predicted) - values)
+    off = np.abs(model.transform.inverse(predicted) - values)
     size = np.abs(values)
     relative = float(np.median(np.divide(off, size, out=np.full(len(values), np.inf), where=size > 0.0)))
     return round(max(0.0, explained), 4), round(relative, 4) if np.isfinite(relative) else None

@@ -9,6 +9,7 @@ from armwright.arrays import Array
 from armwright.search.surrogate.gaussian_process import GaussianProcess, Hyperparameters, fit
 
 SHIFT = 0.03  # of the median, added before a logarithm, so that a value near 0 does not stand out
+LARGEST_LOG = 700.0  # of a prediction, so that it is finite
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,10 @@ class Transform:
         shaped = np.log(np.maximum(values, 0.0) + self.shift) if self.is_log else values
         return (shaped - self.mean) / self.deviation
 
-    def restored(self, transformed: Array) -> Array:
-        """Return the (N,) values of transformed ones."""
+    def inverse(self, transformed: Array) -> Array:
+        """Return the (N,) values that have these transformed values."""
         shaped = transformed * self.deviation + self.mean
-        return np.exp(shaped) - self.shift if self.is_log else shaped
+        return np.exp(np.minimum(shaped, LARGEST_LOG)) - self.shift if self.is_log else shaped
 
     def log_slopes(self, values: Array) -> float:
         """Return the sum of the logarithms of the transform's slopes at values (N,)."""

@@ -11,10 +11,14 @@ from optuna.samplers import BaseSampler, RandomSampler
 from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
+from armwright.exceptions import SettingsError
 from armwright.problem.problem import Problem
+from armwright.search.callable_names import name_of
 from armwright.search.surrogate.cheap_features import FeatureFunction
+from armwright.search.surrogate.proposal_screen import Rejection, rejection
 from armwright.search.surrogate.surrogate import Observations, Surrogate
 from armwright.spaces.optuna_distributions import distributions
+from armwright.spaces.parameters import Design
 
 STARTUP = 5  # trials that are random if the study begins with the sampler
 
@@ -31,7 +35,7 @@ class SurrogateFactory:
     surrogate: Surrogate = field(repr=False)
     name: str
 
-    def __call__(self, seed: int) -> BaseSampler:
+    def __call__(self, seed: int) -> "SurrogateSampler":
         """Return the sampler of one trial."""
         return SurrogateSampler(self.surrogate, seed)
 
@@ -50,6 +54,9 @@ def surrogate_sampler(problem: Problem, features: FeatureFunction | None = None)
         problem: the problem; the sampler never calls its evaluator.
         features: further numbers that may predict the objectives, from a design.
 
+    Raises:
+        SettingsError: `features` is not a function.
+
     Examples:
         >>> import armwright as aw
         >>> problem = aw.Problem(aw.load_task("target-1"))
@@ -59,7 +66,9 @@ def surrogate_sampler(problem: Problem, features: FeatureFunction | None = None)
     """
     name = "surrogate"
     if features is not None:
-        name += f"(features={features.__module__}.{features.__qualname__})"
+        if not callable(features):
+            raise SettingsError(f"features: expected a function of a design, got {features!r}")
+        name += f"(features={name_of(features)})"
     return SurrogateFactory(Surrogate(problem, features), name)
 
 
@@ -98,11 +107,18 @@ class SurrogateSampler(BaseSampler):
         """Return a random value."""
         return self._random.sample_independent(study, trial, param_name, param_distribution)
 
-    def _observations(self, study: Study, trial: FrozenTrial) -> Observations:
+    def rejection(self, study: Study, design: Design) -> Rejection | None:
+        """Return why a design from another source is not worth an evaluation; None if it is."""
+        space = self._surrogate.problem.space
+        row = space.normalised(space.matrix([design]))[0]
+        return rejection(self._surrogate, self._observations(study, None), row, self._seed)
+
+    def _observations(self, study: Study, trial: FrozenTrial | None) -> Observations:
         signs = np.array([1.0 if d is StudyDirection.MINIMIZE else -1.0 for d in study.directions])
         trials = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.FAIL, TrialState.RUNNING))
         done = [t for t in trials if t.state is not TrialState.RUNNING and t.params]
-        pending = [t for t in trials if t.state is TrialState.RUNNING and t.number != trial.number and t.params]
+        own = None if trial is None else trial.number
+        pending = [t for t in trials if t.state is TrialState.RUNNING and t.number != own and t.params]
         failed = np.array([has_failed(t) for t in done])
         values = [np.zeros(len(signs)) if has_failed(t) else signs * t.values for t in done]
         return Observations(self._matrix(done), np.array(values), failed, self._matrix(pending))

@@ -81,13 +81,18 @@ class Surrogate:
 
     def choose(self, observations: Observations, seed: int) -> Array:
         """Return the (P,) design to evaluate next."""
-        rng = np.random.default_rng(seed)
         screen = Screen(self, observations)
+        matrix, known = self.considered(observations, screen, seed)
+        return matrix[int(np.argmax(screen.score(matrix, known)))]
+
+    def considered(self, observations: Observations, screen: "Screen", seed: int) -> tuple[Array, Description]:
+        """Return the (N, P) candidates for the next design, and their description."""
+        rng = np.random.default_rng(seed)
         matrix, known = self._screened(observations)
         mutants = self._mutants(observations, screen.feasible, rng)
         if len(mutants):
             matrix, known = np.vstack([matrix, mutants]), known + self._features.describe(mutants)
-        return matrix[int(np.argmax(screen.score(matrix, known)))]
+        return matrix, known
 
     def describe(self, matrix: Array) -> Description:
         """Return the description of designs (N, P)."""
@@ -172,7 +177,7 @@ class Screen:
         self._success = _success_process(known, observations.failed)
         values = self._transformed(observations.values[kept])
         inputs = known[np.flatnonzero(kept)].inputs
-        self._processes = self._conditioned(inputs, values)
+        self._processes = self._learned = self._conditioned(inputs, values)
         self._front = self._transformed(observations.values[self.feasible])
         if len(observations.pending):
             self._imagine(surrogate.describe_known(observations.pending), inputs, values)
@@ -184,6 +189,22 @@ class Screen:
             for model, process in zip(self._models, self._processes, strict=True)
         ]
         return Forecast(np.column_stack([mean for mean, _ in pairs]), np.column_stack([d for _, d in pairs]))
+
+    @property
+    def quality(self) -> Array:
+        """(M,) shares of the variance of the transformed objectives that are predicted, each value left out in turn."""
+        shares = np.zeros(len(self._learned))
+        for objective, process in enumerate(self._learned):
+            variance = float(process.observations.var())
+            if variance > 0.0:
+                error = process.observations - process.left_out[0]
+                shares[objective] = 1.0 - float((error**2).mean()) / variance
+        return shares
+
+    def predicted(self, known: Description) -> Array:
+        """Return the (N, M) medians of the objectives of designs."""
+        mean = self.forecast(known).mean
+        return np.column_stack([m.transform.inverse(column) for m, column in zip(self._models, mean.T, strict=True)])
 
     def gain(self, known: Description) -> Array:
         """Return (N,) expected gains of transformed hypervolume, times the probabilities of success.
