@@ -75,6 +75,7 @@ actuators:
   - XM540-W270
   - XL430-W250
   - {name: mine, maker: me, kind: servo, voltage: 12, mass: 0.3, stall_torque: 6.0, speed: 5.0, price: 120, source: me}
+motor_bodies: false
 safety_factor: 2.0
 restrict: {joint_1: [R, P], origin_y: 0.0, link_3: [0.1, 0.2]}
 grid: {link: 0.005, origin_x: 0.1}
@@ -183,5 +184,6 @@ def actuator_seeds() -> list[bytes]:
               "estimates": ["rotor_inertia"]}  # fmt: skip
     plain = {"name": "plain", "mass": 0.1}
     records = ([record], [record, plain | {"rated_torque": 3.0, "kind": "harmonic"}], [plain | {"peak_torque": 3.0}])
-    spaces = [{"name": "a", "actuators": listed, "safety_factor": 2.0} for listed in records]
+    spaces = [{"name": "a", "actuators": listed, "safety_factor": 2.0, "motor_bodies": i == 0}
+              for i, listed in enumerate(records)]  # fmt: skip
     return [yaml.safe_dump(space).encode() for space in spaces]
