@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from armwright.arrays import Array
 from armwright.tasks.motions import Motion
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 MANY_SAMPLES = 256  # beyond which the weights of all samples take more time and memory than they save
 
@@ -36,7 +39,7 @@ class MotionPath:
             weight = (share, np.ones(len(share)), np.zeros(len(share)))[order]
             return (self.q[:, :1] if order == 0 else 0.0) + weight[:, None] * change
         if self.q.shape[1] > MANY_SAMPLES:
-            return CubicSpline(self.share, self.q, axis=1)(share, order)
+            return _spline(self.share, self.q, axis=1)(share, order)
         weights = _spline_weights(self.q.shape[1], tuple(share.tolist()), order)
         return np.matmul(weights, self.q)
 
@@ -49,5 +52,12 @@ class MotionPath:
 @lru_cache(maxsize=128)
 def _spline_weights(samples: int, share: tuple[float, ...], order: int) -> Array:
     """Return (F, R) weights of equally spaced samples in the values of their spline, or its derivatives."""
-    spline = CubicSpline(np.linspace(0.0, 1.0, samples), np.eye(samples))
+    spline = _spline(np.linspace(0.0, 1.0, samples), np.eye(samples))
     return np.ascontiguousarray(spline(np.array(share), order))
+
+
+def _spline(share: Array, q: Array, axis: int = 0) -> "CubicSpline":
+    """Return the cubic spline through q at shares along an axis."""
+    from scipy.interpolate import CubicSpline  # takes 0.4 s to import, which searches without a cycle save
+
+    return CubicSpline(share, q, axis=axis)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import FIXED, ArmArrays
@@ -77,12 +76,7 @@ def _states(path: MotionPath, time: Array, duration: float) -> tuple[Array, Arra
     s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
     rate = (30.0 * t**2 * (1.0 - t) ** 2 / duration)[:, None]
     change = (60.0 * t * (1.0 - t) * (1.0 - 2.0 * t) / duration**2)[:, None]
-    if path.motion.by == "joint":
-        first, last = path.q[0, 0], path.q[0, -1]
-        q, q_s, q_ss = first + s[:, None] * (last - first), last - first, np.zeros(1)
-    else:
-        spline = CubicSpline(path.share, path.q[0])
-        q, q_s, q_ss = spline(s), spline(s, 1), spline(s, 2)
+    q, q_s, q_ss = (path.at(s, order)[0] for order in range(3))
     qd = q_s * rate
     return q, np.where(np.abs(qd) < STILL, 0.0, qd), q_ss * rate**2 + q_s * change
 
