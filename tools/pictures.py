@@ -73,6 +73,27 @@ def dark_report(folder: Path, page: Page, file: Path) -> None:
     page.screenshot(path=file)
 
 
+def engineer(size: tuple[int, int]) -> Shot:
+    """Return a picture of the report that begins with the recommended designs, as three objectives have it."""
+
+    def shot(folder: Path, page: Page, file: Path) -> None:
+        command = ("design", EXAMPLES / "6-price-task.yaml", "--space", EXAMPLES / "6-price-space.yaml")
+        open_report(page, once(folder, "runs/price", *command, "--evaluations", 2000), size)
+        page.screenshot(path=file)
+
+    return shot
+
+
+def infeasible_report(folder: Path, page: Page, file: Path) -> None:
+    """Show the report of a task that asks too much."""
+    task = folder / "strict.yaml"
+    text = (EXAMPLES / "8-stiffness-task.yaml").read_text()
+    task.write_text(text.replace("deflection <= 0.001", "deflection <= 0.0002"))
+    command = ("design", task, "--space", EXAMPLES / "8-stiffness-space.yaml", "--evaluations", 1000)
+    open_report(page, once(folder, "runs/strict", *command), (1280, 700))
+    page.screenshot(path=file)
+
+
 def live_report(folder: Path, page: Page, file: Path) -> None:
     """Show a run in progress."""
     command = [Path(sys.executable).with_name("armwright"), "optimize", "target-3", "--n-total", "2000", "--live"]
@@ -193,6 +214,9 @@ PICTURES: dict[str, Shot] = {
     "arms.png": arms,
     "page.png": report,
     "page-dark.png": dark_report,
+    "page-recommended.png": engineer((1280, 1500)),
+    "page-phone.png": engineer((390, 844)),
+    "page-infeasible.png": infeasible_report,
     "page-live.png": live_report,
     "tutorial.png": tutorial,
     "example-shelf.png": arm_of(

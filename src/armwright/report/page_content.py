@@ -22,6 +22,7 @@ from armwright.pareto import hypervolume
 from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import TORQUE, TORQUE_SCALE
 from armwright.report.page_cycles import cycle_motions, cycle_of_design
+from armwright.report.page_recommendations import explained, recommended_designs, why_nothing
 from armwright.report.repeat_command import repeat_command
 from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.robot.arm import AXES, Arm, Joint, Link
@@ -57,6 +58,8 @@ class RunContent:
         self._chunks: list[tuple[int, Arrays]] = []  # chunks of designs, by the number of the first
         self._n = 0
         self._cycle_of: dict[int, dict[str, Any]] = {}  # of designs that are or were on the front
+        self._chosen: Sequence[Mapping[str, Any]] = ()  # recommendations of the summary
+        self._recommended: list[dict[str, Any]] = []  # the same as the page shows them
         self.history = self._nothing()
         self.refresh()
 
@@ -77,6 +80,9 @@ class RunContent:
         self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
         self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
         self.history = self.history.grown(self._reader.trials, self.config.reference_point)
+        chosen = (self.summary or {}).get("recommended", ())
+        if chosen != self._chosen:
+            self._chosen, self._recommended = chosen, recommended_designs(self.history, chosen)
         if len(self.history) > self._n:
             self._chunks.append((self._n, _designs(self.history, range(self._n, len(self.history)))))
             self._n = len(self.history)
@@ -118,6 +124,8 @@ class RunContent:
             "existing": EXISTING._asdict(),
             "existing_arms": _existing_arms(self.folder, self.history),
             "result": _result(self.history, self.summary),
+            "recommended": self._recommended,
+            "nothing": why_nothing(self.history, self.summary),
             "calls_from": calls_from,
             "calls": [asdict(call) for call in self.calls[calls_from:]],
             "files": {number: design_files(self.history, number) for number in front} if with_files else {},
@@ -305,6 +313,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
             "infeasible": INFEASIBLE,
         },
         "joint_labels": JOINT_LABEL,
+        "quantities": explained(),
     }
 
 
@@ -331,7 +340,6 @@ def _result(history: History, summary: Mapping[str, Any] | None) -> dict[str, An
         "evaluations": search.get("evaluations", sum(trial.evaluations for trial in history)),
         "infeasible": search.get("infeasible", int((~history.feasible & ~history.failed).sum())),
         "failed": int(history.failed.sum()),
-        "recommended": parts.get("recommended", []),
         "robust": (parts.get("verification") or {}).get("robust_numbers"),
         "search": search.get("hypervolume_history"),
         "surrogate": parts.get("surrogate"),

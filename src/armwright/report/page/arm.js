@@ -12,6 +12,7 @@ const MOST_CELLS = 16; // most cells along one side of the grid
 const MOVE = 700; // [ms] from one posture to the next
 const REST = 500; // [ms] at a target while playing
 const VIEW = [0.55, -1, 0.42]; // initial direction of the camera
+const PICTURE = [480, 320], CLOSER = 1.3; // [px] of snapshots, and how much nearer they are than the whole frame
 const FILLS = 0.8; // an arm smaller than this share of the frame's radius gets a new frame
 const ARROW = 0.16; // length of arrows, as a share of the frame's radius
 const SLACK = 0.2; // share of the frame's radius by which an arm may leave it before it grows
@@ -68,6 +69,29 @@ export function openArm(shownContent) {
   describeTarget();
 }
 
+// Returns a picture of a design as a data address; null without 3D graphics.
+export function snapshot(design) {
+  if (!scene) return null;
+  const kept = { ...state }, keptFrame = frame, way = camera.position.clone(), [width, height] = PICTURE;
+  Object.assign(state, { design, compared: null, target: 0 });
+  frame = null;
+  renderer.setPixelRatio(1);
+  renderer.setSize(width, height, false);
+  [camera.aspect, camera.zoom] = [width / height, CLOSER];
+  drawArm();
+  const picture = renderer.domElement.toDataURL();
+  camera.zoom = 1;
+  Object.assign(state, kept);
+  frame = null;
+  fit();
+  drawArm();
+  if (keptFrame !== null && turned) {
+    camera.position.copy(way);
+    controls.update();
+    render();
+  }
+  return picture;
+}
 
 // Returns the positions of the drawn joints; for tests.
 export function drawnJoints() {

@@ -70,7 +70,7 @@ function ofStudy() {
 
 function ofSearch(search) {
   return [{
-    x: search.map(([n]) => n), y: search.map(([, volume]) => volume), mode: "lines",
+    x: search.map(([n]) => n), y: search.map(([, volume]) => volume), mode: search.length > 1 ? "lines" : "markers", marker: { color: colour("ink") },
     line: { color: colour("ink"), width: 1.6, shape: "hv" }, hovertemplate: "%{x} designs: %{y:.4g}<extra></extra>",
   }];
 }

@@ -2,7 +2,7 @@
 
 import { angleOff, chain, distance, holding, length, linkLength, reach } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
-import { $, element, metres, millimetres, number, save } from "./format.js";
+import { $, element, metres, millimetres, number, quantity, save } from "./format.js";
 
 const AT_LIMIT = 1e-3; // rad or m
 const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv" };
@@ -71,7 +71,7 @@ export function drawDesign() {
   const iteration = head.is_study && i >= content.nInit ? ` Iteration ${i - content.nInit + 1}.` : "";
   const objectives = content.hasFailed(i) ? [`Evaluation failed (${content.failures[i]})`] : content.objectives.map((o, k) => {
     const mean = o.name === "position_error" && n > 1 ? ` summed over ${n} targets (${millimetres(values[k] / n)} on average)` : "";
-    return `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}${mean}`;
+    return `${o.label} ${quantity(values[k], o.unit)}${mean}`;
   });
   const feasible = head.constraints.length ? ` ${describeConstraints(i)}` : "";
   const motors = content.chosen(i, "motor").length ? ` Motors: ${content.chosen(i, "motor").join(", ")}.` : "";
@@ -81,7 +81,7 @@ export function drawDesign() {
   const mount = content.param(i, "mount");
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
   const base = Array.from(arm.base, metres).join(", ");
-  $("design-summary").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${describeRecommended(i)}${feasible}${iteration}${motors}${tubes}${supply}`;
+  $("design-summary").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${describeRecommended(i)}${feasible}${iteration}${motors}${tubes}${supply}${describeIdle(i, posed)}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
@@ -104,17 +104,17 @@ function describeConstraints(i) {
   const violations = content.violations(i);
   const values = content.head.constraints.map((c, k) => {
     const has = c.bound + c.sign * c.scale * violations[k];
-    return `${c.description}: ${number(has)} ${c.unit}${violations[k] > 0 ? " (violated)" : ""}`;
+    return `${c.description}: ${quantity(has, c.unit)}${violations[k] > 0 ? " (violated)" : ""}`;
   });
   return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${values.join("; ")}.`;
 }
 
 // Says for what it is recommended, whether it is verified, and which perturbations it survives.
 function describeRecommended(i) {
-  const found = content.head.result.recommended.filter((one) => one.design === i);
-  if (!found.length) return "";
-  const { status, survival } = found[0], roles = found.map((one) => one.role).join(", ");
-  return ` Recommended (${roles}): ${status}; ${survival?.verdict ?? "perturbations not evaluated"}.`;
+  const found = content.head.recommended.find((one) => one.design === i);
+  if (!found) return "";
+  const { status, survival, roles } = found;
+  return ` Recommended (${roles.join(", ")}): ${status}; ${survival?.verdict ?? "perturbations not evaluated"}.`;
 }
 
 // Names the values of its motors that are assumed.
@@ -142,7 +142,7 @@ function drawLinks(arm) {
 
 function drawPostures(arm, posed) {
   const joints = [...arm.axis.keys()];
-  const head = element("tr", {}, ...["", "target [m]", "missed by", "torque [N m]"].map((name, k) =>
+  const head = element("tr", {}, ...["", "target [m]", "missed by", "largest torque [N m]"].map((name, k) =>
     element("th", { scope: "col", class: k === 1 ? "text" : "" }, name)),
   ...joints.map((j) => element("th", { scope: "col", title: `limits ${number(arm.lower[j], 3)} to ${number(arm.upper[j], 3)}` },
     arm.kind[j] === 1 ? `q${j + 1} [m]` : `q${j + 1}`)));
@@ -158,7 +158,7 @@ function drawPostures(arm, posed) {
   element("td", {}, String(t + 1)),
   element("td", { class: "text" }, one.target.map((v) => number(v, 3)).join(", ")),
   element("td", { class: one.missed ? "missed" : "", title: one.missed ? why(arm, one) : null }, one.missed ? describeMiss(one) : "reached"),
-  element("td", { title: one.torques.map((v, j) => `joint ${j + 1}: ${number(v, 3)} N m`).join("\n") }, number(length(one.torques), 3)),
+  element("td", { title: one.torques.map((v, j) => `joint ${j + 1}: ${number(v, 3)} N m`).join("\n") }, describeLargest(one.torques)),
   ...joints.map((j) => {
     const side = at(arm, one.q, j);
     return element("td", {}, element("span", { class: side ? "limit" : "", title: side ? `at its ${side} limit` : null }, one.q[j].toFixed(3).replace(/^-(?=[0.]+$)/, "")));
@@ -167,6 +167,19 @@ function drawPostures(arm, posed) {
     ...joints.map((j) => element("td", {}, `${number(arm.lower[j], 3)}…${number(arm.upper[j], 3)}`)));
   $("postures").replaceChildren(element("thead", {}, head), element("tbody", {}, ...rows), element("tfoot", {}, limits));
   mark();
+}
+
+function describeLargest(torques) {
+  const largest = torques.reduce((best, v, j) => (Math.abs(v) > Math.abs(torques[best]) ? j : best), 0);
+  return `${number(Math.abs(torques[largest]), 3)} (joint ${largest + 1})`;
+}
+
+// Names the joints that the task does not need.
+function describeIdle(i, posed) {
+  const ways = [...posed.map((one) => one.q), ...(content.head.cycles[i]?.q ?? []).flat()], { kind } = content.arm(i);
+  const idle = [...posed[0].q.keys()].filter((j) => kind[j] < 2 && ways.every((q) => Math.abs(q[j] - ways[0][j]) < AT_LIMIT));
+  if (!idle.length || ways.length < 2) return "";
+  return ` ${idle.length === 1 ? `Joint ${idle[0] + 1} never moves` : `Joints ${idle.map((j) => j + 1).join(", ")} never move`}.`;
 }
 
 function mark() {
@@ -186,8 +199,11 @@ export function showRow(row) {
   else if (end > box.scrollTop + box.clientHeight) box.scrollTop = end - box.clientHeight;
 }
 
-async function download(format) {
-  const i = state.design, name = `${content.head.config.task.name}-${i}.${ENDINGS[format]}`;
+const download = (format) => downloadOf(state.design, format);
+
+// Saves a design as a file.
+export async function downloadOf(i, format) {
+  const name = `${content.head.config.task.name}-${i}.${ENDINGS[format]}`;
   if (format === "csv") save(name, asCsv(i), TYPES.csv);
   else {
     try {

@@ -21,13 +21,36 @@ export function number(value, digits = 4) {
 }
 
 export const percent = (share, digits = 1) => `${(100 * share).toFixed(digits)} %`;
-export const millimetres = (metres) => (metres >= 1 ? `${number(metres, 3)} m` : `${number(1000 * metres, 3)} mm`);
+export const millimetres = (metres) => (Math.abs(metres) >= 1 ? `${number(metres, 3)} m` : `${number(1000 * metres, 3)} mm`);
 export const plural = (n, word) => `${n.toLocaleString("en")} ${word}${n === 1 ? "" : "s"}`;
 
 // Metres to a tenth of a millimetre, so that columns align.
 export const metres = (value) => value.toFixed(4).replace(/^-(?=[0.]+$)/, "");
 
 export const isTouched = () => matchMedia("(pointer: coarse)").matches;
+
+const FINEST = { m: 1e-6, rad: 1e-5, "N m": 1e-4, kg: 1e-4 }; // below which a value is practically 0
+
+// A value with its unit, in the digits that an engineer reads.
+export function quantity(value, unit) {
+  if (value === null || value === undefined || Number.isNaN(value)) return "not known";
+  const finest = FINEST[unit] ?? 0;
+  if (value !== 0 && Math.abs(value) < finest) return `< ${quantity(finest, unit)}`;
+  switch (unit) {
+    case "m": return millimetres(value);
+    case "rad": return `${number((180 * value) / Math.PI, 3)}°`;
+    case "of allowed": return `${percent(value, 0)} of allowed`;
+    case "fraction": return percent(value, 0);
+    case "USD": return `${Math.round(value).toLocaleString("en")} USD`;
+    default: return `${number(value, 3)} ${unit.replace(" x ", " × ")}`;
+  }
+}
+
+// A question mark that opens an explanation.
+export function why(name, text) {
+  const summary = element("summary", { "aria-label": `What is ${name}?`, title: text }, "?");
+  return element("details", { class: "why" }, summary, element("p", {}, text));
+}
 
 export function duration(seconds) {
   if (seconds < 1) return `${Math.round(1000 * seconds)} ms`;

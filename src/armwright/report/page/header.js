@@ -1,5 +1,6 @@
 // The title of the run, its key figures and its configuration.
 
+import { isForEngineers } from "./recommended.js";
 import { $, duration, element, number, percent, plural } from "./format.js";
 
 let content = null;
@@ -22,7 +23,7 @@ function fact(name, value, paint) {
 }
 
 export function drawHeader() {
-  const { head } = content, { result } = head, facts = [];
+  const { head } = content, { result } = head, facts = [], research = isForEngineers(head) ? [] : facts;
   $("title").textContent = `${head.config.task.name}: ${head.method}, seed ${head.config.seed}`;
   $("description").textContent = head.config.task.description;
   $("repeat").hidden = head.command === "";
@@ -30,8 +31,8 @@ export function drawHeader() {
   if (!result.finished) facts.push(fact("state", "unfinished"));
   if (result.hypervolume !== null) {
     const share = head.best_known ? ` (${percent(result.hypervolume / head.best_known)} of the best known)` : "";
-    facts.push(fact("hypervolume", `${number(result.hypervolume)}${share}`));
-    facts.push(fact("reference point", `(${head.reference_point.map((v) => number(v)).join(", ")})`));
+    research.push(fact("hypervolume", `${number(result.hypervolume)}${share}`));
+    research.push(fact("reference point", `(${head.reference_point.map((v) => number(v)).join(", ")})`));
   }
   const robust = result.robust === null ? "" : `, ${result.robust.length} robust`;
   facts.push(fact("front", `${plural(head.front.length, "design")}${robust}`));
@@ -50,6 +51,8 @@ export function drawHeader() {
     facts.push(fact("calls to the model", `${calls}${cost}${stand_in}`));
   }
   $("facts").replaceChildren(...facts);
+  $("research").hidden = research === facts || !research.length;
+  if (research !== facts) $("research").replaceChildren(...research);
 }
 
 export function drawConfiguration() {

@@ -7,8 +7,10 @@ import { during } from "./cycle.js";
 import { drawDesign, openDesign, postures } from "./design.js";
 import { drawConfiguration, drawHeader, openHeader } from "./header.js";
 import { fileFetcher, openLive } from "./live.js";
+import { drawLoads, openLoads } from "./loads.js";
 import { growPareto, openPareto } from "./pareto.js";
 import { drawPick, forget, openPick, ranked } from "./pick.js";
+import { arrange, drawRecommended, openRecommended } from "./recommended.js";
 import { fromAddress, keepAddress, set, state } from "./state.js";
 import { drawSurrogate } from "./surrogate.js";
 import { drawTable, openTable } from "./table.js";
@@ -18,15 +20,16 @@ import { $ } from "./format.js";
 const content = new Content();
 let isOpen = false;
 
-// Selects the design of the address, or else the knee of the front.
+// Selects the design of the address, or else the knee of the front, or the nearest to a feasible one.
 function begin() {
   const selected = fromAddress(content);
-  if (selected.design === undefined) selected.design = ranked(content, content.head.front)[0] ?? (content.n ? 0 : null);
+  if (selected.design === undefined) selected.design = ranked(content, content.head.front)[0] ?? content.head.nothing?.nearest ?? (content.n ? 0 : null);
   set(selected);
 }
 
 function open() {
   isOpen = true;
+  arrange(content.head);
   openHeader(content);
   openCurve(content);
   openDesign(content, fileFetcher(content));
@@ -38,6 +41,8 @@ function open() {
   keepAddress();
   begin();
   openArm(content);
+  openRecommended(content);
+  openLoads(content);
   drawConfiguration();
   addEventListener("hashchange", () => set(fromAddress(content)));
   $("loading").hidden = true;
@@ -70,6 +75,8 @@ function take(buffer) {
   }
   grow();
   if (isAnother || content.head.result.finished !== before) {
+    drawRecommended();
+    drawLoads();
     drawDesign();
     drawArm();
   }

@@ -1,0 +1,98 @@
+// The designs to build, or why there is none: what an engineer reads first.
+
+import { snapshot } from "./arm.js";
+import { downloadOf } from "./design.js";
+import { listen, set, state } from "./state.js";
+import { $, element, onTheme, plural, quantity, why } from "./format.js";
+
+const ROLES = { knee: "Best compromise" };
+const REACH = "The largest distance of the tip from the first joint, with the arm stretched out.";
+
+let content = null;
+
+export const isForEngineers = (head) => head.constraints.length > 0;
+
+export function openRecommended(shownContent) {
+  content = shownContent;
+  drawRecommended();
+  listen((changed) => { if (changed.has("design")) mark(); });
+  onTheme(drawPictures);
+}
+
+// Puts the search in numbers after the designs of a task with constraints; for the paper's tasks it comes first.
+export function arrange(head) {
+  if (!isForEngineers(head)) return;
+  for (const id of ["curve-box", "surrogate-box", "transcript-box", "configuration-box"]) {
+    $(id).parentElement.append($(id));
+  }
+  $("curve-box").classList.add("wide");
+}
+
+export function drawRecommended() {
+  const { recommended, nothing } = content.head;
+  $("recommended-box").hidden = !recommended.length && nothing === null;
+  $("nothing").hidden = nothing === null;
+  $("recommended-box").querySelector("h2").textContent = nothing === null
+    ? plural(recommended.length, "recommended design") : "No design meets all constraints";
+  if (nothing !== null) {
+    const nearest = element("button", { type: "button", onclick: () => set({ design: nothing.nearest }) }, `Show the nearest, #${nothing.nearest}`);
+    $("nothing").replaceChildren(`${nothing.description[0].toUpperCase()}${nothing.description.slice(1)}. `, nearest);
+  }
+  $("recommended").replaceChildren(...recommended.map(card));
+  drawPictures();
+  mark();
+}
+
+function card(one) {
+  const { design, roles, status, survival } = one;
+  const show = () => set({ design });
+  const title = [...roles].map((role) => ROLES[role] ?? role.replaceAll("_", " ")).join(", ");
+  return element("article", { class: "card", "data-design": design },
+    element("button", { type: "button", class: "picture", onclick: show, "aria-label": `Show design ${design}` }, element("img", { alt: "" })),
+    element("h3", {}, `${title[0].toUpperCase()}${title.slice(1)}: #${design} ${content.joints(design)}`),
+    verdict(status),
+    element("dl", { class: "asked" }, ...rows(one).flatMap(([label, value, text]) => [element("dt", {}, label, why(label, text)), element("dd", {}, value)])),
+    ...survives(survival),
+    element("p", { class: "buttons" }, element("button", { type: "button", onclick: show }, "Show"),
+      ...["urdf", "mjcf"].map((format) => element("button", { type: "button", onclick: () => downloadOf(design, format) }, format.toUpperCase()))));
+}
+
+function rows({ design, reach, quantities }) {
+  const { quantities: explained } = content.head, measured = { ...quantities };
+  content.objectives.forEach((o, k) => { measured[o.name] = content.values(design)[k]; });
+  const named = Object.entries(measured).map(([name, value]) => {
+    const known = explained[name] ?? content.objectives.find((o) => o.name === name);
+    return [known.label, quantity(value, known.unit), known.description];
+  });
+  return [["Reach", quantity(reach, "m"), REACH], ...named];
+}
+
+function verdict(status) {
+  const passed = status === "verified", failed = status.startsWith("not verified");
+  const text = passed ? "Drives its cycle in MuJoCo" : failed ? `Fails in MuJoCo: ${status.slice("not verified: ".length)}` : `Not driven in MuJoCo${status.slice("not simulated".length)}`;
+  return element("p", { class: passed ? "passed" : failed ? "missed" : "note" }, text);
+}
+
+// What the design holds and what breaks it.
+function survives(survival) {
+  if (survival === null) return [];
+  const broken = survival.perturbations.filter((one) => one.broken.length);
+  const held = survival.perturbations.filter((one) => !one.broken.length).map((one) => one.name);
+  const lines = broken.map(({ name, broken: by }) => {
+    const [first, ...others] = by, more = others.length ? ` and ${plural(others.length, "other")}` : "";
+    return element("p", { class: "missed" }, `Breaks with ${name}: ${first.change}, ${first.constraint}${more}`);
+  });
+  return [...lines, ...(held.length ? [element("p", { class: "note" }, `Holds ${held.join("; ")}.`)] : [])];
+}
+
+function drawPictures() {
+  for (const one of $("recommended").querySelectorAll(".card")) {
+    const picture = snapshot(Number(one.dataset.design));
+    one.querySelector(".picture").hidden = picture === null;
+    if (picture !== null) one.querySelector("img").src = picture;
+  }
+}
+
+function mark() {
+  for (const one of $("recommended").querySelectorAll(".card")) one.classList.toggle("chosen", Number(one.dataset.design) === state.design);
+}
