@@ -48,6 +48,12 @@ def test_constraints_that_no_design_satisfies_are_named_one_by_one() -> None:
     assert record["admitting_alone"] is None
 
 
+def test_bounds_of_zero_stay_if_others_can_change() -> None:
+    record = record_of([-1.0, -1.0, -1.0, 1.0], [2.0, 3.0, -1.0, 0.0])
+    assert record["admitting"] == ["mass <= 6", "price <= 2000"]
+    assert record["admitting_alone"] is None
+
+
 def test_conflict_may_take_three_constraints() -> None:
     pairs = [[-1.0, -1.0, 1.0, -1.0], [-1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, -1.0]]
     assert record_of(*pairs)["conflicts"] == [["mass <= 2", "price <= 500", "clearance >= 0.01"]]

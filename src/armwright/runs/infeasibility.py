@@ -97,11 +97,16 @@ def conflict_record(constraints: Sequence[Constraint], tally: ViolationTally) ->
         designs: Number of designs.
         satisfied_by: Number of designs that satisfy each constraint.
         conflicts: Smallest sets of constraints that no design satisfies together.
-        admitting: Constraints with other bounds, of the smallest sum of relative changes, that admit one of them.
+        admitting: Constraints with other bounds, of the smallest sum of relative changes, that admit one of them;
+            bounds of 0 change only if no design meets all of these.
         admitting_alone: The smallest change of a single bound that does; None if no design violates only one.
     """
     names = [constraint.description for constraint in constraints]
     rows = np.array(list(tally.nearest.values()))
+    # Nobody loosens a bound of 0, such as that of unreached targets or collisions, while another bound will do.
+    rigid = np.array([constraint.bound == 0.0 for constraint in constraints])
+    is_adjustable = ~(rows[:, rigid] > 0.0).any(axis=1)
+    rows = rows[is_adjustable] if is_adjustable.any() else rows
     totals, violated = total_violation(rows), (rows > 0.0).sum(axis=1)
     alone = np.flatnonzero(violated == 1)
     single = None if not len(alone) else _loosened(constraints, rows[alone[np.argmin(totals[alone])]])[0]
