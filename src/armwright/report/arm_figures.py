@@ -33,6 +33,8 @@ ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's re
 MAX_PANELS = 12
 COLUMNS = 42  # characters of a caption above one of several panels
 LINE_HEIGHT = 0.2  # [inches]
+NARROW = 3  # columns of the legend of a narrow figure
+INNER = 0.88  # part of an axis that has tick labels
 
 # Lines
 MISS: Any = {"color": MISSED, "linewidth": 1.2, "linestyle": (0, (2, 2))}  # from the tip to a target not reached
@@ -44,17 +46,19 @@ EDGE: Any = {"color": "#8A8A8A", "linewidth": 0.8}  # of boxes to cover
 def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
     """Draw the chosen designs side by side, each with its postures at all targets."""
     captions = [f"{title}\n{_caption(history, member, COLUMNS)}" for title, member in chosen]
-    height = 3.8 + LINE_HEIGHT * max(caption.count("\n") + 1 for caption in captions)
+    evaluation = history.evaluation([member.number for _, member in chosen])
+    handles, columns = _legend(evaluation, is_narrow=len(chosen) == 1)
+    foot = 0.24 + LINE_HEIGHT * math.ceil(len(handles) / columns)  # [inches]
+    height = foot + 3.36 + LINE_HEIGHT * max(caption.count("\n") + 1 for caption in captions)
     figure = Figure(figsize=(3.8 * len(chosen), height))
     # The layout engines do not know how far the labels of a 3D plot reach.
-    figure.subplots_adjust(left=0.01, right=0.97, bottom=0.44 / height, top=3.96 / height, wspace=0.08)
-    evaluation = history.evaluation([member.number for _, member in chosen])
+    figure.subplots_adjust(left=0.01, right=0.97, bottom=foot / height, top=(foot + 3.52) / height, wspace=0.08)
     extent = _extent(evaluation, [member for _, member in chosen])
     for column, (_, member) in enumerate(chosen):
         axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
         _draw_panel(axes, member, evaluation, column, range(len(evaluation.targets)), extent)
         axes.set_title(captions[column], y=1.0)
-    _add_legend(figure, evaluation, is_narrow=len(chosen) == 1)
+    figure.legend(handles=handles, loc="lower center", ncols=columns)
     return figure
 
 
@@ -65,9 +69,11 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     shown = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MAX_PANELS))})
     columns = min(4, max(2, math.ceil(math.sqrt(len(shown)))))
     rows = -(-len(shown) // columns)
-    height = 3.1 * rows + 1.2
+    handles, legend_columns = _legend(evaluation, is_narrow=columns <= 2)
+    foot = 0.35 + LINE_HEIGHT * math.ceil(len(handles) / legend_columns)  # [inches]
+    height = 3.1 * rows + foot + 0.65
     figure = Figure(figsize=(3.1 * columns, height))
-    figure.subplots_adjust(left=0.01, right=0.96, bottom=0.55 / height, top=1 - 0.75 / height, wspace=0.08, hspace=0.12)
+    figure.subplots_adjust(left=0.01, right=0.96, bottom=foot / height, top=1 - 0.75 / height, wspace=0.08, hspace=0.12)
     extent = _extent(evaluation, [member])
     for place, target in enumerate(shown):
         axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
@@ -77,7 +83,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
         axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=MISSED if missed else FRONT)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
     figure.suptitle(f"{title}{part}\n{_caption(history, member)}", fontsize=10)
-    _add_legend(figure, evaluation, is_narrow=columns <= 2)
+    figure.legend(handles=handles, loc="lower center", ncols=legend_columns)
     return figure
 
 
@@ -164,8 +170,11 @@ def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
     """Set equal scales on all axes, so that angles and lengths are not distorted."""
     centre, half = extent
     for name, middle in zip("xyz", centre, strict=True):
-        getattr(axes, f"set_{name}lim")(middle - half, middle + half)
-        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(4))
+        low, high = middle - half, middle + half
+        getattr(axes, f"set_{name}lim")(low, high)
+        # Labels at the ends of two axes would lie on each other in their common corner.
+        ticks = [tick for tick in MaxNLocator(4).tick_values(low, high) if abs(tick - middle) < INNER * half]
+        getattr(axes, f"set_{name}ticks")(ticks)
         getattr(axes, f"set_{name}label")(f"{name} [m]", labelpad=-6, fontsize=7)
     axes.tick_params(labelsize=6, pad=-2)
     axes.set_box_aspect((1, 1, 1))
@@ -195,8 +204,8 @@ def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.
     return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))
 
 
-def _add_legend(figure: Figure, evaluation: Evaluation, is_narrow: bool) -> None:
-    """Add the legend below the panels: one line, or three columns in a narrow figure."""
+def _legend(evaluation: Evaluation, is_narrow: bool) -> tuple[list[Line2D | Patch], int]:
+    """Return the entries of the legend below the panels, and its number of columns: one line unless it is narrow."""
     handles: list[Line2D | Patch] = [
         legend_mark("base", "s", FRONT),
         *(legend_mark(JOINT_LABEL[axis], "o", JOINT[axis]) for axis in "xyz"),
@@ -209,7 +218,7 @@ def _add_legend(figure: Figure, evaluation: Evaluation, is_narrow: bool) -> None
         handles += [Line2D([], [], **MOVE, label="line of the cycle"), Line2D([], [], **TIP, label="its tip")]
     if evaluation.workspace:
         handles.append(Line2D([], [], **EDGE, label="workspace"))
-    figure.legend(handles=handles, loc="lower center", ncols=3 if is_narrow else len(handles))
+    return handles, NARROW if is_narrow else len(handles)
 
 
 def _caption(history: History, member: FrontMember, columns: int = 200) -> str:

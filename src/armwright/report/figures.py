@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
@@ -137,6 +137,8 @@ def draw_search(history: History, search: Mapping[str, Any]) -> Figure:
     evaluations, volumes = np.array(search["hypervolume_history"]).T
     axes.step(evaluations, volumes, where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")  # the usual one writes markup
+    axes.xaxis.set_minor_formatter(NullFormatter())
     _label_hypervolume(axes, history, "Designs evaluated")
     return figure
 
@@ -206,7 +208,8 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
     arms = _draw_existing(axes, limits[:, 1], existing)
     axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if arms else [])], loc="upper right")
     area = hypervolume(history.masked_objectives, reference)
-    axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
+    n = len(history.front)
+    axes.set_title(f"{history.problem.task.name}: {n} design{'s' * (n != 1)} on the front, hypervolume {area:.2f}")
     marks = [(reference[0], reference[1]), *((m.values[0], m.values[1]) for m in history.front)]
     marks = [mark for mark in marks if np.all(np.array(mark) <= limits[:, 1])]
     place_labels(axes, labels + arms, marks)

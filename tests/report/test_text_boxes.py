@@ -1,0 +1,128 @@
+"""No text of a figure or of the page lies on another or is cut off."""
+
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+from playwright.sync_api import Browser
+
+import armwright as aw
+from armwright.report import drawing
+from armwright.report.figures import write_figures
+from armwright.report.page import write_report
+from tests.support.browser import Tab
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+TOUCHING = 3.0  # [px] of margins that text boxes may share; a letter is 14 px high
+WIDTHS = (1280, 390)
+
+
+def price_run(folder: Path) -> None:
+    task, space = aw.load_task(EXAMPLES / "6-price-task.yaml"), aw.load_space(EXAMPLES / "6-price-space.yaml")
+    aw.find_front(aw.Problem(task, space), evaluations=500, out=folder)
+
+
+def paper_run(folder: Path) -> None:
+    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="rules", n_total=40, out=folder)
+
+
+def infeasible_run(folder: Path) -> None:
+    task = aw.load_task("desk-sorting").model_copy(update={"constraints": ("length <= 0.3",)})
+    aw.find_front(aw.Problem(task, aw.load_space("desk-sorting")), evaluations=100, out=folder)
+
+
+RUNS = {"three-objectives": price_run, "paper": paper_run, "infeasible": infeasible_run}
+
+
+@pytest.fixture(scope="module", params=RUNS)
+def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("text") / "run"
+    RUNS[request.param](folder)
+    return folder
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[Bbox, list[tuple[str, Bbox]]]]:
+    """For each figure that is drawn from now on: its box, and its horizontal and vertical texts with theirs [px]."""
+    found: dict[str, tuple[Bbox, list[tuple[str, Bbox]]]] = {}
+    boxes: list[tuple[str, Bbox]] = []
+    draw = Text.draw
+
+    def recorded(self: Text, renderer: Any, *others: Any, **named: Any) -> None:
+        draw(self, renderer, *others, **named)
+        if self.get_visible() and self.get_text().strip() and self.get_rotation() % 90.0 == 0.0:
+            boxes.append((self.get_text(), self.get_window_extent(renderer)))
+
+    def saved(figure: Figure, png: Path) -> str:
+        figure.savefig(png, dpi="figure")
+        figure.set_layout_engine(None)  # it is settled now, so each text is drawn once
+        boxes.clear()
+        figure.savefig(png, dpi="figure")
+        found[png.name] = figure.bbox.frozen(), list(boxes)
+        return png.name
+
+    monkeypatch.setattr(Text, "draw", recorded)
+    monkeypatch.setattr(drawing, "_save", saved)
+    return found
+
+
+def overlap(one: Bbox, other: Bbox) -> float:
+    """The smaller side of what two boxes share [px]."""
+    return min(min(one.x1, other.x1) - max(one.x0, other.x0), min(one.y1, other.y1) - max(one.y0, other.y0))
+
+
+def test_texts_of_figures_are_whole_and_apart(run: Path, drawn: dict[str, tuple[Bbox, list[tuple[str, Bbox]]]]) -> None:
+    write_figures(run)
+    assert len(drawn) >= 3
+    for name, (figure, texts) in drawn.items():
+        assert len(texts) > 5
+        for text, box in texts:
+            is_inside = box.x0 > -1 and box.y0 > -1 and box.x1 < figure.x1 + 1 and box.y1 < figure.y1 + 1
+            assert is_inside, f"{name}: {text!r} is cut off"
+        for (text, box), (other, its) in combinations(texts, 2):
+            assert overlap(box, its) < TOUCHING, f"{name}: {text!r} lies on {other!r}"
+
+
+@pytest.fixture
+def tab(browser: Browser) -> Iterator[Tab]:
+    opened = Tab(browser, offline=True)
+    yield opened
+    opened.close()
+
+
+# Boxes of the lines of all visible texts outside of scrolling boxes, with their texts.
+TEXTS = """() => {
+    const found = [], walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    const isLeftOut = "script, style, option, .scroll, .modebar, noscript, details:not([open]) > :not(summary)";
+    for (let node = walk.nextNode(); node; node = walk.nextNode()) {
+        const parent = node.parentElement, text = node.textContent.trim();
+        if (!text || !parent.checkVisibility({ visibilityProperty: true, opacityProperty: true })) continue;
+        if (parent.closest(isLeftOut)) continue;
+        const range = document.createRange();
+        range.selectNodeContents(node);
+        for (const { left, top, right, bottom, width } of range.getClientRects()) {
+            if (width > 0) found.push([text, left, top + scrollY, right, bottom + scrollY]);
+        }
+    }
+    return found;
+}"""
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_texts_of_the_page_are_whole_and_apart(run: Path, tab: Tab, width: int) -> None:
+    write_report(run)
+    tab.page.set_viewport_size({"width": width, "height": 900})
+    tab.open(run / "report.html")
+    tab.page.locator("#arm canvas").wait_for()
+    texts = [(text, Bbox.from_extents(*box)) for text, *box in tab.ask(TEXTS)]
+    assert len(texts) > 30
+    for text, box in texts:
+        assert box.x0 > -1, text
+        assert box.x1 < width + 1, f"{text!r} leaves the page"
+    for (text, box), (other, its) in combinations(texts, 2):
+        assert overlap(box, its) < TOUCHING, f"{text!r} lies on {other!r}"
