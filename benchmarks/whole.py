@@ -59,11 +59,10 @@ def compare(problem: Problem, budget: int, survey: int, seed: int) -> None:
     shared = np.vstack([values_in(spaces[label], math.ceil(budget / len(chosen))) for label in chosen])
     single = {label: volume(values) for label, values in full.items()}
     top = max(single, key=lambda label: single[label])
-    print(
-        f"  {problem.task.name:24s}{joint / volume(shared):14.2%}{joint / single[top]:10.2%}"
-        f"{joint / volume(np.vstack(list(full.values()))):10.2%}   {top}",
-        flush=True,
-    )
+    shares = [
+        np.divide(joint, other) for other in (volume(shared), single[top], volume(np.vstack(list(full.values()))))
+    ]
+    print(f"  {problem.task.name:24s}{shares[0]:14.2%}{shares[1]:10.2%}{shares[2]:10.2%}   {top}", flush=True)
 
 
 if __name__ == "__main__":
