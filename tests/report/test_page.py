@@ -107,6 +107,8 @@ def test_what_the_surrogate_learned_is_a_table(run: Path, tab: Tab, tmp_path: Pa
         "relative_error": 0.0123,
         "inputs": "physics",
         "effects": effects,
+        "predicted": [1.0] * 30,
+        "log_shift": 0.1,
     }
     constant: dict[str, Any] = {
         "name": "steps",
@@ -114,9 +116,11 @@ def test_what_the_surrogate_learned_is_a_table(run: Path, tab: Tab, tmp_path: Pa
         "relative_error": None,
         "inputs": "parameters",
         "effects": [],
+        "predicted": [3.0] * 30,
+        "log_shift": None,
     }
     objectives = [work | {"correction": "work is 1.4 times our peak torque"}, constant | {"correction": ""}]
-    summary["surrogate"] = {"designs": 30, "objectives": objectives}
+    summary["surrogate"] = {"designs": 30, "trials": list(range(30)), "objectives": objectives}
     (copy / "summary.json").write_text(json.dumps(summary))
     tab.open(write_report(copy))
     rows = tab.page.locator("#surrogate tbody tr").all()
