@@ -425,6 +425,34 @@ def test_markup_in_answers_is_escaped(tmp_path: Path, tab: Tab, chat_server: Cha
     assert tab.requests == [(tmp_path / "run" / "report.html").resolve().as_uri()]
 
 
+def test_transcript_states_what_was_predicted_of_a_screened_proposal(
+    tmp_path: Path, tab: Tab, chat_server: ChatServer
+) -> None:
+    best = dict(known_front(aw.Problem(aw.load_task("target-1"))).designs[0].params)
+    answer = json.dumps({**best, "reason": "short"})
+    chat_server.answer = lambda request: answer if wants_design(request) else "because"
+    proposer = llm_proposer(chat_server.url, origin="scripted")
+    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer=proposer, n_init=4, n_step=2, n_total=3, out=tmp_path)
+    trials = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text().splitlines()]
+    screened = trials[4]  # as if the screen had left it out
+    number, id_ = screened["number"], screened["proposal"]
+    screened |= {"screened": {"source": "llm", "proposal": id_, "gain": 0.02, "predicted": [0.5, 12.0]}}
+    screened |= {"source": "bbo", "proposal": None}
+    del screened["reason"]
+    (tmp_path / "trials.jsonl").write_text("".join(json.dumps(trial) + "\n" for trial in trials))
+    tab.open(write_report(tmp_path), f"#design={number}")
+    line = (
+        f"{id_} was not evaluated: predicted position error 0.5 m, torque 12 N m x 40; expected gain 2 % of the best "
+        "candidate's"
+    )
+    assert f"{line}. #{number} is the black box's design instead." in tab.text("#transcript")
+    assert tab.page.locator("#transcript .call").count() >= 1
+    tab.page.locator("#all-calls").check()
+    stated = tab.page.locator("#transcript .call", has_text=line)
+    assert stated.count() == tab.page.locator("#transcript .call", has_text=id_).count() >= 1
+    assert tab.faults == []
+
+
 def test_page_of_a_front_search(tmp_path: Path, tab: Tab) -> None:
     run = aw.find_front(aw.Problem(task=aw.load_task("target-3")), evaluations=3000, out=tmp_path / "front")
     tab.open(write_report(tmp_path / "front"))
