@@ -5,6 +5,7 @@ import io
 import json
 import re
 import shutil
+from base64 import b64encode
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from armwright.exceptions import RunFolderError
 from armwright.kinematics.forward import joint_positions
 from armwright.pareto import front_indices
 from armwright.report.page import program, write_report
+from armwright.report.page_content import RunContent
 from armwright.runs.folder import read_run
 from armwright.runs.front_gap import known_front
 from armwright.runs.history import History
@@ -423,6 +425,15 @@ def test_markup_in_answers_is_escaped(tmp_path: Path, tab: Tab, chat_server: Cha
     assert tab.ask("window.hacked") is None
     assert tab.page.locator("img[src=x]").count() == 0
     assert tab.requests == [(tmp_path / "run" / "report.html").resolve().as_uri()]
+
+
+def test_failures_of_a_replaced_run_are_forgotten(run: Path, tab: Tab) -> None:
+    """A run that begins anew discards its trials, and a live page receives all designs again."""
+    tab.open(run / "report.html")
+    packed = b64encode(RunContent(run).packed()).decode()
+    tab.ask("armwright.content.failures[3] = 'exception: no licence'")
+    tab.ask(f"armwright.content.add(Uint8Array.from(atob('{packed}'), (c) => c.charCodeAt(0)).buffer)")
+    assert tab.ask("armwright.content.hasFailed(3)") is False
 
 
 def test_transcript_states_what_was_predicted_of_a_screened_proposal(

@@ -29,8 +29,6 @@ export class Content {
   constructor() {
     this.head = null;
     this.calls = [];
-    this.proposals = {};
-    this.failures = {}; // why evaluations failed, which then have no finite values
     this._clear();
   }
 
@@ -40,6 +38,7 @@ export class Content {
     this._chunk = []; // of each design
     this._row = [];
     this.proposals = {};
+    this.failures = {}; // why evaluations failed, which then have no finite values
   }
 
   // Adds a packed run, or only its new part.
