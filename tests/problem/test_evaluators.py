@@ -61,7 +61,10 @@ def test_evaluator_combines_with_builtin_objectives_and_constraints() -> None:
 @pytest.mark.parametrize(
     ("made", "words"),
     [
-        (lambda arm, task: (1.0, 2.0), r"expected 1 numbers \(energy\), got \(1.0, 2.0\)"),
+        (
+            lambda arm, task: (1.0, 2.0),
+            r"expected 1 numbers \(energy\), got \(1.0, 2.0\) \(test_evaluators.py, line \d+\)$",
+        ),
         (lambda arm, task: None, "got None"),
         (lambda arm, task: "much", "got 'much'"),
         (lambda arm, task: math.nan, "expected finite numbers, got energy = nan"),
@@ -78,6 +81,8 @@ def test_evaluator_results_are_validated(made: Callable[[aw.Arm, aw.Task], float
 def test_system_exit_in_an_evaluator_is_a_failure() -> None:
     with pytest.raises(EvaluatorError, match=": SystemExit: 3"):
         raising(SystemExit(3))(ARM, TASK)
+    with pytest.raises(EvaluatorError, match=r": MemoryError \("):
+        raising(MemoryError())(ARM, TASK)
     with pytest.raises(KeyboardInterrupt):
         raising(KeyboardInterrupt())(ARM, TASK)
 
@@ -187,12 +192,14 @@ def test_evaluator_file_can_import_its_neighbours(file: Path) -> None:
         ("broken.py:f", r"cannot load broken.py: SyntaxError: .*\(broken.py, line 2\)"),
         ("raises.py:f", r"cannot load raises.py: RuntimeError: at once \(raises.py, line 1\)"),
         ("exits.py:f", r"cannot load exits.py: SystemExit: 3 \(exits.py, line 1\)"),
+        ("named.py:f", r'^cannot load named.py: objective "length" is built in; .* \(named.py, line 2\)$'),
     ],
 )
 def test_unloadable_evaluator_is_one_line(file: Path, place: str, words: str) -> None:
     (file.parent / "broken.py").write_text("x = 1\ndef f(:\n")
     (file.parent / "raises.py").write_text("raise RuntimeError('at once')\n")
     (file.parent / "exits.py").write_text("raise SystemExit(3)\n")
+    (file.parent / "named.py").write_text("import armwright as aw\n@aw.evaluator('length')\ndef f(arm, task): ...\n")
     with pytest.raises(SettingsError, match=words) as raised:
         aw.load_evaluator(place)
     assert "\n" not in str(raised.value)

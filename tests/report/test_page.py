@@ -5,6 +5,7 @@ import io
 import json
 import re
 import shutil
+from base64 import b64encode
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from armwright.exceptions import RunFolderError
 from armwright.kinematics.forward import joint_positions
 from armwright.pareto import front_indices
 from armwright.report.page import program, write_report
+from armwright.report.page_content import RunContent
 from armwright.runs.folder import read_run
 from armwright.runs.front_gap import known_front
 from armwright.runs.history import History
@@ -107,6 +109,8 @@ def test_what_the_surrogate_learned_is_a_table(run: Path, tab: Tab, tmp_path: Pa
         "relative_error": 0.0123,
         "inputs": "physics",
         "effects": effects,
+        "predicted": [1.0] * 30,
+        "log_shift": 0.1,
     }
     constant: dict[str, Any] = {
         "name": "steps",
@@ -114,9 +118,11 @@ def test_what_the_surrogate_learned_is_a_table(run: Path, tab: Tab, tmp_path: Pa
         "relative_error": None,
         "inputs": "parameters",
         "effects": [],
+        "predicted": [3.0] * 30,
+        "log_shift": None,
     }
     objectives = [work | {"correction": "work is 1.4 times our peak torque"}, constant | {"correction": ""}]
-    summary["surrogate"] = {"designs": 30, "objectives": objectives}
+    summary["surrogate"] = {"designs": 30, "trials": list(range(30)), "objectives": objectives}
     (copy / "summary.json").write_text(json.dumps(summary))
     tab.open(write_report(copy))
     rows = tab.page.locator("#surrogate tbody tr").all()
@@ -419,6 +425,43 @@ def test_markup_in_answers_is_escaped(tmp_path: Path, tab: Tab, chat_server: Cha
     assert tab.ask("window.hacked") is None
     assert tab.page.locator("img[src=x]").count() == 0
     assert tab.requests == [(tmp_path / "run" / "report.html").resolve().as_uri()]
+
+
+def test_failures_of_a_replaced_run_are_forgotten(run: Path, tab: Tab) -> None:
+    """A run that begins anew discards its trials, and a live page receives all designs again."""
+    tab.open(run / "report.html")
+    packed = b64encode(RunContent(run).packed()).decode()
+    tab.ask("armwright.content.failures[3] = 'exception: no licence'")
+    tab.ask(f"armwright.content.add(Uint8Array.from(atob('{packed}'), (c) => c.charCodeAt(0)).buffer)")
+    assert tab.ask("armwright.content.hasFailed(3)") is False
+
+
+def test_transcript_states_what_was_predicted_of_a_screened_proposal(
+    tmp_path: Path, tab: Tab, chat_server: ChatServer
+) -> None:
+    best = dict(known_front(aw.Problem(aw.load_task("target-1"))).designs[0].params)
+    answer = json.dumps({**best, "reason": "short"})
+    chat_server.answer = lambda request: answer if wants_design(request) else "because"
+    proposer = llm_proposer(chat_server.url, origin="scripted")
+    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer=proposer, n_init=4, n_step=2, n_total=3, out=tmp_path)
+    trials = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text().splitlines()]
+    screened = trials[4]  # as if the screen had left it out
+    number, id_ = screened["number"], screened["proposal"]
+    screened |= {"screened": {"source": "llm", "proposal": id_, "gain": 0.02, "predicted": [0.5, 12.0]}}
+    screened |= {"source": "bbo", "proposal": None}
+    del screened["reason"]
+    (tmp_path / "trials.jsonl").write_text("".join(json.dumps(trial) + "\n" for trial in trials))
+    tab.open(write_report(tmp_path), f"#design={number}")
+    line = (
+        f"{id_} was not evaluated: predicted position error 0.5 m, torque 12 N m x 40; expected gain 2 % of the best "
+        "candidate's"
+    )
+    assert f"{line}. #{number} is the black box's design instead." in tab.text("#transcript")
+    assert tab.page.locator("#transcript .call").count() >= 1
+    tab.page.locator("#all-calls").check()
+    stated = tab.page.locator("#transcript .call", has_text=line)
+    assert stated.count() == tab.page.locator("#transcript .call", has_text=id_).count() >= 1
+    assert tab.faults == []
 
 
 def test_page_of_a_front_search(tmp_path: Path, tab: Tab) -> None:

@@ -233,7 +233,9 @@ def test_killed_local_workers_and_search_are_resumed(tmp_path: Path, bench: Benc
 @pytest.mark.slow
 def test_design_that_kills_three_workers_ends_the_search(tmp_path: Path, bench: Bench) -> None:
     bench.ask("die")
-    with pytest.raises(EvaluatorError, match=r"3 workers were lost over trial 0 .* design: \{.*\}\. Rerun") as raised:
+    with pytest.raises(
+        EvaluatorError, match=r"3 workers were lost over trial 0 .* design: \{.*\}\. Rerun .* --evaluation"
+    ) as raised:
         aw.optimize(bench.problem(), **SHORT, out=tmp_path / "run", workers=aw.Workers(1))
     assert len({pid for pid, _ in bench.evaluated}) == len(bench.evaluated) == 3
     assert '"origin_x": ' in str(raised.value)

@@ -104,7 +104,7 @@ class Evaluator:
                 made = cast("Callable[..., object]", self.measure)(arm, task, **given)
         except (Exception, SystemExit) as fault:  # noqa: BLE001 (the failure is recorded)
             kind = type(fault).__name__
-            reason = one_line(f"{kind}: {fault}", MAX_REASON_LENGTH)
+            reason = one_line(f"{kind}: {fault}".removesuffix(": "), MAX_REASON_LENGTH)
             return Failure("exception", reason, kind, _place(fault), _traceback(fault))
         names = [objective.name for objective in self.objectives]
         values = _numbers(made)
@@ -112,7 +112,7 @@ class Evaluator:
             reason = one_line(
                 f"expected {len(names)} numbers ({', '.join(names)}), got {made!r:.80}", MAX_REASON_LENGTH
             )
-            return Failure("exception", reason, "wrong result")
+            return Failure("exception", reason, "wrong result", _defined_at(self.measure))
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):
                 return Failure("non_finite", f"expected finite numbers, got {name} = {value}")
@@ -269,6 +269,8 @@ def _file_module(path: Path, source: bytes) -> ModuleType:
     sys.modules[name] = module  # as pickle and dataclasses expect
     try:
         spec.loader.exec_module(module)
+    except SettingsError as fault:  # raised by our decorator for an argument in the file
+        raise SettingsError(f"cannot load {path}: {fault} ({_place(fault, str(path))})") from fault
     except (Exception, SystemExit) as fault:
         raise SettingsError(f"cannot load {path}: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
     return module
@@ -280,9 +282,16 @@ def _traceback(fault: BaseException) -> str:
     return "".join(traceback.format_exception(type(fault), fault, trace and trace.tb_next)).rstrip()
 
 
-def _place(fault: BaseException) -> str:
-    """Return where it was raised: `file.py, line 12`."""
+def _place(fault: BaseException, file: str = "") -> str:
+    """Return where an exception was raised, or where `file` called what raised it: `file.py, line 12`."""
     if isinstance(fault, SyntaxError):
         return f"{Path(fault.filename or '').name}, line {fault.lineno}"
-    frame = traceback.extract_tb(fault.__traceback__)[-1]
+    frames = traceback.extract_tb(fault.__traceback__)
+    frame = next((frame for frame in reversed(frames) if frame.filename == file), frames[-1])
     return f"{Path(frame.filename).name}, line {frame.lineno}"
+
+
+def _defined_at(measure: Measure) -> str:
+    """Return where a function is defined: `file.py, line 12`; empty for an object that is called."""
+    code = getattr(measure, "__code__", None)
+    return "" if code is None else f"{Path(code.co_filename).name}, line {code.co_firstlineno}"

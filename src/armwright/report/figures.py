@@ -27,6 +27,7 @@ from armwright.report.drawing import (
 )
 from armwright.report.point_labels import PointLabel, place_labels
 from armwright.report.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
+from armwright.report.surrogate_figure import draw_surrogate
 from armwright.runs.attribution import front_by_source, gained_by_source
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import read_run
@@ -48,19 +49,29 @@ def write_figures(folder: str | Path, has_time: Callable[[float], bool] = lambda
     """
     folder = Path(folder)
     config, history = read_run(folder)
-    summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
-    search = None if summary is None else summary.get("search")
+    is_study = not isinstance(config.method, FrontMethod)
+    summary = read_summary(folder) or {}
+    search, learned = (None, summary.get("surrogate")) if is_study else (summary.get("search"), None)
     existing = read_existing_arms(folder, len(config.objectives))
-    return write_drawn(folder / FIGURES, _figures(history, search, existing, has_time))
+    return write_drawn(folder / FIGURES, _figures(history, search, learned, existing, has_time))
 
 
 def _figures(
     history: History,
     search: Mapping[str, Any] | None,
+    learned: Mapping[str, Any] | None,
     existing: Sequence[ComparedArm],
     has_time: Callable[[float], bool],
 ) -> Iterator[tuple[str, Figure]]:
-    """Yield figures by name; search: the record of a direct search, whose trials are its front."""
+    """Yield figures by name.
+
+    Args:
+        history: The trials.
+        search: The record of a direct search, whose trials are its front.
+        learned: What the surrogate of a study learned.
+        existing: Arms to compare with.
+        has_time: As for `write_figures`.
+    """
     if len(history) and history.failed.all():
         return  # there is nothing to draw
     is_plane = len(history.problem.objectives) > 1  # figures of the first two objectives
@@ -71,6 +82,8 @@ def _figures(
         if is_plane:
             yield "samples", draw_samples(history)
         yield "attribution", draw_attribution(history)
+    if learned is not None:
+        yield "surrogate", draw_surrogate(history, learned)
     if is_plane:
         yield "front", draw_front(history, existing)
     chosen = chosen_members(history)

@@ -356,15 +356,16 @@ def _failures(history: History, first: int) -> dict[int, str]:
 
 
 def _proposals(history: History, first: int) -> dict[int, dict[str, Any]]:
-    """Return the proposals, refinements and failed proposals among the designs from `first` on."""
+    """Return the proposals, refinements, and failed and screened proposals among the designs from `first` on."""
     return {
         trial.number: {
-            "id": trial.proposal,
+            "id": trial.answer,
             "reason": trial.reason,
             "expected": trial.expected,
             "fault": trial.fault,
             "refines": trial.refines,
+            "screened": None if trial.screened is None else trial.screened.describe(history.problem.objectives),
         }
         for trial in history.trials[first:]
-        if trial.proposal is not None or trial.fault is not None or trial.refines is not None
+        if trial.answer is not None or trial.fault is not None or trial.refines is not None
     }

@@ -30,6 +30,8 @@ class LearnedObjective:
         inputs: The set of inputs that predicts best: `physics` or `parameters`.
         effects: The inputs with the largest effects; none if little is explained.
         correction: How the objective follows from a quantity of the built-in physics; empty if evidence is weak.
+        predicted: Values of the designs of the summary, each predicted from the others.
+        log_shift: What is added before the logarithm that is predicted; None if the values are predicted as they are.
     """
 
     name: str
@@ -38,6 +40,8 @@ class LearnedObjective:
     inputs: str
     effects: Sequence[Effect]
     correction: str
+    predicted: Sequence[float]
+    log_shift: float | None
 
 
 @dataclass(frozen=True)
@@ -46,8 +50,10 @@ class SurrogateSummary:
 
     Attributes:
         designs: Number of different designs whose evaluation did not fail.
+        trials: Their numbers.
         objectives: What it learned of each objective.
     """
 
     designs: int
+    trials: Sequence[int]
     objectives: Sequence[LearnedObjective]

@@ -5,7 +5,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAda
 
 from armwright.files import replace_surrogates
 from armwright.problem.failure import Failure
+from armwright.problem.objective import Objective
 from armwright.runs.config import RunConfig
 from armwright.spaces.parameters import Design, ParameterValue
 
@@ -44,6 +45,13 @@ class ScreenedOut:
     proposal: str
     gain: float
     predicted: tuple[float, ...]
+
+    def describe(self, objectives: Sequence[Objective]) -> str:
+        """Return in one line what was predicted of the proposal."""
+        pairs = zip(objectives, self.predicted, strict=True)
+        values = ", ".join(f"{o.name.replace('_', ' ')} {value:.4g} {o.unit}".rstrip() for o, value in pairs)
+        gain = f"expected gain {100.0 * self.gain:.2g} % of the best candidate's"
+        return f"{self.proposal} was not evaluated: predicted {values}; {gain}"
 
 
 @dataclass(frozen=True)

@@ -52,9 +52,10 @@ class DaskBackend(EvaluationBackend):
         number: Any = finished.key
         design = self._designs.pop(number)
         if finished.is_lost:
+            way_out = "" if self._timeout is not None else ", with --evaluation-timeout S if the evaluator crashes"
             raise EvaluatorError(
                 f"{MAX_LOSSES} workers were lost over trial {number} (killed, or out of memory?); design: "
-                f"{describe_design(design)}. Rerun the same command to resume with it"
+                f"{describe_design(design)}. Rerun the same command to resume with it{way_out}"
             )
         if finished.error is not None:
             raise finished.error

@@ -1,10 +1,11 @@
 """Requests to a proposer, and the trials that its designs, or its faults, take."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armwright.exceptions import DesignError, ProposalError
+from armwright.problem.objective import Objective
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.history import History
 from armwright.runs.trial import ScreenedOut
@@ -37,12 +38,11 @@ class ProposalSlot:
         """Reason for a missing design: empty if there is a design, None if the reason was reported before."""
         return "" if self.proposal is not None or self.screened is not None else self.note or None
 
-    def screened_out(self, source: str, rejection: Rejection) -> "ProposalSlot":
+    def screened_out(self, source: str, rejection: Rejection, objectives: Sequence[Objective]) -> "ProposalSlot":
         """Return the slot without its proposal, which is not evaluated."""
         assert self.proposal is not None
-        note = f"{self.proposal.id} is not evaluated: expected gain {rejection.gain:.1%} of the best candidate's"
         screened = ScreenedOut(source, self.proposal.id, rejection.gain, rejection.predicted)
-        return replace(self, proposal=None, note=note, screened=screened)
+        return replace(self, proposal=None, note=screened.describe(objectives), screened=screened)
 
 
 class ProposalRequests:

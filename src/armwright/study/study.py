@@ -312,7 +312,9 @@ class Study:
             return slot
         assert self._proposer is not None
         rejection = self._black_box.rejection(slot.proposal.design, number)
-        return slot if rejection is None else slot.screened_out(self._proposer.name, rejection)
+        if rejection is None:
+            return slot
+        return slot.screened_out(self._proposer.name, rejection, self._problem.objectives)
 
     def _refine_next(self, number: int) -> Refinement | None:
         """Refine a design of the front, if one is due."""

@@ -63,6 +63,19 @@ def test_multiple_of_a_torque_is_stated() -> None:
     assert found.explained is not None
     assert found.explained > 0.95
     assert found.effects[0].name == "peak_torque"
+    assert summary.trials == list(range(40))
+
+
+@pytest.mark.slow
+def test_predictions_explain_the_stated_share() -> None:
+    history = history_of(effort)
+    summary = learned(history)
+    assert summary is not None
+    (found,) = summary.objectives
+    values, predicted = history.values[:, 0], np.array(found.predicted)
+    if found.log_shift is not None:
+        values, predicted = np.log(values + found.log_shift), np.log(predicted + found.log_shift)
+    assert found.explained == pytest.approx(1.0 - np.mean((predicted - values) ** 2) / values.var(), abs=1e-4)
 
 
 @pytest.mark.slow

@@ -116,6 +116,14 @@ def test_trial_round_trips_the_rejected_proposal() -> None:
     assert again.request == (0, 0)
 
 
+def test_rejected_proposal_is_described_with_its_prediction() -> None:
+    screened = ScreenedOut("rules", "rules-0001-size", 0.0123, (0.1, 0.2345678))
+    assert screened.describe(problem().objectives) == (
+        "rules-0001-size was not evaluated: predicted shift 0.1 m, span 0.2346 m; expected gain 1.2 % of the best "
+        "candidate's"
+    )
+
+
 @pytest.mark.slow
 def test_rejected_proposals_are_replaced_counted_and_resumed(tmp_path: Path) -> None:
     whole = aw.optimize(problem(), proposer=Repeating(), n_total=6, out=tmp_path / "whole", **SETTINGS)

@@ -29,8 +29,6 @@ export class Content {
   constructor() {
     this.head = null;
     this.calls = [];
-    this.proposals = {};
-    this.failures = {}; // why evaluations failed, which then have no finite values
     this._clear();
   }
 
@@ -40,6 +38,7 @@ export class Content {
     this._chunk = []; // of each design
     this._row = [];
     this.proposals = {};
+    this.failures = {}; // why evaluations failed, which then have no finite values
   }
 
   // Adds a packed run, or only its new part.
@@ -130,8 +129,16 @@ export class Content {
   isRobust(i) { return this.head.result.robust === null ? null : this.head.result.robust.includes(i); }
   callsOf(i) {
     const id = this.proposals[i]?.id;
-    if (!id) return [];
-    // Several designs of one call are named NAME-0042.1, .2, …
-    return this.calls.filter((call) => call.proposal && (call.proposal === id || id.startsWith(call.proposal + ".")));
+    return id ? this.calls.filter((call) => isOf(call, id)) : [];
   }
+
+  // What was predicted of the designs of a call that were not evaluated.
+  screenedOf(call) {
+    return Object.values(this.proposals).filter((one) => one.screened && isOf(call, one.id)).map((one) => one.screened);
+  }
+}
+
+// Several designs of one call are named NAME-0042.1, .2, …
+function isOf(call, id) {
+  return call.proposal && (call.proposal === id || id.startsWith(call.proposal + "."));
 }

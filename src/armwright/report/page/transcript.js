@@ -21,7 +21,7 @@ export function drawTranscript() {
   const calls = all ? content.calls : state.design === null ? [] : content.callsOf(state.design);
   const parts = [];
   if (!all) parts.push(element("p", {}, describeProposal()));
-  parts.push(...calls.map(callElement));
+  parts.push(...calls.map((call) => callElement(call, all)));
   const key = `${all} ${state.design} ${calls.length}`; // unchanged elements stay, so that an opened prompt stays open
   if (key === $("transcript").dataset.key) return;
   $("transcript").dataset.key = key;
@@ -33,12 +33,13 @@ function describeProposal() {
   if (i === null) return "Select a design.";
   if (proposal?.refines !== null && proposal?.refines !== undefined) return `#${i} is design #${proposal.refines}, refined.`;
   if (proposal?.fault) return `The proposal for #${i} failed (${proposal.fault}); the black box replaced it.`;
+  if (proposal?.screened) return `${proposal.screened}. #${i} is the black box's design instead.`;
   if (!proposal) return `#${i}, source: ${content.look(i).label}; no reason is given.`;
   const expected = proposal.expected ? ` Expected: ${proposal.expected.map((value) => number(value)).join(", ")}.` : "";
   return `#${i}, by ${content.look(i).label}: ${proposal.reason || "no reason is given"}.${expected}`.replace("..", ".");
 }
 
-function callElement(call) {
+function callElement(call, inList) {
   const cost = call.cost_usd ? `, ${number(call.cost_usd, 2)} USD` : "";
   const head = [
     `${call.proposal || "before the first trial"}, ${STEPS[call.step] ?? call.step}: ${call.model || call.origin}`,
@@ -47,6 +48,7 @@ function callElement(call) {
     call.fault ? `; failed: ${call.fault}` : "",
   ].join("");
   const made = element("div", { class: "call" }, element("strong", {}, head));
+  if (inList) made.append(...content.screenedOf(call).map((text) => element("p", {}, text)));
   if (call.error) made.append(element("p", { class: "missed" }, call.error));
   for (const [name, text, open] of [["Answer", call.answer, true], ["Prompt", call.prompt, false]]) {
     if (text) made.append(element("details", { open }, element("summary", {}, name), element("pre", {}, text)));

@@ -41,9 +41,19 @@ def summarize_surrogate(surrogate: Surrogate, history: History) -> SurrogateSumm
         is_predicted = explained is not None and explained >= LEAST_EXPLAINED
         names = surrogate.input_names[model.inputs]
         effects = largest_effects(model, names, inputs[model.inputs], column) if is_predicted else ()
-        correction = describe_correction(objective, column, quantities) if objective in measured else ""
-        learned.append(LearnedObjective(objective.name, explained, error, model.inputs, effects, correction))
-    return SurrogateSummary(len(trials), learned)
+        learned.append(
+            LearnedObjective(
+                name=objective.name,
+                explained=explained,
+                relative_error=error,
+                inputs=model.inputs,
+                effects=effects,
+                correction=describe_correction(objective, column, quantities) if objective in measured else "",
+                predicted=left_out(model, inputs[model.inputs], column),
+                log_shift=model.transform.shift if model.transform.is_log else None,
+            )
+        )
+    return SurrogateSummary(len(trials), [trial.number for trial in trials], learned)
 
 
 def quality(model: ResponseModel, inputs: Array, values: Array) -> tuple[float | None, float | None]:
@@ -66,6 +76,18 @@ def quality(model: ResponseModel, inputs: Array, values: Array) -> tuple[float |
     size = np.abs(values)
     relative = float(np.median(np.divide(off, size, out=np.full(len(values), np.inf), where=size > 0.0)))
     return round(max(0.0, explained), 4), round(relative, 4) if np.isfinite(relative) else None
+
+
+def left_out(model: ResponseModel, inputs: Array, values: Array) -> list[float]:
+    """Return the values of N designs, each predicted from all others, to six digits.
+
+    Args:
+        model: of an objective.
+        inputs: (N, F) of its set.
+        values: (N,) of the objective.
+    """
+    predicted, _ = _process(model, inputs, values).left_out
+    return [float(f"{value:.6g}") for value in model.transform.inverse(predicted)]
 
 
 def largest_effects(model: ResponseModel, names: Sequence[str], inputs: Array, values: Array) -> list[Effect]:
