@@ -1,6 +1,5 @@
 """Conditions on quantities, such as `price <= 200 USD`, and weights, as users write them."""
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,22 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.exceptions import SettingsError
+from armwright.units import OTHER_UNITS
 
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _BOUND = re.compile(rf"\s*(<=|>=|==|<|>)?\s*{_NUMBER}\s*([^\W\d][^<>=]*)?")
 _NAME = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>=].*)", re.DOTALL)
 _WEIGHT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 _HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.greater, "==": np.equal}
-# Units that people write beside those of this program, what they measure, and their size
-_OTHER_UNITS = {
-    "mm": ("m", 1e-3),
-    "cm": ("m", 1e-2),
-    "g": ("kg", 1e-3),
-    "mA": ("A", 1e-3),
-    "ms": ("s", 1e-3),
-    "deg": ("rad", math.pi / 180.0),
-    "rpm": ("rad/s", math.pi / 30.0),
-}
 
 
 @dataclass(frozen=True)
@@ -50,9 +40,9 @@ class Condition:
         """Return the condition with its bound in the unit of the quantity; SettingsError if it is in another one."""
         if self.unit in ("", unit):
             return Condition(self.name, self.relation, self.bound)
-        measured, size = _OTHER_UNITS.get(self.unit, (None, 1.0))
+        measured, size = OTHER_UNITS.get(self.unit, (None, 1.0))
         if measured != unit:
-            known = [unit, *(name for name, (of, _) in _OTHER_UNITS.items() if of == unit)] if unit else []
+            known = [unit, *(name for name, (of, _) in OTHER_UNITS.items() if of == unit)] if unit else []
             expected = f"a bound in {' or '.join(known)}" if known else "a number without a unit"
             raise SettingsError(f"{self.name}: expected {expected}, got {self.bound:g} {self.unit}")
         return Condition(self.name, self.relation, self.bound * size)
