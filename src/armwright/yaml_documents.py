@@ -10,6 +10,8 @@ from yaml.composer import Composer
 
 from armwright.exceptions import did_you_mean
 from armwright.files import read_text
+from armwright.schema_types import owners_of
+from armwright.validation_messages import describe_fault
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
@@ -41,15 +43,13 @@ def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Excep
         if key not in keys:
             allowed = ", ".join(keys)
             hint = did_you_mean(str(key), keys, RENAMED)
-            raise error(f'{where}: unknown key "{key}". Allowed: {allowed}.{hint}')
+            owners = owners_of(str(key), schema)
+            place = f" It is a key of {' and '.join(owners)}." if owners else ""
+            raise error(f'{where}: unknown key "{key}".{place} Allowed: {allowed}.{hint}')
     try:
         return schema.model_validate(data)
     except ValidationError as fault:
-        first = fault.errors(include_url=False, include_context=False)[0]
-        at = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
-        message = first["msg"].removeprefix("Value error, ")
-        got = "" if first["type"] in ("missing", "value_error") else f" (got {_shorten(first['input'])})"
-        raise error(f"{where}: {at + ': ' if at else ''}{message}{got}") from fault
+        raise error(f"{where}: {describe_fault(fault, schema, data)}") from fault
 
 
 def document_keys(schema: type[BaseModel]) -> dict[str, str]:

@@ -154,7 +154,7 @@ def test_builtin_experiments_run_with_few_trials(tmp_path: Path) -> None:
         ({"tasks": []}, "tasks is empty"),
         ({"methods": {}}, "methods"),
         ({"methods": {"a": {"label": "A"}, "b": {"label": "A"}}}, "same label"),
-        ({"methods": {"../a": {"label": "A"}}}, "match pattern"),
+        ({"methods": {"../a": {"label": "A"}}}, "expected a name of at most 40 lowercase letters"),
         ({"n_total": 0}, "n_total"),
         ({"methods": {"a": {"label": "A", "seeds": [2, 2]}}}, "each once"),
         ({"methods": {"a": {"label": "A", "against": ["b"]}}}, r'methods\.a\.against names the unknown method "b"'),

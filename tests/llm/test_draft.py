@@ -157,7 +157,7 @@ REFUSED = {
     "did you mean": (answer_with(task={"paylod": 1}), 'Did you mean "payload"?'),
     "far away": (answer_with(task={"targets": [[6000, 0, 0]]}), "is more than 1000 m away"),
     "not finite": (answer_with(task={"targets": [[float("nan"), 0, 0]]}), "targets[0][0]"),
-    "no name": (answer_with(task={"name": None}), "task: name: Field required"),
+    "no name": (answer_with(task={"name": None}), "task: name: expected text, but the key is missing"),
     "payloads": (answer_with(task={"payload": [0.5, 0.5]}), "payload: expected 1 or 6 values [kg], got 2"),
     "unknown objective": (answer_with(task={"objectives": ["torqe"]}), 'unknown objective "torqe"'),
     "reference point": (answer_with(task={"reference_point": [1.0, 1.0]}), "reference_point: expected 3 values"),
@@ -170,11 +170,11 @@ REFUSED = {
     "built-in name": (answer_with(task={"name": "shelf"}), '"shelf" is that of a built-in task'),
     "no provenance": (answer_with(task={"provenance": None}), "provenance is missing"),
     # Hostile, or near it.
-    "path": (answer_with(task={"name": "../../etc/wall"}), "task: name: String should match pattern"),
-    "absolute path": (answer_with(task={"name": "/etc/passwd"}), "task: name: String should match pattern"),
-    "dotfile": (answer_with(task={"name": ".bashrc"}), "task: name: String should match pattern"),
-    "long name": (answer_with(task={"name": "w" * 300}), "task: name: String should match pattern"),
-    "long text": (answer_with(task={"description": "w" * 20_000}), "description: String should have at most"),
+    "path": (answer_with(task={"name": "../../etc/wall"}), "task: name: expected a name of at most 64 letters"),
+    "absolute path": (answer_with(task={"name": "/etc/passwd"}), "task: name: expected a name of at most 64 letters"),
+    "dotfile": (answer_with(task={"name": ".bashrc"}), "task: name: expected a name of at most 64 letters"),
+    "long name": (answer_with(task={"name": "w" * 300}), "task: name: expected a name of at most 64 letters"),
+    "long text": (answer_with(task={"description": "w" * 20_000}), "description: expected text of at most"),
     "too long": (answer_with(task={"targets": [[0, 0, 0]] * 10_001}), "task: expected an object"),
 }  # fmt: skip
 REFUSED_FAST = ("no task", "unknown key", "payloads", "actuators missing", "price missing", "built-in name", "path")

@@ -22,10 +22,11 @@ from armwright.kinematics.forward import joint_positions
 from armwright.pareto import front_indices
 from armwright.report.page import program, write_report
 from armwright.report.page_content import RunContent
+from armwright.runs.conditions import read_condition
 from armwright.runs.folder import read_run
 from armwright.runs.front_gap import known_front
 from armwright.runs.history import History
-from armwright.runs.selection import pick_from, read_condition
+from armwright.runs.selection import pick_from
 from tests.support.browser import Tab
 from tests.support.chat_server import ChatServer, wants_design
 from tests.support.wire_formats import llm_proposer

@@ -10,8 +10,9 @@ from armwright.kinematics.payload_limits import payloads_over_reach
 from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
 from armwright.runs.assumptions import assumed_values
 from armwright.runs.compliance_notes import compliance_notes
+from armwright.runs.conditions import read_condition
 from armwright.runs.folder import read_run
-from armwright.runs.selection import pick, read_condition
+from armwright.runs.selection import pick
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests.runs.test_simulation import SPACE, Desk

@@ -18,9 +18,10 @@ from armwright.cli.app import app
 from armwright.exceptions import FailureError, SettingsError
 from armwright.pareto import knee_index
 from armwright.problem.problem import Problem
+from armwright.runs.conditions import Condition, read_condition, read_weights
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
-from armwright.runs.selection import Condition, numbers_of, pick, pick_from, read_condition, read_weights
+from armwright.runs.selection import numbers_of, pick, pick_from
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 
@@ -83,7 +84,7 @@ def test_empty_selection_names_the_reason(history: History) -> None:
 
 @given(
     st.from_regex(r"[a-z_]{1,12}", fullmatch=True),
-    st.sampled_from(["<=", ">=", "<", ">"]),
+    st.sampled_from(["<=", ">=", "<", ">", "=="]),
     st.floats(allow_nan=False, allow_infinity=False),
 )
 def test_written_conditions_are_read_back(name: str, relation: str, bound: float) -> None:
@@ -97,10 +98,28 @@ def test_arbitrary_conditions_are_read_or_refused(words: str) -> None:
             read(words)
 
 
-@pytest.mark.parametrize("words", ["", "torque", "torque<", "torque<=x", "__import__('os')<1", "a<1<2", "torque==1"])
+@pytest.mark.parametrize(
+    "words", ["", "torque", "torque<", "torque<=x", "__import__('os')<1", "a<1<2", "torque=1", "torque==1==2"]
+)
 def test_invalid_conditions_are_refused(words: str) -> None:
     with pytest.raises(SettingsError, match="expected a name, one of"):
         read_condition(words)
+
+
+def test_conditions_know_the_number_of_joints_and_units(history: History) -> None:
+    assert len(pick(history, [read_condition("joints == 4")])) == len(history.front)
+    with pytest.raises(FailureError, match="joints < 4; the nearest has 4"):
+        pick(history, [read_condition("joints<4")])
+    by_unit = [pick(history, [read_condition(f"length<={text}")]) for text in ("0.6", "0.6 m", "600 mm", "60 cm")]
+    assert all([m.number for m in picked] == [m.number for m in by_unit[0]] for picked in by_unit)
+    with pytest.raises(SettingsError, match=r"length: expected a bound in m or mm or cm, got 0\.6 kg"):
+        pick(history, [read_condition("length<=0.6 kg")])
+
+
+def test_unknown_quantities_are_answered_with_all_that_exist(history: History) -> None:
+    for name, known in (("n_joints", "joints"), ("weight", "mass"), ("manipulabilty", "manipulability")):
+        with pytest.raises(SettingsError, match=f'"{name}". Did you mean "{known}".*Available: .*payload_capacity'):
+            pick(history, [Condition(name, "<", 1.0)])
 
 
 def invoke(*arguments: str | Path) -> str:
@@ -120,6 +139,20 @@ def test_pick_and_export_commands_agree(run: Path, history: History, tmp_path: P
     assert len(robot.actuated_joints) == 4
     invoke("export", run, "--format", "mjcf", "--out", tmp_path / "deep" / "arm.xml")
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "deep" / "arm.xml")).njnt == 4
+
+
+def test_all_picked_designs_are_a_table_and_csv(run: Path, history: History) -> None:
+    asked = ("pick", run, "--where", "joints==4", "--by", "torque", "--all")
+    rows = list(csv.DictReader(io.StringIO(invoke(*asked, "--csv"))))
+    records = json.loads(invoke(*asked, "--json"))
+    assert [int(row["number"]) for row in rows] == [record["number"] for record in records]
+    assert len(rows) == len(history.front)
+    for row, record in zip(rows, records, strict=True):
+        assert float(row["torque"]) == record["torque"]
+        assert row["joint_1"] == record["joints"][0]
+        assert float(row["joints"]) == len(record["joints"])
+    table = invoke(*asked).splitlines()
+    assert [line.split()[0] for line in table[2:]] == [row["number"] for row in rows]
 
 
 def test_build_sheet_lists_joint_torques_and_ranges(run: Path, history: History) -> None:

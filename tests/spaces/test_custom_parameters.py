@@ -17,8 +17,9 @@ from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import load_prompt
 from armwright.problem.checks.instant import check_instantly
 from armwright.problem.reduction import without_joints
+from armwright.runs.conditions import read_condition
 from armwright.runs.folder import read_run
-from armwright.runs.selection import pick, read_condition
+from armwright.runs.selection import pick
 from armwright.search.cma_es import refine
 from armwright.search.encoding import DesignEncoding
 from armwright.search.variation import offspring

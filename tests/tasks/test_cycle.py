@@ -180,9 +180,9 @@ def test_payload_is_carried_between_pick_and_place(actions: Any, closed: bool, c
         (steps(1, {"to": 2, "time": 0}), "cycle.steps[1].time: expected seconds above 0, or fastest"),
         (steps(1, {"to": 2.0}), "cycle.steps[1].to: expected the name of a target or its number, from 1"),
         (steps(1, {"to": True}), "cycle.steps[1].to: expected the name of a target or its number, from 1"),
-        (steps(1, {"to": 2, "by": "arc"}), "cycle.steps[1].by: Input should be 'line' or 'joint' (got arc)"),
-        (steps(1, 2, approach=0), "cycle.approach: Input should be greater than 0"),
-        (steps(1, 2, dwell=-1), "cycle.dwell: Input should be greater than or equal to 0"),
+        (steps(1, {"to": 2, "by": "arc"}), 'cycle.steps[1].by: expected line or joint, got "arc"'),
+        (steps(1, 2, approach=0), "cycle.approach: expected a number above 0 m, got 0"),
+        (steps(1, 2, dwell=-1), "cycle.dwell: expected a number of at least 0 s, got -1"),
     ],
 )
 def test_mistaken_cycles_get_one_clear_line(cycle: Any, message: str) -> None:

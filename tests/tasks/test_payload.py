@@ -145,7 +145,7 @@ def test_prompt_states_tool_and_payload() -> None:
     ("payload", "words"),
     [
         ({"mas": 0.5}, r'Did you mean "mass"\?'),
-        ({"center": [0.0, 0.0, 0.1]}, "payload: mass: Field required"),
+        ({"center": [0.0, 0.0, 0.1]}, r"payload: mass: expected a number \[kg\], but the key is missing"),
         ({"mass": 0.0}, "payload: mass"),
         ({"mass": 0.5, "size": [0.1, 0.1]}, "payload: size"),
         ({"mass": 0.5, "size": [0.1, 0.1, 0.0]}, "payload: size"),

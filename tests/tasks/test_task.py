@@ -74,7 +74,10 @@ def test_minimal_task_file_is_accepted(tmp_path: Path) -> None:
         ("name: a\ntargets: [[0, 0, 0]]\nreference_point: []", "reference_point"),
         ("name: a\ntargets: [[0, 0, 0]]\nreference_point: 5", "reference_point"),
         ("name: a\ntargets: [[0, 0, 0]]\nresolution: 0.1", "resolution: expected objectives and their resolutions"),
-        ("name: a\ntargets: [[0, 0, 0]]\nresolution: {torque: 0}", "resolution[0][1]: Input should be greater than 0"),
+        (
+            "name: a\ntargets: [[0, 0, 0]]\nresolution: {torque: 0}",
+            "resolution[0][1]: expected a number above 0, got 0",
+        ),
         ("name: a\ntargets: [[0, 0, 0]]\nresolutions: {torque: 1}", 'Did you mean "resolution"?'),
         ("name: a\ntargets: 3", "targets"),
         ("", "keys and values"),

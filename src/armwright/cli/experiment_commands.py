@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from armwright.cli.options import (
+    Csv,
     Figures,
     Json,
     ModelName,
@@ -16,7 +17,7 @@ from armwright.cli.options import (
     TaskName,
     select_workers,
 )
-from armwright.cli.streams import exit_interrupted, open_console, print_json
+from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_csv, print_json
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -54,7 +55,7 @@ def experiment(
 
     The same command resumes; finished runs are kept.
     """
-    from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_outcome, show_plan
+    from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_files, show_outcome, show_plan
     from armwright.experiments import outcome, plan
     from armwright.experiments import runner as running
     from armwright.experiments.cells import plan_cells
@@ -91,7 +92,8 @@ def experiment(
             failed += [done] if done.fault else []
         found = outcome.collect(chosen, cells)
         notes = notes_on_cells(skipped, failed)
-        tables = write_tables(out, found, f"Experiment {chosen.name}", outcome.published(chosen), notes)
+        title, published = f"Experiment {chosen.name}", outcome.published(chosen)
+        tables = write_tables(out, found, title, published, notes)
         if figures:
             console.print("drawing the figures")
         drawn = write_experiment_figures(out, chosen, found) if figures else []
@@ -101,7 +103,10 @@ def experiment(
         counts = {"cells": len(cells), "skipped": len(skipped), "failed": len(failed)}
         print_json({"folder": out, **counts, "tables": tables, "figures": drawn})
     else:
-        show_comparison(console, tables, drawn)
+        console.print()
+        show_comparison(console, found, title, published, notes)
+        console.print()
+        show_files(console, tables, drawn)
     if failed:
         sys.exit(FailureError.exit_code)
 
@@ -115,19 +120,27 @@ def compare(
     out: Annotated[
         Path | None, typer.Option(help="Folder for tables and figures.", show_default="none are written")
     ] = None,
+    json_: Json = False,
+    csv_: Csv = False,
 ) -> None:
     """Compare finished runs by method, task and seed: tables, intervals, tests."""
-    from armwright.cli.show_comparisons import show_files
+    from armwright.cli.show_comparisons import show_comparison, show_files
     from armwright.experiments.compare_runs import compare_summaries
     from armwright.experiments.run_list import read_finished_runs
-    from armwright.report.tables import markdown, write_tables
+    from armwright.report.table_records import row_records
+    from armwright.report.tables import comparison_record, write_tables
 
-    console = open_console()
+    console = open_console(check_formats(json_, csv_))
     finished, unfinished = read_finished_runs(folders)
     notes = [f"{folder} is not finished and is left out" for folder in unfinished]
     comparison = compare_summaries(finished, baseline)
     title = "Comparison of runs"
-    console.print(markdown(comparison, title, notes=notes), end="")
+    if json_:
+        print_json(comparison_record(comparison))
+    elif csv_:
+        print_csv(row_records(comparison))
+    else:
+        show_comparison(console, comparison, title, notes=notes)
     if out is not None:
         tables = write_tables(out, comparison, title, notes=notes)
         drawn: list[Path] = []
@@ -164,12 +177,14 @@ def compare_arms(
     figures: Figures = True,
     seed: Annotated[int, typer.Option(help="Seed of the base search.")] = 0,
     json_: Json = False,
+    csv_: Csv = False,
 ) -> None:
     """Evaluate existing arms on TASK, and compare them with the designs of a run."""
-    from armwright.cli.show_comparisons import show_arms
+    from armwright.cli.show_comparisons import arm_rows, show_arms
     from armwright.experiments.compare_arms import compare_arms, comparison_record
     from armwright.spaces.design_space import load_space
 
+    check_formats(json_, csv_)
     compared = compare_arms(
         task,
         arms,
@@ -188,6 +203,8 @@ def compare_arms(
         drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
     if json_:
         print_json(comparison_record(compared))
+    elif csv_:
+        print_csv(arm_rows(compared))
     else:
         show_arms(open_console(), compared, drawn)
 
@@ -204,13 +221,17 @@ def _parse_point(text: str) -> tuple[float, float, float]:
 def runs(
     folders: Annotated[list[Path] | None, typer.Argument(help="Folders to search.", show_default="runs")] = None,
     json_: Json = False,
+    csv_: Csv = False,
 ) -> None:
     """List the runs in folders and their progress."""
     from armwright.cli.show_results import show_runs
     from armwright.experiments.run_list import find_runs, list_runs
 
+    check_formats(json_, csv_)
     listed = list_runs(find_runs(folders or [Path("runs")]))
     if json_:
         print_json(listed)
+    elif csv_:
+        print_csv(listed)
     else:
         show_runs(open_console(), listed)

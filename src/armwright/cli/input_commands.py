@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from armwright.cli.options import (
+    Csv,
     Json,
     MaxCost,
     ModelName,
@@ -20,7 +21,7 @@ from armwright.cli.options import (
     load_problem,
 )
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import open_console, print_json
+from armwright.cli.streams import check_formats, open_console, print_csv, print_json
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -82,14 +83,19 @@ def check(
 def tasks(
     names: Annotated[list[str] | None, typer.Argument(help="Describe these tasks (built-in, random-N, files).")] = None,
     json_: Json = False,
+    csv_: Csv = False,
 ) -> None:
     """List the built-in tasks, or describe the tasks given."""
-    from armwright.cli.show_inputs import show_task, show_tasks
+    from armwright.cli.show_inputs import show_task, show_tasks, task_rows
     from armwright.experiments.baselines import baselines_of
     from armwright.runs.front_gap import best_known_hypervolume
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
+    check_formats(json_, csv_)
     listed = [load_task(name) for name in names] if names else list(builtin_tasks().values())
+    if csv_:
+        print_csv(task_rows(listed))
+        return
     known = {task.name: best_known_hypervolume(task) for task in listed} if names or json_ else {}
     stored = {name: baselines_of(name) if known[name] is not None else [] for name in known}
     if json_:
@@ -110,19 +116,42 @@ def tasks(
 
 def actuators(
     names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Actuators to list in full.")] = None,
+    torque: Annotated[
+        str | None, typer.Option(help='Bound of the peak torque, else of the stall torque, such as ">=2" [N m].')
+    ] = None,
+    speed: Annotated[
+        str | None, typer.Option(help='Bound of the no-load speed, such as ">5" [rad/s] or ">50 rpm".')
+    ] = None,
+    mass: Annotated[str | None, typer.Option(help='Bound of the mass, such as "<=0.08" [kg] or "<=80 g".')] = None,
+    price: Annotated[str | None, typer.Option(help='Bound of the price, such as "<=60" [USD].')] = None,
+    voltage: Annotated[str | None, typer.Option(help="Voltage, such as 12, or a bound [V].")] = None,
+    where: Annotated[
+        list[str] | None, typer.Option(help='A condition on any value, such as "backlash<0.005" (may be repeated).')
+    ] = None,
     json_: Json = False,
+    csv_: Csv = False,
 ) -> None:
     """List the catalogue of actuators that a space file may name, or the values of some and where they are from."""
-    from armwright.cli.show_inputs import show_actuator, show_actuators
+    from armwright.cli.actuator_filter import ActuatorFilter
+    from armwright.cli.show_inputs import actuator_rows, show_actuator, show_actuators
     from armwright.robot.actuators import catalogue, named_actuator
 
-    records = [named_actuator(name) for name in names] if names else list(catalogue().values())
+    check_formats(json_, csv_)
+    bounds = {"torque": torque, "speed": speed, "mass": mass, "price": price, "voltage": voltage}
+    chosen = ActuatorFilter.of(bounds, where or ())
+    known = [named_actuator(name) for name in names] if names else list(catalogue().values())
+    records = chosen.apply(known)
     if json_:
         print_json([r.completed().model_dump(exclude_none=True) | {"assumed": r.assumed} for r in records])
+        return
+    if csv_:
+        print_csv(actuator_rows(records))
         return
     console = open_console()
     if not names:
         show_actuators(console, records)
+        for name, count in chosen.unknown(known).items():
+            console.print(f"left out, as their {name.replace('_', ' ')} is unknown: {count}")
     for record in records if names else ():
         show_actuator(console, record)
 

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.options import Json, ModelName, ModelOptionsFile, RunFolder, SpaceFile, load_problem
-from armwright.cli.streams import open_console, print_json
+from armwright.cli.options import Csv, Json, ModelName, ModelOptionsFile, RunFolder, SpaceFile, load_problem
+from armwright.cli.streams import check_formats, open_console, print_csv, print_json
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -25,28 +25,32 @@ def pick(
         bool, typer.Option("--robust", help="Only designs that stay good with the base or a link 1 mm off.")
     ] = False,
     n: Annotated[int, typer.Option("-n", help="Number of designs, the best first.")] = 1,
+    all_: Annotated[bool, typer.Option("--all", help="All designs that meet the conditions, in a table.")] = False,
     json_: Json = False,
+    csv_: Csv = False,
 ) -> None:
     """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee."""
-    from armwright.cli.show_results import show_picked
-    from armwright.runs.path_report import path_record
-    from armwright.runs.selection import numbers_of, pick_from, read_condition, read_weights, survival_of
+    from armwright.cli.show_picked import picked_records, picked_rows, show_picked, show_picked_table
+    from armwright.runs.conditions import read_condition, read_weights
+    from armwright.runs.selection import pick_from, survival_of
 
+    check_formats(json_, csv_)
     if n < 1:
         raise SettingsError(f"-n {n}: expected a whole number from 1")
     conditions = [read_condition(text) for text in where or ()]
     weighed = None if weights is None else read_weights(weights)
     history, picked = pick_from(run, conditions, by, weighed, robust)
-    survival = survival_of(run, history, [member.number for member in picked[:n]])
+    chosen = picked if all_ else picked[:n]
+    names = [*(condition.name for condition in conditions), *([] if by is None else [by])]
+    if csv_:
+        print_csv(picked_rows(history, chosen, names))
+        return
+    if all_ and not json_:
+        show_picked_table(open_console(), history, chosen, names)
+        return
+    survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
     if json_:
-        print_json(
-            [
-                {"number": m.number, "source": m.source, "joints": m.design.joints, **numbers_of(history, m)}
-                | path_record(history.evaluation([m.number]), 0)
-                | ({"survival": survival[m.number]} if m.number in survival else {})
-                for m in picked[:n]
-            ]
-        )
+        print_json(list(picked_records(history, chosen, names, survival)))
         return
     show_picked(open_console(), run, history, picked, survival, n)
 

@@ -32,7 +32,7 @@ from armwright.cli.options import (
     load_problem,
     select_workers,
 )
-from armwright.cli.streams import exit_interrupted, open_console, print_json, repeat_command
+from armwright.cli.streams import exit_interrupted, open_console, print_command, print_json, repeat_command
 from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 
 
@@ -261,9 +261,8 @@ def optimize(
     except AnswerPendingError as pending:
         if pending.refusal:
             console.print(f"answer rejected: {pending.refusal}")
-        console.print(
-            f"{pending.question} waits for your answer in {pending.answer}; then resume with:\n  {repeat_command()}"
-        )
+        console.print(f"{pending.question} waits for your answer in {pending.answer}; then resume with:")
+        print_command(console, repeat_command())
         if json_:
             files = {"folder": folder, "question": pending.question, "answer": pending.answer}
             print_json({**files, "refusal": pending.refusal})

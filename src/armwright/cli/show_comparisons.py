@@ -1,18 +1,24 @@
 """Print experiments, comparisons of methods, and existing arms next to designs."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
 from armwright.cli.notes import payload_note
-from armwright.cli.streams import format_point, list_files, plain_table
+from armwright.cli.streams import format_point, list_files
+from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_arms import MEASURES, ArmComparison, ComparedArm
+from armwright.experiments.compare_runs import Comparison
+from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
 from armwright.experiments.runner import CellOutcome
 from armwright.extras import install_command, missing_packages
 from armwright.problem.objectives import TORQUE_SCALE
+from armwright.report.table_cells import remarks_on
+from armwright.report.tables import markdown, sections
 from armwright.study.cluster import Workers
 
 
@@ -57,11 +63,34 @@ def show_outcome(console: Console, outcome: CellOutcome, number: int, of: int) -
     console.file.flush()
 
 
-def show_comparison(console: Console, tables: Sequence[Path], figures: Sequence[Path]) -> None:
-    """Print the Markdown table and the paths of all tables and figures."""
-    console.print()
-    console.print(tables[0].read_text(encoding="utf-8"))
-    show_files(console, tables, figures)
+def show_comparison(
+    console: Console,
+    comparison: Comparison,
+    title: str,
+    published: Published = NOTHING_PUBLISHED,
+    notes: Sequence[str] = (),
+) -> None:
+    """Print a comparison: in a terminal its tables as wide as that, elsewhere Markdown.
+
+    Args:
+        console: The console.
+        comparison: The comparison.
+        title: Its title.
+        published: Published values to show beside it.
+        notes: Further remarks.
+    """
+    if not console.is_terminal:
+        console.print(markdown(comparison, title, published, notes), end="")
+        return
+    console.print(title)
+    for section in sections(comparison, published):
+        columns = [
+            Column(head, is_number=i in section.right, rank=max(0, i - 1)) for i, head in enumerate(section.head)
+        ]
+        console.print(f"\n{section.title}: {section.caption}")
+        print_table(console, Table(columns, section.rows, "--json and table.md have all"))
+    for note in (*remarks_on(comparison), *notes):
+        console.print(f"- {note}")
 
 
 def show_files(console: Console, tables: Sequence[Path], figures: Sequence[Path]) -> None:
@@ -77,15 +106,21 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     others = [o for o in objectives if o not in MEASURES and o.name != "mass"]
     title = "; ".join(filter(None, (f"Arms on {comparison.problem.task.name}", payload_note(comparison.problem.task))))
     measured = [_ARM_COLUMNS[objective.name] for objective in MEASURES]
-    numbers = ("\njoints", "reach\nm", "mass\nkg", *measured, *(f"{o.name}\n{o.unit}" for o in others))
-    table = plain_table("\narm", *numbers, right=numbers, title=title, gap=1)
-    table.columns[0].no_wrap = True
+    minimised = [objective.name for objective in objectives]
+    columns = (
+        Column("arm", least=12),
+        *numbers("joints", rank=1),
+        *numbers("reach\nm", "mass\nkg"),
+        *(Column(measured[i], True, rank=0 if MEASURES[i].name in minimised else 3) for i in range(len(MEASURES))),
+        *numbers(*(f"{o.label.lower()}\n{o.unit}" for o in others)),
+    )
+    rows: list[list[str]] = []
     for arm in (*comparison.arms, *comparison.designs):
         values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
         measures = [*arm.measures.values(), *(values[objective.name] for objective in others)]
         cells = ["-" if value is None else _format_measure(value) for value in measures]
-        table.add_row(arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", *cells)
-    console.print(table)
+        rows.append([arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", *cells])
+    print_table(console, Table(columns, rows, "--json and --csv print all", title=title, gap=1))
     console.print(
         f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; torque "
         "util. = the largest share of a joint's effort limit"
@@ -112,9 +147,27 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
         console.print(f"redrawn: {', '.join(map(str, drawn))}")
 
 
+def arm_rows(comparison: ArmComparison) -> Iterator[dict[str, Any]]:
+    """Yield arms and designs as rows of CSV, in SI units; unknown values are empty."""
+    names = [objective.name for objective in comparison.problem.objectives]
+    for arm in (*comparison.arms, *comparison.designs):
+        yield {
+            "name": arm.name,
+            "joints": arm.joints,
+            "reach": arm.reach,
+            "mass": arm.mass,
+            **dict(zip(("base_x", "base_y", "base_z"), arm.base, strict=True)),
+            **arm.measures,
+            **dict(zip(names, arm.values, strict=True)),
+            "dominates": arm.dominates,
+            "dominated_by": arm.dominated_by,
+            "violated": "; ".join(arm.violated),
+        }
+
+
 _ARM_COLUMNS = {
     "position_error": "error\nm",
-    "torque": "\ntorque",
+    "torque": "torque",
     "worst_error": "worst\nm",
     "unreached_targets": "targets\nunreached",
     "peak_torque": "peak\nN m",

@@ -3,13 +3,14 @@
 import math
 import shlex
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.text import Text
 
-from armwright.cli.streams import format_point, plain_table
+from armwright.cli.streams import format_point, print_command, print_named
+from armwright.cli.tables import NO_BREAK, Column, Table, numbers, print_table
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.llm.draft import Draft
 from armwright.problem.checks.reach import distance_to_bases
@@ -27,31 +28,49 @@ MAX_ROWS = 40  # of a table of targets
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     """Print a table with a line per task."""
     methods = list(dict.fromkeys(baseline.method for baseline in baselines()))
-    numbers = ("targets", *methods)
-    table = plain_table("task", *numbers, "", right=numbers)
-    table.columns[0].no_wrap = True
+    columns = (Column("task"), *numbers("targets", *methods), Column("", rank=1, least=24))
+    rows: list[list[str]] = []
     for task in tasks:
         shares = {baseline.method: f"{100 * baseline.share:.0f} %" for baseline in baselines_of(task.name)}
         shown = (shares.get(method, "") for method in methods)
-        table.add_row(task.name, str(len(task.targets)), *shown, Text(task.description))
-    console.print(table)
+        rows.append([task.name, str(len(task.targets)), *shown, task.description])
+    print_table(console, Table(columns, rows, "--json and --csv print all"))
     console.print(
         f"\n{' and '.join(methods)}: share of the best known hypervolume after 200 counted trials (mean of "
         f"{baselines()[0].runs} runs).\narmwright tasks NAME describes one task; random-N is one of a seeded family."
     )
 
 
+def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
+    """Yield tasks as rows of CSV, with the share of the best known hypervolume that each method reached."""
+    for task in tasks:
+        shares = {baseline.method: baseline.share for baseline in baselines_of(task.name)}
+        yield {"name": task.name, "targets": len(task.targets), **shares, "description": task.description}
+
+
+def actuator_rows(records: Sequence[ActuatorRecord]) -> Iterator[dict[str, Any]]:
+    """Yield actuators as rows of CSV, with the defaults of their kind and the names of what is assumed."""
+    for record in records:
+        assumed = {"estimates": " ".join(record.estimates), "assumed": " ".join(record.assumed)}
+        yield record.completed().model_dump() | assumed
+
+
 def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
     """Print the catalogue; torques and prices that a data sheet lacks are empty."""
-    heads = ("V", "g", "stall N m", "rated N m", "peak N m", "rad/s", "USD")
-    table = plain_table("actuator", "maker", *heads, "source", right=heads)
-    table.columns[0].no_wrap = table.columns[1].no_wrap = True
-    table.columns[-1].overflow = "fold"
+    columns = (
+        Column("actuator"), Column("maker", rank=3, least=8), *numbers("V", "kg"),
+        *numbers(f"stall N{NO_BREAK}m", rank=2), *numbers(f"rated N{NO_BREAK}m", rank=1),
+        *numbers(f"peak N{NO_BREAK}m", "rad/s", "USD"), Column("source", rank=4, least=24),
+    )  # fmt: skip
+    rows: list[list[str]] = []
     for record in records:
-        numbers = (record.voltage, 1e3 * record.mass, record.stall_torque, record.rated_torque, record.peak_torque)
-        shown = ("" if n is None else f"{n:.4g}" for n in (*numbers, record.speed, record.price))
-        table.add_row(record.name, Text(record.maker), *shown, Text(record.source))
-    console.print(table)
+        values = (
+            record.voltage, record.mass, record.stall_torque, record.rated_torque, record.peak_torque,
+            record.speed, record.price,
+        )  # fmt: skip
+        shown = ("" if value is None else f"{value:.4g}" for value in values)
+        rows.append([record.name, record.maker, *shown, record.source])
+    print_table(console, Table(columns, rows, "--json and --csv print all"))
     n_values = sum(value_of(record.completed(), name) is not None for record in records for name in UNITS)
     n_assumed = sum(len(record.assumed) for record in records)
     console.print(
@@ -63,10 +82,9 @@ def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
 def show_actuator(console: Console, record: ActuatorRecord) -> None:
     """Print the values of an actuator of the catalogue with their sources."""
     completed, sources = record.completed(), catalogue_sources()[record.name]
-    console.print(Text(record.name, style="bold") + Text(f": {record.kind} by {record.maker}"))
-    console.print(Text(f"page: {record.source}\nnote: {record.note}"))
-    table = plain_table("", "value", "", "source", right=("value",))
-    table.columns[0].no_wrap = table.columns[2].no_wrap = True
+    print_named(console, record.name, f": {record.kind} by {record.maker}")
+    console.print(f"page: {record.source}\nnote: {record.note}")
+    rows: list[list[str]] = []
     for name, unit in UNITS.items():
         value = value_of(completed, name)
         if value is None:
@@ -75,10 +93,11 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
         shown = "page, or as the note says" if found is None else f"{found.address} ({found.statement})"
         if name in record.assumed:
             shown = f"assumed: estimate from {shown}" if found else f"assumed: default of a {record.kind}"
-        table.add_row(name, f"{value:.4g}", unit, Text(shown))
-    console.print(table)
+        rows.append([name, f"{value:.4g}", unit, shown])
+    columns = (Column(""), *numbers("value"), Column(""), Column("source", rank=1, least=24))
+    print_table(console, Table(columns, rows, "--json and --csv print all"))
     if record.body_shape is not None:
-        console.print(Text(f"body: {_describe_body(record, record.body_shape)}"))
+        console.print(f"body: {_describe_body(record, record.body_shape)}")
 
 
 def _describe_body(record: ActuatorRecord, body: ActuatorShape) -> str:
@@ -109,7 +128,7 @@ def show_task(
         is_brief: Leave out the targets and the steps of the cycle.
     """
     reference = task.reference_point
-    console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
+    print_named(console, task.name, f": {task.description}")
     if not is_brief:
         points = " ".join(format_point(target) for target in task.targets)
         console.print(f"  {len(task.targets)} targets [m]: {points}")
@@ -147,16 +166,18 @@ def show_task(
 def show_target_table(console: Console, problem: Problem) -> None:
     """Print a table of the targets of a task and their distances from the bases that a space allows."""
     task, arrays = problem.task, problem.task.target_arrays
-    heads = ("x [m]", "y [m]", "z [m]", "tolerance [mm]", "payload [kg]", "nearest base [m]")
-    table = plain_table("  target", *heads, "tool direction", right=heads)
+    heads = ("x [m]", "y [m]", "z [m]", "tolerance [mm]", "payload [kg]", f"nearest{NO_BREAK}base [m]")
     distances = distance_to_bases(problem.space, task.target_positions)
+    rows: list[list[str]] = []
     for i, point in enumerate(task.targets[:MAX_ROWS]):
-        numbers = (*point, 1e3 * arrays.tolerance[i], task.payloads[i], distances[i])
-        table.add_row(
-            f"  {task.target_names[i]}", *(f"{value:.4g}" for value in numbers), Text(_tool_direction(arrays, i))
-        )
+        values = (*point, 1e3 * arrays.tolerance[i], task.payloads[i], distances[i])
+        rows.append([task.target_names[i], *(f"{value:.4g}" for value in values), _tool_direction(arrays, i)])
     console.print(f"  {len(task.targets)} targets:")
-    console.print(table)
+    columns = (
+        Column("target", least=12), *numbers(*heads[:4]), *numbers(heads[4], rank=1), *numbers(heads[5]),
+        Column("tool direction", rank=2, least=14),
+    )  # fmt: skip
+    print_table(console, Table(columns, rows, "--json prints all", indent=2))
     if len(task.targets) > MAX_ROWS:
         console.print(f"  … and {len(task.targets) - MAX_ROWS} more")
 
@@ -228,4 +249,5 @@ def show_draft(console: Console, draft: Draft) -> None:
         f"{usage.output_tokens:,} out, {cost}, {usage.call_seconds:.1f} s"
     )
     console.print(f"wrote {' and '.join(map(str, draft.files))}: a draft. Check and edit the numbers, then run:")
-    console.print(f"  armwright tasks {shlex.quote(str(draft.files[0]))}\n  {draft.command}")
+    print_command(console, f"armwright tasks {shlex.quote(str(draft.files[0]))}")
+    print_command(console, draft.command)

@@ -1,29 +1,23 @@
 """Print the results of runs: fronts, attribution, costs and the paths of the files."""
 
 import math
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from armwright.cli.notes import payload_note, unused_parts
-from armwright.cli.streams import format_point, list_files, plain_table
+from armwright.cli.streams import list_files
+from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.problem.ignored_errors import describe_ignored_errors
-from armwright.problem.objective import Objective
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.report.style import look
-from armwright.runs.assumptions import assumed_values, count_assumed
-from armwright.runs.history import FrontMember, History
+from armwright.runs.assumptions import count_assumed
+from armwright.runs.history import History
 from armwright.runs.infeasibility import describe_infeasibility
-from armwright.runs.path_report import describe_extremes
 from armwright.runs.results import REPORT
-from armwright.runs.supply_record import supply_of
-from armwright.spaces.custom_parameters import describe_custom
 from armwright.study.direct_search import FrontRun
 from armwright.study.progress import StudyResult
 from armwright.study.refine_run import RefinedRun
@@ -31,7 +25,6 @@ from armwright.study.time_plan import MAX_DESIGNS
 
 SHORT_NAMES = {POSITION_ERROR: "error [m]", TORQUE: "torque"}
 MAX_ROWS = 16  # of the front; front.csv has all
-MAX_OBJECTIVES_BESIDE_GEOMETRY = 3  # more of them leave no room for base and links
 
 
 def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> None:
@@ -39,7 +32,7 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
     history, summary, problem = run.history, run.summary, run.history.problem
     show_front(console, history, summary)
     if summary["proposer"] is not None:
-        console.print(_attribution_table(summary["attribution"]))
+        print_table(console, _attribution_table(summary["attribution"]))
     _show_hypervolume(console, history, summary, "more trials")
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
     n_infeasible = int((~history.feasible & ~history.failed).sum())
@@ -93,7 +86,7 @@ def show_front(console: Console, history: History, summary: dict[str, Any]) -> N
     if not history.front:
         return
     verified = summary["verification"]
-    console.print(_front_table(history, None if verified is None else set(verified["robust_numbers"])))
+    print_table(console, _front_table(history, None if verified is None else set(verified["robust_numbers"])))
     if verified is not None:
         console.print(
             f"recomputed in float64 and with the base or a link 1 mm off: {verified['robust']} robust, "
@@ -218,109 +211,73 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
     if not listed:
         console.print("no runs found")
         return
-    numbers = ("seed", "trials", "hypervolume", "share")
-    table = plain_table("run", "task", "method", *numbers, "state", right=numbers)
-    for run in listed:
-        volume, share = run["hypervolume"], run["share_of_best_known"]
-        table.add_row(
-            *(Text(str(run[name])) for name in ("folder", "task", "method", "seed", "trials")),
-            "" if volume is None else f"{volume:.3f}",
-            "" if share is None else f"{share:.1%}",
-            Text(str(run["state"])),
-        )
-    console.print(table)
-
-
-def show_picked(
-    console: Console,
-    run: Path,
-    history: History,
-    picked: Sequence[FrontMember],
-    survival: Mapping[int, Mapping[str, Any]],
-    most: int,
-) -> None:
-    """Print the chosen designs and the command that exports the first.
-
-    Args:
-        console: The console.
-        run: The run folder.
-        history: Its trials.
-        picked: The chosen designs.
-        survival: Records of their survival by number.
-        most: Number of designs to print.
-    """
-    console.print(f"{len(picked)} of the front's {len(history.front)} designs meet the conditions")
-    for member in picked[:most]:
-        values = ", ".join(map(_format_objective, history.problem.objectives, member.values))
-        links = ", ".join(f"{length:.3f}" for length in member.design.links)
-        console.print(Text(f"#{member.number}", style="bold") + Text(f" ({look(member.source).label}): {values}"))
-        motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
-        tubes = f", tubes {', '.join(member.design.tubes)}" if member.design.tubes else ""
-        base = format_point([round(value, 3) for value in member.design.origin])
-        console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}{tubes}")
-        if custom := describe_custom(history.problem.space.custom, member.design.params):
-            console.print(f"  {custom}")
-        evaluation = history.evaluation([member.number])
-        if along := describe_extremes(evaluation, 0):
-            console.print(f"  worst along its cycle: {along}")
-        if supply := supply_of(evaluation, 0):
-            console.print(f"  supply along its cycle: {supply.description}")
-        if assumed := assumed_values(history.problem, [member.arm]):
-            console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
-        if member.number in survival:
-            console.print(f"  perturbed: {survival[member.number]['verdict']}")
-    first = picked[0].number
-    console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
-
-
-def _format_objective(objective: Objective, value: float) -> str:
-    if objective == TORQUE:  # scaled, as in the paper
-        return f"torque {value:.4g} = {TORQUE_SCALE:g} x {value / TORQUE_SCALE:.4g} N m"
-    return f"{objective.label.lower()} {value:.4g} {objective.unit}"
+    columns = (
+        Column("run"), Column("task", rank=3, least=10), Column("method", rank=1, least=8),
+        *numbers("seed", rank=4), *numbers("trials", rank=2), *numbers("hypervolume", "share"),
+        Column("state", least=10),
+    )  # fmt: skip
+    rows = [
+        [
+            *(str(run[name]) for name in ("folder", "task", "method", "seed", "trials")),
+            "" if run["hypervolume"] is None else f"{run['hypervolume']:.3f}",
+            "" if run["share_of_best_known"] is None else f"{run['share_of_best_known']:.1%}",
+            str(run["state"]),
+        ]
+        for run in listed
+    ]
+    print_table(console, Table(columns, rows, "--json and --csv print all"))
 
 
 def _front_table(history: History, robust: set[int] | None) -> Table:
-    verdict = () if robust is None else ("verdict",)
     objectives = [SHORT_NAMES.get(o, o.name.replace("_", " ")) for o in history.problem.objectives]
-    geometry = ("base [m]", "links [m]") if len(objectives) <= MAX_OBJECTIVES_BESIDE_GEOMETRY else ()
-    table = plain_table(
-        "#", "source", *verdict, *objectives, "joints", *geometry,
-        right=("#", *objectives), title=f"Pareto front of {history.problem.task.name}", gap=1,
+    columns = (
+        *numbers("#"), Column("source", rank=3), *([] if robust is None else [Column("verdict", rank=1)]),
+        *numbers(*objectives), Column("joints"), Column("base [m]", rank=4), Column("links [m]", rank=5),
     )  # fmt: skip
-    for column in table.columns:
-        column.no_wrap = str(column.header) not in geometry
     reference = history.reference_point or (math.inf,) * len(objectives)
     inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front
     shown: list[int] = np.unique(np.linspace(0, len(inside) - 1, MAX_ROWS).round().astype(int)).tolist()
-    for member in (inside[i] for i in shown):
-        base_and_links = (
-            " ".join(f"{value:5.2f}" for value in member.design.origin),
-            " ".join(f"{value:.2f}" for value in member.design.links),
-        )
-        table.add_row(
+    rows = [
+        [
             str(member.number),
             look(member.source).label,
             *(() if robust is None else ("robust" if member.number in robust else "sensitive",)),
-            *map(_format_value, member.values),
+            *map(format_value, member.values),
             member.design.joints,
-            *(base_and_links if geometry else ()),
-        )
-    left_out = len(history.front) - len(shown)
-    if left_out:
-        beyond = len(history.front) - len(inside)
-        table.caption = f"and {left_out} more" + (f", {beyond} of them beyond the reference point" if beyond else "")
-        table.caption_justify = "left"
-    return table
+            " ".join(f"{value:5.2f}" for value in member.design.origin),
+            " ".join(f"{value:.2f}" for value in member.design.links),
+        ]
+        for member in (inside[i] for i in shown)
+    ]
+    return Table(
+        columns,
+        rows,
+        "front.csv has all",
+        title=f"Pareto front of {history.problem.task.name}",
+        caption=_describe_left_out(len(history.front) - len(shown), len(history.front) - len(inside)),
+        gap=1,
+    )
+
+
+def _describe_left_out(left_out: int, beyond: int) -> str:
+    """Return how many designs of the front the table lacks; empty if none."""
+    note = f", {beyond} of them beyond the reference point" if beyond else ""
+    return f"and {left_out} more{note}" if left_out else ""
 
 
 def _attribution_table(attribution: dict[str, dict[str, Any]]) -> Table:
     """Return a table of trials and gained hypervolume by source; useful only with a proposer."""
-    numbers = ("trials", "on the front", "hypervolume gained")
-    table = plain_table("source", *numbers, right=numbers, title="Attribution")
-    for source, share in attribution.items():
-        gained = "-" if share["hypervolume_gained"] is None else f"{share['hypervolume_gained']:.3f}"
-        table.add_row(look(source).label, str(share["trials"]), str(share["front"]), gained)
-    return table
+    rows = [
+        [
+            look(source).label,
+            str(share["trials"]),
+            str(share["front"]),
+            "-" if share["hypervolume_gained"] is None else f"{share['hypervolume_gained']:.3f}",
+        ]
+        for source, share in attribution.items()
+    ]
+    columns = (Column("source"), *numbers("trials", "on the front", "hypervolume gained"))
+    return Table(columns, rows, "--json prints all", title="Attribution")
 
 
 def _show_proposer(console: Console, proposer: dict[str, Any]) -> None:
@@ -355,5 +312,6 @@ def _show_proposer(console: Console, proposer: dict[str, Any]) -> None:
         )
 
 
-def _format_value(value: float) -> str:
+def format_value(value: float) -> str:
+    """Return a value of a table: three decimals, or two digits of small ones."""
     return f"{value:.3f}" if value >= 0.0095 or value == 0.0 else f"{value:.1e}"

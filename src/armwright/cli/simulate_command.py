@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.options import Json, RunFolder
-from armwright.cli.streams import open_console, plain_table, print_json
+from armwright.cli.options import Csv, Json, RunFolder
+from armwright.cli.streams import check_formats, open_console, print_csv, print_json
+from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ def simulate(
     ] = False,
     all_: Annotated[bool, typer.Option("--all", help="All designs of the front.")] = False,
     json_: Json = False,
+    csv_: Csv = False,
 ) -> None:
     """Drive designs of RUN through their cycle in MuJoCo (extra sim), and say which pass.
 
@@ -39,6 +41,7 @@ def simulate(
     from armwright.runs.simulated_run import Simulator
     from armwright.runs.simulation_files import SIMULATION, simulation_record, write_simulated
 
+    check_formats(json_, csv_)
     if (design is not None) + recommended + all_ > 1:
         raise SettingsError("--design, --recommended and --all choose the designs; use one of them")
     _, history = read_run(run)
@@ -61,6 +64,9 @@ def simulate(
     if json_:
         print_json(record)
         return
+    if csv_:
+        print_csv(map(_row, (member.result for member in members)))
+        return
     _show(open_console(), run, [member.result for member in members], choice)
 
 
@@ -77,6 +83,21 @@ def _simulate_chosen(simulator: "Simulator", design: int | None, every: bool) ->
     return []
 
 
+def _row(one: "SimulatedDesign") -> dict[str, Any]:
+    """Return a simulated design as a row of CSV: the worst of its targets [m] and of its joints."""
+    ratios = (joint.peak_torque / joint.claimed_peak_torque for joint in one.joints if joint.claimed_peak_torque)
+    return {
+        "design": one.design,
+        "verdict": one.verdict,
+        "cycle_time": one.cycle_time,
+        "energy": one.energy,
+        "tip_error": max((arrival.tip_error for arrival in one.targets), default=0.0),
+        "droop": max((arrival.droop for arrival in one.targets), default=0.0),
+        "torque_over_claimed": max(ratios, default=0.0),
+        "reasons": "; ".join(one.reasons),
+    }
+
+
 def _show(
     console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: Sequence[dict[str, Any]]
 ) -> None:
@@ -87,17 +108,14 @@ def _show(
     if not results:
         console.print(f"nothing to simulate: {run} has no feasible design")
         return
-    numbers = ("cycle [s]", "energy [J]", "tip error [mm]", "without feed-forward", "peak torque / claimed")
-    table = plain_table("#", "verdict", *numbers, right=("#", *numbers))
-    for one in results:
-        off = [max((getattr(arrival, name) for arrival in one.targets), default=0.0) for name in ("tip_error", "droop")]
-        ratio = max(
-            (joint.peak_torque / joint.claimed_peak_torque for joint in one.joints if joint.claimed_peak_torque),
-            default=0.0,
-        )
-        cells = (f"{one.cycle_time:.2f}", f"{one.energy:.1f}", *(f"{1e3 * value:.2f}" for value in off), f"{ratio:.3f}")
-        table.add_row(str(one.design), one.verdict, *cells)
-    console.print(table)
+    heads = ("cycle [s]", "energy [J]", "tip error [mm]", "without feed-forward", "peak torque / claimed")
+    rows: list[list[str]] = []
+    for row in map(_row, results):
+        off = (f"{1e3 * row[name]:.2f}" for name in ("tip_error", "droop"))
+        cells = (f"{row['cycle_time']:.2f}", f"{row['energy']:.1f}", *off, f"{row['torque_over_claimed']:.3f}")
+        rows.append([str(row["design"]), row["verdict"], *cells])
+    columns = (*numbers("#"), Column("verdict"), *numbers(*heads))
+    print_table(console, Table(columns, rows, "--json and --csv print all"))
     for one in results:
         for reason in one.reasons:
             console.print(f"#{one.design}: {reason}")

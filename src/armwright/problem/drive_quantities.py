@@ -11,6 +11,7 @@ from armwright.kinematics.actuation import Actuation
 from armwright.kinematics.drive_limits import torque_speed_utilisation
 from armwright.kinematics.supply import SupplyCurrents
 from armwright.problem.evaluation import Evaluation
+from armwright.robot.actuators import UNITS
 
 # Ratings of actuators that a quantity needs, by its name.
 RATINGS: Mapping[str, tuple[str, ...]] = {
@@ -28,6 +29,8 @@ RATINGS: Mapping[str, tuple[str, ...]] = {
     "payload_capacity": ("peak",),
 }
 
+KEYS = {"peak": "peak_torque", "continuous": "rated_torque", "no_load_speed": "speed"}  # of these in records
+
 
 def require_ratings(actuation: Actuation | None, quantity: str) -> Actuation:
     """Return the actuation of arms; SettingsError if it lacks what a quantity of this name needs."""
@@ -35,8 +38,11 @@ def require_ratings(actuation: Actuation | None, quantity: str) -> Actuation:
         raise SettingsError(f"objective {quantity} needs actuators: name some in the space file (actuators: [...])")
     for rating in RATINGS[quantity]:
         if np.isnan(getattr(actuation, rating)).any():
-            key = {"no_load_speed": "speed"}.get(rating, rating)
-            raise SettingsError(f"objective {quantity} needs the {key} of every actuator; the space names one without")
+            key = KEYS.get(rating, rating)
+            raise SettingsError(
+                f"objective {quantity} needs the {key} of every actuator; try {key} [{UNITS[key]}] in the record of "
+                "each in the space file, or leave out those without"
+            )
     return actuation
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from armwright.experiments.compare_runs import Comparison, Contrast, OverallContrast
-from armwright.experiments.outcome import Published
+from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
 from armwright.experiments.run_summary import RunSummary, shares_by_source
 from armwright.experiments.statistics import Interval, least_p
 from armwright.report.table_cells import format_seeds
@@ -16,7 +16,7 @@ from armwright.report.table_cells import format_seeds
 BIASES = ("lengths_5_cm", "lengths_1_cm", "base_on_symmetry_plane", "near_repeats", "equal_neighbours")
 
 
-def row_records(comparison: Comparison, published: Published) -> Iterable[dict[str, Any]]:
+def row_records(comparison: Comparison, published: Published = NOTHING_PUBLISHED) -> Iterable[dict[str, Any]]:
     """Yield one record per method and task."""
     for row in comparison.rows:
         e_hv, sigma_hv = published.values.get((row.method, row.task), (None, None))

@@ -1,9 +1,10 @@
 """Tables of a comparison: Markdown to read, CSV for programs and LaTeX for papers."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from armwright.experiments.compare_runs import LEVELS, Comparison
 from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
@@ -33,6 +34,25 @@ from armwright.report.table_records import (
 )
 
 WIDE = 4  # up to this many tasks, each has a column, as in the paper
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table of a comparison.
+
+    Attributes:
+        title: Its title.
+        caption: What its numbers mean.
+        head: The heads of its columns.
+        rows: Its rows.
+        right: The columns that are aligned to the right.
+    """
+
+    title: str
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    right: Sequence[int] = ()
 
 
 def write_tables(
@@ -73,6 +93,18 @@ def markdown(
     remarks = [*remarks_on(comparison), *notes]
     parts = [
         f"# {title}",
+        *(
+            f"## {one.title}\n\n{one.caption}\n\n{_table(one.head, one.rows, one.right)}"
+            for one in sections(comparison, published)
+        ),
+        *(["## Notes\n\n" + "\n".join(f"- {note}" for note in remarks)] if remarks else []),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def sections(comparison: Comparison, published: Published = NOTHING_PUBLISHED) -> list[Section]:
+    """Return the tables of a comparison that have rows."""
+    tables = (
         _summary_section(comparison, published),
         _final_section(comparison),
         _overall_section(comparison),
@@ -80,18 +112,24 @@ def markdown(
         _time_section(comparison),
         _source_section(comparison),
         _proposer_section(comparison),
-        "## Notes\n\n" + "\n".join(f"- {note}" for note in remarks) if remarks else "",
-    ]
-    return "\n\n".join(filter(None, parts)) + "\n"
+    )
+    return [table for table in tables if table.rows]
 
 
-def _section(
-    title: str, caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()
-) -> str:
-    return f"## {title}\n\n{caption}\n\n{_table(head, rows, right)}" if rows else ""
+def comparison_record(comparison: Comparison, published: Published = NOTHING_PUBLISHED) -> dict[str, Any]:
+    """Return the records of a comparison in JSON types."""
+    return {
+        "methods": list(row_records(comparison, published)),
+        "differences": list(contrast_records(comparison)),
+        "overall": list(overall_records(comparison)),
+        "time_to": [asdict(time) for time in comparison.times],
+        "sources": list(source_records(comparison)),
+        "proposers": proposer_records(comparison),
+        "runs": list(run_records(comparison)),
+    }
 
 
-def _summary_section(comparison: Comparison, published: Published) -> str:
+def _summary_section(comparison: Comparison, published: Published) -> Section:
     """Return the paper's table, with published values if there are any."""
     caption = (
         "Mean hypervolume E_hv over the counted trials and the runs. In brackets σ_hv: the mean over the trials of the "
@@ -105,7 +143,7 @@ def _summary_section(comparison: Comparison, published: Published) -> str:
     table = [["task" if is_wide else "method", "seeds", *comparison.tasks], *rows]
     if is_wide:
         table = list(map(list, zip(*table, strict=True)))
-    return _section("Hypervolume over the trials", caption, table[0], table[1:]) if rows else ""
+    return Section("Hypervolume over the trials", caption, table[0], table[1:] if rows else [])
 
 
 def _summary_cell(cell: SummaryCell | None) -> str:
@@ -115,7 +153,7 @@ def _summary_cell(cell: SummaryCell | None) -> str:
     return f"**{text}**" if cell.is_best else text
 
 
-def _final_section(comparison: Comparison) -> str:
+def _final_section(comparison: Comparison) -> Section:
     """Return the table of final hypervolumes."""
     caption = (
         "Mean over the runs, with 95 % bootstrap intervals. Share: relative to the best known hypervolume of the task."
@@ -130,10 +168,10 @@ def _final_section(comparison: Comparison) -> str:
         if known is not None:
             rows.append([task, "best known front", "", f"{known:.2f}", "100 %"])
     head = ["task", "method", "runs", "hypervolume at the end", "share"]
-    return _section("At the end", caption, head, rows, right=(2,))
+    return Section("At the end", caption, head, rows, right=(2,))
 
 
-def _overall_section(comparison: Comparison) -> str:
+def _overall_section(comparison: Comparison) -> Section:
     """Return the table over all tasks; empty if there are too few."""
     caption = (
         "Ratio of a method's E_hv to that of another one; every task counts once. Mean with its 95 % bootstrap "
@@ -149,10 +187,10 @@ def _overall_section(comparison: Comparison) -> str:
         ]
         for over in comparison.overall
     ]
-    return _section("Over all tasks", caption, ["method", "against", "ratio", *TEST_COLUMNS], rows)
+    return Section("Over all tasks", caption, ["method", "against", "ratio", *TEST_COLUMNS], rows)
 
 
-def _contrast_section(comparison: Comparison) -> str:
+def _contrast_section(comparison: Comparison) -> Section:
     """Return the table of paired tests."""
     caption = (
         "E_hv of a method minus that of another one, paired by seed: mean difference with its 95 % bootstrap interval. "
@@ -175,10 +213,10 @@ def _contrast_section(comparison: Comparison) -> str:
         ]
         for contrast in comparison.contrasts
     ]
-    return _section("Differences", caption, ["task", "method", "against", "difference", *TEST_COLUMNS], rows)
+    return Section("Differences", caption, ["task", "method", "against", "difference", *TEST_COLUMNS], rows)
 
 
-def _time_section(comparison: Comparison) -> str:
+def _time_section(comparison: Comparison) -> Section:
     """Return the table of trials needed to reach shares of the best known hypervolume."""
     caption = (
         "Counted trials needed to reach a share of the best known hypervolume (if none is known, of the best of these "
@@ -192,10 +230,10 @@ def _time_section(comparison: Comparison) -> str:
         ]
         for (task, method), times in groupby(comparison.times, lambda time: (time.task, time.method))
     ]
-    return _section("Trials to a hypervolume", caption, ["task", "method", *(f"{level:.0%}" for level in LEVELS)], rows)
+    return Section("Trials to a hypervolume", caption, ["task", "method", *(f"{level:.0%}" for level in LEVELS)], rows)
 
 
-def _source_section(comparison: Comparison) -> str:
+def _source_section(comparison: Comparison) -> Section:
     """Return the table of who found the front and the hypervolume."""
     caption = (
         "Share of the final front that was found by each source. In brackets: the share of the final hypervolume that "
@@ -219,10 +257,10 @@ def _source_section(comparison: Comparison) -> str:
         ]
         for task, label, shares in found
     ]
-    return _section("Front by source", caption, ["task", "method", *(look(source).label for source in sources)], rows)
+    return Section("Front by source", caption, ["task", "method", *(look(source).label for source in sources)], rows)
 
 
-def _proposer_section(comparison: Comparison) -> str:
+def _proposer_section(comparison: Comparison) -> Section:
     """Return the table of the proposals and their biases."""
     caption = (
         "Means over the runs. 5 cm, 1 cm: designs whose link lengths are all multiples of it. In plane: bases on a "
@@ -242,7 +280,7 @@ def _proposer_section(comparison: Comparison) -> str:
         ]
         for record in proposer_records(comparison)
     ]
-    return _section("Proposals", caption, head, rows)
+    return Section("Proposals", caption, head, rows)
 
 
 def _table(head: Sequence[str], lines: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:

@@ -1,8 +1,6 @@
 """Selection of designs of a front: by conditions, by one quantity, by weights, or the knee."""
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ from pydantic_core import to_jsonable_python
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import QUANTITIES
+from armwright.runs.conditions import Condition
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.infeasibility import describe_infeasibility
@@ -20,43 +19,8 @@ from armwright.runs.results import read_summary
 from armwright.runs.survival import evaluate_survival
 from armwright.spaces.parameters import FloatParameter
 
-_CONDITION = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
-_WEIGHT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
-_HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.greater}
-
-
-@dataclass(frozen=True)
-class Condition:
-    """A bound for a quantity of a design."""
-
-    name: str
-    relation: str
-    bound: float
-
-    def holds(self, numbers: Mapping[str, float]) -> bool:
-        """Return whether a design with these quantities satisfies the condition."""
-        return bool(_HOLDS[self.relation](numbers[self.name], self.bound))
-
-
-def read_condition(text: str) -> Condition:
-    """Parse a condition such as `position_error<=0.05`; SettingsError if it is none."""
-    found = _CONDITION.fullmatch(text)
-    if found is None:
-        raise SettingsError(f'--where "{text}": expected a name, one of <= < >= > and a number, such as mass<=2.5')
-    return Condition(found[1], found[2], float(found[3]))
-
-
-def read_weights(text: str) -> dict[str, float]:
-    """Parse weights such as `position_error=2,torque=1`."""
-    weights: dict[str, float] = {}
-    for part in text.split(","):
-        found = _WEIGHT.fullmatch(part)
-        if found is None:
-            raise SettingsError(f'--weights "{text}": expected names with numbers, such as position_error=2,torque=1')
-        weights[found[1]] = float(found[2])
-    if not any(weights.values()):
-        raise SettingsError(f'--weights "{text}": expected at least one above 0')
-    return weights
+# Names by which users look for quantities that are called otherwise
+_SYNONYMS = {"n_joints": "joints", "joint_count": "joints", "cost": "price", "weight": "mass", "reach": "length"}
 
 
 def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
@@ -101,7 +65,7 @@ def pick(
     Examples:
         >>> import armwright as aw
         >>> run = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="rules", n_total=20)
-        >>> lightest = pick(run.history, [read_condition("length<=1.2")], by="torque")[0]
+        >>> lightest = pick(run.history, [Condition("length", "<=", 1.2)], by="torque")[0]
         >>> lightest.values[1] == min(member.values[1] for member in run.front if member.arm.length <= 1.2)
         True
     """
@@ -109,15 +73,11 @@ def pick(
         raise SettingsError("expected one quantity or weights, got both")
     if len(history) and not history.front:
         raise FailureError(describe_infeasibility(history))
-    quantities = {member.number: numbers_of(history, member) for member in history.front}
-    names = list(quantities[history.front[0].number]) if history.front else []
     objectives = [objective.name for objective in history.problem.objectives]
     asked = [*(condition.name for condition in where), *([] if by is None else [by])]
-    for name in asked:
-        _check_name(name, names, QUANTITIES)
-    for name in {name for name in asked if name not in names}:
-        for number, value in _evaluated(history, QUANTITIES[name]).items():
-            quantities[number][name] = value
+    quantities = quantities_of_front(history, asked)
+    units = _units(history)
+    where = [condition.in_unit(units[condition.name]) for condition in where]
     for name in weights or {}:
         _check_name(name, objectives)
     left = [
@@ -169,17 +129,51 @@ def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int
     return {number: one for number, one in {**stored, **evaluated}.items() if number in numbers}
 
 
+def quantities_of_front(history: History, names: Sequence[str]) -> dict[int, dict[str, float]]:
+    """Return the quantities of the designs of the front by number: those of `numbers_of`, and these.
+
+    Raises:
+        SettingsError: A name is unknown.
+    """
+    quantities = {member.number: numbers_of(history, member) for member in history.front}
+    known = list(quantities[history.front[0].number]) if history.front else []
+    for name in dict.fromkeys(names):
+        _check_name(name, list(dict.fromkeys([*known, *QUANTITIES])))
+        if name not in known:
+            for number, value in _evaluated(history, QUANTITIES[name]).items():
+                quantities[number][name] = value
+    return quantities
+
+
+def _units(history: History) -> dict[str, str]:
+    """Return the unit of each quantity by name."""
+    problem = history.problem
+    return {
+        **{name: quantity.unit for name, quantity in QUANTITIES.items()},
+        **{
+            parameter.name: parameter.unit
+            for parameter in problem.space.parameters
+            if isinstance(parameter, FloatParameter)
+        },
+        "length": "m",
+        "mass": "kg",
+        **{constraint.quantity.name: constraint.quantity.unit for constraint in problem.constraints},
+        **{objective.name: objective.unit for objective in problem.objectives},
+    }
+
+
 def _evaluated(history: History, quantity: Objective) -> dict[int, float]:
     """Return a quantity of the designs of the front by number, in the task's first case; SettingsError if unknown."""
     numbers = [member.number for member in history.front]
     return dict(zip(numbers, quantity(history.evaluation(numbers)).tolist(), strict=True)) if numbers else {}
 
 
-def _check_name(name: str, names: Sequence[str], others: Iterable[str] = ()) -> None:
-    """Raise SettingsError if a name is not among names or others; the message lists the names."""
-    known = [*names, *others]
+def _check_name(name: str, known: Sequence[str]) -> None:
+    """Raise SettingsError if a name is unknown; the message lists the known ones."""
     if name not in known:
-        raise SettingsError(f'unknown quantity "{name}".{did_you_mean(name, known)} Available: {", ".join(names)}')
+        synonym = _SYNONYMS.get(name)
+        hint = f' Did you mean "{synonym}"?' if synonym in known else did_you_mean(name, known)
+        raise SettingsError(f'unknown quantity "{name}".{hint} Available: {", ".join(known)}')
 
 
 def _describe_unmet(where: Sequence[Condition], quantities: Sequence[Mapping[str, float]]) -> str:

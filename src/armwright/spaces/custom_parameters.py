@@ -8,6 +8,7 @@ from typing import Any, Literal, Self, cast
 from pydantic import BaseModel, ValidationError, model_validator
 
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter, ParameterValue, Range
+from armwright.validation_messages import describe_fault
 
 MAX_CUSTOM = 30  # entries of a space file
 MAX_VALUE = 1e9  # of a bound
@@ -99,10 +100,7 @@ def read_custom(value: Any) -> Any:
         try:
             pairs.append((str(name), CustomParameter.model_validate(content)))
         except ValidationError as fault:
-            first = fault.errors(include_url=False, include_context=False)[0]
-            key = ".".join(str(part) for part in first["loc"][:1])
-            message = first["msg"].removeprefix("Value error, ")
-            raise ValueError(f"{name}: {key + ': ' if key else ''}{message}") from fault
+            raise ValueError(f"{name}: {describe_fault(fault, CustomParameter, content)}") from fault
     return tuple(pairs)
 
 

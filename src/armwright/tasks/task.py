@@ -1,7 +1,7 @@
 """The task: points that the tip of the arm should reach, and which way it should point there."""
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Self, cast
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Self, cast
 
 import numpy as np
 from pydantic import (
@@ -72,6 +72,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         resolution: Differences of objectives that do not matter, by name; of designs that differ by no more, `armwright
             design` reports one.
     """
+
+    entry_records: ClassVar[Mapping[str, type]] = {"targets": Target}  # for messages: records that a list may hold
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # also names run folders
     targets: tuple[Point, ...] = Field(max_length=MAX_TARGETS)
@@ -146,7 +148,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @classmethod
     def _read_obstacles(cls, value: Any) -> Any:
         if not isinstance(value, (list, tuple)):
-            raise ValueError("obstacles: expected a list of records, such as {kind: ground, z: 0.0}")
+            raise ValueError("expected a list of records, such as {kind: ground, z: 0.0}")
         records = cast("list[Any]", value)
         return [read_obstacle(record, number) for number, record in enumerate(records, start=1)]
 

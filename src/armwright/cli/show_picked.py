@@ -1,0 +1,137 @@
+"""Print designs that were picked: each with all that is known of it, or many in a table."""
+
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.text import Text
+
+from armwright.cli.show_results import format_value
+from armwright.cli.streams import format_point, print_named
+from armwright.cli.tables import Column, Table, numbers, print_table
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import QUANTITIES, TORQUE, TORQUE_SCALE
+from armwright.report.style import look
+from armwright.runs.assumptions import assumed_values, count_assumed
+from armwright.runs.history import FrontMember, History
+from armwright.runs.path_report import describe_extremes, path_record
+from armwright.runs.selection import quantities_of_front
+from armwright.runs.supply_record import supply_of
+from armwright.spaces.custom_parameters import describe_custom
+from armwright.spaces.parameters import CategoricalParameter
+
+
+def picked_records(
+    history: History, picked: Sequence[FrontMember], names: Sequence[str], survival: Mapping[int, Mapping[str, Any]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the chosen designs for JSON.
+
+    Args:
+        history: The trials of the run.
+        picked: The chosen designs.
+        names: Quantities to include beside those that the run evaluated.
+        survival: Records of their survival by number.
+    """
+    quantities = quantities_of_front(history, names)
+    for member in picked:
+        record = {"number": member.number, "source": member.source, **quantities[member.number]}
+        record |= {"joints": member.design.joints} | path_record(history.evaluation([member.number]), 0)
+        yield record | ({"survival": survival[member.number]} if member.number in survival else {})
+
+
+def picked_rows(history: History, picked: Sequence[FrontMember], names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield the chosen designs as rows of CSV: parameters and quantities."""
+    quantities = quantities_of_front(history, names)
+    categorical = [p.name for p in history.problem.space.parameters if isinstance(p, CategoricalParameter)]
+    for member in picked:
+        yield {
+            "number": member.number,
+            "source": member.source,
+            **{name: member.design.params.get(name) for name in categorical},
+            **quantities[member.number],
+        }
+
+
+def show_picked_table(console: Console, history: History, picked: Sequence[FrontMember], names: Sequence[str]) -> None:
+    """Print the chosen designs in a table: their objectives, and the quantities of these names."""
+    quantities = quantities_of_front(history, names)
+    minimised = [objective.name for objective in history.problem.objectives]
+    further = [name for name in dict.fromkeys(names) if name not in minimised]
+    units = {objective.name: objective.unit for objective in (*QUANTITIES.values(), *history.problem.objectives)}
+    heads = [f"{name.replace('_', ' ')} [{units[name]}]" if name in units else name for name in (*minimised, *further)]
+    columns = (
+        *numbers("#"), Column("source", rank=3), *numbers(*heads), Column("types", rank=1),
+        Column("links [m]", rank=4), Column("motors", rank=5, least=12),
+    )  # fmt: skip
+    rows = [
+        [
+            str(member.number),
+            look(member.source).label,
+            *(format_value(quantities[member.number][name]) for name in minimised),
+            *(f"{quantities[member.number][name]:.4g}" for name in further),
+            member.design.joints,
+            " ".join(f"{value:.2f}" for value in member.design.links),
+            ", ".join(member.design.motors),
+        ]
+        for member in picked
+    ]
+    if not any(member.design.motors for member in picked):
+        columns, rows = columns[:-1], [row[:-1] for row in rows]
+    _show_count(console, history, picked)
+    print_table(console, Table(columns, rows, "--json and --csv print all"))
+
+
+def _show_count(console: Console, history: History, picked: Sequence[FrontMember]) -> None:
+    console.print(f"{len(picked)} of the front's {len(history.front)} designs meet the conditions")
+
+
+def show_picked(
+    console: Console,
+    run: Path,
+    history: History,
+    picked: Sequence[FrontMember],
+    survival: Mapping[int, Mapping[str, Any]],
+    most: int,
+) -> None:
+    """Print the chosen designs and the command that exports the first.
+
+    Args:
+        console: The console.
+        run: The run folder.
+        history: Its trials.
+        picked: The chosen designs.
+        survival: Records of their survival by number.
+        most: Number of designs to print.
+    """
+    _show_count(console, history, picked)
+    for member in picked[:most]:
+        values = ", ".join(map(_format_objective, history.problem.objectives, member.values))
+        links = ", ".join(f"{length:.3f}" for length in member.design.links)
+        print_named(console, f"#{member.number}", f" ({look(member.source).label}): {values}")
+        motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
+        tubes = f", tubes {', '.join(member.design.tubes)}" if member.design.tubes else ""
+        base = format_point([round(value, 3) for value in member.design.origin])
+        console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}{tubes}")
+        if custom := describe_custom(history.problem.space.custom, member.design.params):
+            console.print(f"  {custom}")
+        evaluation = history.evaluation([member.number])
+        if along := describe_extremes(evaluation, 0):
+            console.print(f"  worst along its cycle: {along}")
+        if supply := supply_of(evaluation, 0):
+            console.print(f"  supply along its cycle: {supply.description}")
+        if assumed := assumed_values(history.problem, [member.arm]):
+            console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
+        if member.number in survival:
+            console.print(f"  perturbed: {survival[member.number]['verdict']}")
+    first = picked[0].number
+    console.print(
+        Text(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
+    )
+
+
+def _format_objective(objective: Objective, value: float) -> str:
+    if objective == TORQUE:  # scaled, as in the paper
+        return f"torque {value:.4g} = {TORQUE_SCALE:g} x {value / TORQUE_SCALE:.4g} N m"
+    return f"{objective.label.lower()} {value:.4g} {objective.unit}"

@@ -1,0 +1,86 @@
+"""Conditions on quantities, such as `price <= 200 USD`, and weights, as users write them."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.exceptions import SettingsError
+from armwright.units import OTHER_UNITS
+
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_BOUND = re.compile(rf"\s*(<=|>=|==|<|>)?\s*{_NUMBER}\s*([^\W\d][^<>=]*)?")
+_NAME = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>=].*)", re.DOTALL)
+_WEIGHT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
+_HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.greater, "==": np.equal}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A bound for a quantity.
+
+    Attributes:
+        name: The quantity.
+        relation: `<=`, `<`, `==`, `>` or `>=`.
+        bound: The bound.
+        unit: The unit of the bound as it was written; empty for that of the quantity.
+    """
+
+    name: str
+    relation: str
+    bound: float
+    unit: str = ""
+
+    def holds(self, numbers: Mapping[str, float]) -> bool:
+        """Return whether these quantities satisfy the condition."""
+        return bool(_HOLDS[self.relation](numbers[self.name], self.bound))
+
+    def in_unit(self, unit: str) -> "Condition":
+        """Return the condition with its bound in the unit of the quantity; SettingsError if it is in another one."""
+        if self.unit in ("", unit):
+            return Condition(self.name, self.relation, self.bound)
+        measured, size = OTHER_UNITS.get(self.unit, (None, 1.0))
+        if measured != unit:
+            known = [unit, *(name for name, (of, _) in OTHER_UNITS.items() if of == unit)] if unit else []
+            expected = f"a bound in {' or '.join(known)}" if known else "a number without a unit"
+            raise SettingsError(f"{self.name}: expected {expected}, got {self.bound:g} {self.unit}")
+        return Condition(self.name, self.relation, self.bound * size)
+
+
+def read_condition(text: str) -> Condition:
+    """Parse a condition such as `position_error<=0.05` or `mass<2 kg`; SettingsError if it is none."""
+    name = _NAME.fullmatch(text)
+    found = None if name is None else _BOUND.fullmatch(name[2])
+    if name is None or found is None or not found[1]:
+        raise SettingsError(f'--where "{text}": expected a name, one of <= < == > >= and a number, such as mass<=2.5')
+    return Condition(name[1], found[1], float(found[2]), (found[3] or "").strip())
+
+
+def read_bound(option: str, name: str, text: str) -> Condition:
+    """Parse the value of an option that bounds a quantity, such as `<=60`, or `12` for equality.
+
+    Args:
+        option: The option, for messages.
+        name: The quantity.
+        text: Its value.
+    """
+    found = _BOUND.fullmatch(text)
+    if found is None:
+        raise SettingsError(
+            f'{option} "{text}": expected one of <= < == > >= and a number, such as "<=60", or a number'
+        )
+    return Condition(name, found[1] or "==", float(found[2]), (found[3] or "").strip())
+
+
+def read_weights(text: str) -> dict[str, float]:
+    """Parse weights such as `position_error=2,torque=1`."""
+    weights: dict[str, float] = {}
+    for part in text.split(","):
+        found = _WEIGHT.fullmatch(part)
+        if found is None:
+            raise SettingsError(f'--weights "{text}": expected names with numbers, such as position_error=2,torque=1')
+        weights[found[1]] = float(found[2])
+    if not any(weights.values()):
+        raise SettingsError(f'--weights "{text}": expected at least one above 0')
+    return weights

@@ -1,0 +1,218 @@
+"""Messages about values that a schema refuses: the key, what is expected with its unit, what was found, what to try."""
+
+import re
+from collections.abc import Mapping, Sequence
+from types import NoneType
+from typing import Any, Literal, cast, get_args, get_origin
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from armwright.exceptions import did_you_mean
+from armwright.schema_types import all_keys_of, bare_type, field_path, keys_of, members_of, type_at
+from armwright.units import KEY_UNITS, read_quantity
+
+_COUNTS = {2: "two", 3: "three", 4: "four"}
+_DIRECTIONS = {
+    "down": "[0, 0, -1]", "up": "[0, 0, 1]", "x": "[1, 0, 0]", "y": "[0, 1, 0]", "z": "[0, 0, 1]",
+    "-x": "[-1, 0, 0]", "-y": "[0, -1, 0]", "-z": "[0, 0, -1]",
+}  # fmt: skip
+_BOUNDS = {
+    "greater_than": "above",
+    "greater_than_equal": "of at least",
+    "less_than": "below",
+    "less_than_equal": "of at most",
+}
+_LETTERS = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+def describe_fault(fault: ValidationError, schema: Any, data: Any) -> str:
+    """Return what is wrong first, on one line: `link[1]: expected a number [m], got "long"`.
+
+    Args:
+        fault: The refusal.
+        schema: The model that refused.
+        data: The whole value.
+    """
+    first = fault.errors(include_url=False)[0]
+    path = field_path(first, schema)
+    if first["type"] == "missing" and path and isinstance(path[-1], int):  # a list that is too short
+        path = path[:-1]
+    at = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+    message = _describe(first, path, schema, data)
+    return f"{at}: {message}" if at else message
+
+
+def _describe(error: ErrorDetails, path: Sequence[str | int], schema: Any, data: Any) -> str:
+    """Return what is expected and what was found."""
+    kind, given = error["type"], error["input"]
+    if kind in ("value_error", "assertion_error"):
+        return error["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    annotation = type_at(schema, path)
+    unit = next((KEY_UNITS[part] for part in reversed(path) if isinstance(part, str) and part in KEY_UNITS), "")
+    if kind == "missing" and isinstance(error["loc"][-1], str):
+        return f"expected {_expected(annotation, unit)}, but the key is missing"
+    if kind == "extra_forbidden":
+        known = all_keys_of(type_at(schema, path[:-1]))
+        return f"unknown key.{did_you_mean(str(path[-1]), known)} Allowed: {', '.join(known)}"
+    if kind == "union_tag_invalid":
+        limits = error.get("ctx", {})
+        tags, key = re.findall(r"'([^']*)'", limits["expected_tags"]), limits["discriminator"].strip("'")
+        hint = did_you_mean(str(given[key]), tags)
+        return f"{key}: expected {_choice(tags)}, got {show(given[key])}" + (f".{hint}" if hint else "")
+    expected, hint = _limits(error, unit), ""
+    if not expected:
+        around = _value_at(data, path[:-1])
+        is_point = bool(path) and isinstance(path[-1], int) and _is_one_point(annotation, around)
+        expected = _expected(annotation, unit)
+        hint = show([around]) if is_point else _suggest(annotation, given, unit)
+    if kind == "string_pattern_mismatch" and isinstance(given, str):
+        hint = show(_LETTERS.sub("-", given).strip("-._")[:40]) if _LETTERS.search(given) else ""
+    length = error.get("ctx", {}).get("actual_length") if kind in ("too_short", "too_long") else None
+    got = show(given) if length is None else length
+    return f"expected {expected}, got {got}" + (f"; try {hint}" if hint else "")
+
+
+def _limits(error: ErrorDetails, unit: str) -> str:
+    """Return which values are allowed, if the kind of value is right; an empty string if it is not."""
+    kind, limits = error["type"], error.get("ctx", {})
+    if kind in _BOUNDS:
+        bound = next(iter(limits.values()))
+        return f"a number {_BOUNDS[kind]} {bound:g} {unit}".rstrip()
+    if kind == "finite_number":
+        return f"a finite number{_in(unit)}"
+    if kind in ("too_short", "too_long"):
+        number = limits.get("min_length", limits.get("max_length"))
+        return f"at {'least' if kind == 'too_short' else 'most'} {number} {'entry' if number == 1 else 'entries'}"
+    if kind in ("string_too_short", "string_too_long"):
+        number = limits.get("min_length", limits.get("max_length"))
+        return f"text of at {'least' if kind == 'string_too_short' else 'most'} {number} characters"
+    if kind == "string_pattern_mismatch":
+        pattern = str(limits["pattern"])
+        name = re.fullmatch(r"\^\[[^]]*\]\[(A-Z)?a-z0-9._-\]\{0,(\d+)\}\$", pattern)
+        if name is not None:
+            letters = "letters" if name[1] else "lowercase letters"
+            return (
+                f"a name of at most {int(name[2]) + 1} {letters}, digits and . _ - that begins with a letter or digit"
+            )
+        return f"text of the form {pattern}"
+    return ""
+
+
+def _expected(annotation: Any, unit: str = "") -> str:
+    """Return the values of a type in words."""
+    members = members_of(annotation)
+    if sum(bool(keys_of(member)) for member in members) > 1:
+        members = [member for member in members if not keys_of(member)]
+        return " or ".join(filter(None, ["a record", *(_one_expected(member, unit) for member in members)]))
+    kinds = list(dict.fromkeys(filter(None, (_one_expected(member, unit) for member in members))))
+    return " or ".join(kinds) or "another value"
+
+
+def _choice(names: Sequence[Any]) -> str:
+    """Return alternatives in words."""
+    return " or ".join(names) if len(names) <= 2 else f"one of {', '.join(names)}"
+
+
+def _one_expected(annotation: Any, unit: str) -> str:
+    if annotation in (float, int):
+        return f"{'a number' if annotation is float else 'a whole number'}{_in(unit)}"
+    if annotation in _WORDS:
+        return _WORDS[annotation]
+    entries = get_args(annotation)
+    if get_origin(annotation) is Literal:
+        return _choice(entries)
+    if get_origin(annotation) is tuple:
+        many = {float: "numbers", int: "whole numbers", str: "texts"}
+        plain = many.get(bare_type(entries[0]), "entries")
+        if entries[-1] is not Ellipsis:
+            return f"{_COUNTS.get(len(entries), len(entries))} {plain}{_in(unit)}"
+        return (
+            f"a list of {plain}{_in(unit)}"
+            if plain != "entries"
+            else f"a list, each entry {_expected(entries[0], unit)}"
+        )
+    if keys := keys_of(annotation):
+        return f"a record with the keys {', '.join(keys)}"
+    return "keys and values" if get_origin(annotation) is not None else ""
+
+
+_WORDS: Mapping[Any, str] = {str: "text", bool: "true or false", NoneType: ""}
+
+
+def _in(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def _suggest(annotation: Any, given: Any, unit: str) -> str:
+    """Return a value that the user may have meant; an empty string if there is none."""
+    members = members_of(annotation)
+    pairs = [get_args(m) for m in members if get_origin(m) is tuple and get_args(m)[-1] is not Ellipsis]
+    lists = [get_args(m)[0] for m in members if get_origin(m) is tuple and get_args(m)[-1] is Ellipsis]
+    choices = [choice for m in members if get_origin(m) is Literal for choice in get_args(m)]
+    if isinstance(given, str):
+        if choices:
+            if len(given) > 1 and set(given) <= set(choices):
+                return f"[{', '.join(given)}]"
+            return did_you_mean(given, choices).removeprefix(" Did you mean ").rstrip("?")
+        if float in members or int in members:
+            number = read_quantity(given, unit)
+            return "" if number is None else f"{number:.10g}"
+        if any(len(pair) == 3 for pair in pairs) and given in _DIRECTIONS:
+            return _DIRECTIONS[given]
+        split = [read_quantity(part, unit) for part in re.split(r"[,;]\s*|\s+", given.strip("[]() "))]
+        if pairs and len(split) == len(pairs[0]) and None not in split:
+            return show(split)
+    is_number = isinstance(given, (int, float)) and not isinstance(given, bool)
+    if is_number and (str in members):
+        return show(show(given))
+    if is_number and pairs and all(bare_type(entry) is float for entry in pairs[0]) and len(pairs[0]) == 2:
+        return show([given, given])
+    if isinstance(given, list) and len(cast("list[Any]", given)) == 1 and (float in members or int in members):
+        return show(cast("list[Any]", given)[0])
+    if isinstance(given, float) and int in members:
+        return str(round(given))
+    if lists and not isinstance(given, (list, dict)) and (isinstance(given, str) == (bare_type(lists[0]) is str)):
+        return show([given])
+    return ""
+
+
+def _is_one_point(annotation: Any, around: Any) -> bool:
+    """Return whether a list holds the numbers of one entry, where a list of entries is expected."""
+    entries = [get_args(member) for member in members_of(annotation) if get_origin(member) is tuple]
+    if not isinstance(around, list) or not entries:
+        return False
+    values = cast("list[Any]", around)
+    return len(values) == len(entries[0]) and all(isinstance(value, (int, float)) for value in values)
+
+
+def show(value: Any) -> str:
+    """Return a value as YAML writes it, shortened."""
+    try:
+        text = _flow(value)
+    except ValueError:  # an integer of more than 4300 digits
+        text = "a huge number"
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_flow, cast('list[Any]', value)))}]"
+    if isinstance(value, dict):
+        pairs = cast("dict[Any, Any]", value).items()
+        return f"{{{', '.join(f'{key}: {_flow(entry)}' for key, entry in pairs)}}}"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if value is None:
+        return "nothing"
+    return '"' + value.replace("\n", " ") + '"' if isinstance(value, str) else str(value)
+
+
+def _value_at(data: Any, path: Sequence[str | int]) -> Any:
+    """Return a part of a value; None if there is none."""
+    for part in path:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return data

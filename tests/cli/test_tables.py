@@ -1,0 +1,125 @@
+"""Tables in terminals of any width."""
+
+import io
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from armwright.cli.streams import wrap_sentences
+from armwright.cli.tables import Column, Table, fit_table, numbers, print_table, shorten
+from tests.support.terminal import in_terminal
+
+COLUMNS = st.lists(
+    st.builds(
+        Column,
+        head=st.sampled_from(["#", "price", "cycle time", "peak torque [N m]", "a head"]),
+        is_number=st.booleans(),
+        rank=st.integers(0, 3),
+        least=st.none() | st.integers(3, 10),
+    ),
+    min_size=1,
+    max_size=8,
+)
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> Table:
+    """Draw tables whose numbers are never shortened."""
+    columns = [
+        column if not column.is_number else numbers(column.head, rank=column.rank)[0] for column in draw(COLUMNS)
+    ]
+    text = st.text("abc é中", max_size=30).map(str.strip)
+    row = st.tuples(*(st.floats(-1e6, 1e6).map(lambda value: f"{value:.4g}") if c.is_number else text for c in columns))
+    return Table(columns, draw(st.lists(row, max_size=4)), "--json prints all", gap=draw(st.integers(1, 2)))
+
+
+def printed(table: Table, width: int) -> str:
+    console = Console(file=io.StringIO(), width=width, soft_wrap=True, markup=False, highlight=False)
+    print_table(console, table)
+    return console.file.getvalue()  # type: ignore[attr-defined]
+
+
+@given(tables(), st.integers(1, 90))
+def test_fitted_tables_are_narrow_enough_or_hold_only_what_is_never_dropped(table: Table, width: int) -> None:
+    fitted, dropped = fit_table(table, width)
+    lines = printed(fitted, 10_000).splitlines()
+    console = Console(width=10_000)
+    if max((console.measure(line).maximum for line in lines), default=0) > width:
+        assert {column.rank for column in fitted.columns} == {0} or len(fitted.columns) == 1
+    kept = [column.rank for column in fitted.columns]
+    assert len(kept) + len(dropped) == len(table.columns)
+    gone = sorted(column.rank for column in table.columns)[len(kept) :]
+    assert sorted([*kept, *gone]) == sorted(column.rank for column in table.columns)  # the highest ranks go first
+
+
+@given(tables(), st.integers(1, 90))
+def test_numbers_and_heads_are_never_cut(table: Table, width: int) -> None:
+    fitted, dropped = fit_table(table, width)
+    heads = [column.head.replace("\n", " ") for column in fitted.columns]
+    assert sorted([*heads, *dropped]) == sorted(column.head for column in table.columns)
+    cells = [[cell for c, cell in zip(table.columns, row, strict=True) if c.is_number] for row in table.rows]
+    for shown, whole in zip(fitted.rows, cells, strict=True):
+        left = [cell for c, cell in zip(fitted.columns, shown, strict=True) if c.is_number]
+        assert set(left) <= set(whole)
+
+
+def test_what_is_left_out_is_named() -> None:
+    columns = (*numbers("#"), Column("source", rank=1), *numbers("cycle time"), Column("links [m]", rank=2))
+    table = Table(columns, [["1", "front search", "3.125", "0.10 0.20"]], "--csv prints all", title="Front", gap=1)
+    assert printed(table, 80).splitlines() == [
+        "Front",
+        "# source       cycle time links [m]",
+        "1 front search      3.125 0.10 0.20",
+    ]
+    assert printed(table, 32).splitlines() == [
+        "Front",
+        "               cycle links",
+        "# source        time [m]",
+        "1 front search 3.125 0.10 0.20",
+    ]
+    assert printed(table, 24).splitlines()[:4] == [
+        "Front",
+        "               cycle",
+        "# source        time",
+        "1 front search 3.125",
+    ]
+    assert printed(table, 24).splitlines()[4] == "left out at this width: links [m]; --csv prints all"
+
+
+def test_texts_are_shortened_to_whole_characters() -> None:
+    assert shorten("an arm", 6) == "an arm"
+    assert shorten("an arm", 5) == "an a…"
+    assert shorten("an arm", 4) == "an…"
+    assert shorten("中中中", 5) == "中中…"
+
+
+@given(st.text("abc 12.5%`-", max_size=120), st.integers(5, 60))
+def test_wrapped_sentences_keep_their_words(text: str, width: int) -> None:
+    wrapped = wrap_sentences(text, width)
+    assert wrapped.split() == text.split()
+    for line in wrapped.splitlines():
+        assert len(line) <= width or " " not in re.sub(r"`[^`]*`|\d (?=%)", "", line.strip())
+
+
+def test_commands_and_numbers_with_units_stay_whole() -> None:
+    text = "the torque is 12.5 N m, `armwright design my-task.yaml --budget 1h` suits it better"
+    for width in range(20, 90):
+        wrapped = wrap_sentences(text, width)
+        assert "`armwright design my-task.yaml --budget 1h`" in wrapped
+        assert "12.5 N" in wrapped
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [60, 80])
+@pytest.mark.parametrize(
+    "command",
+    [("actuators",), ("actuators", "XM430-W350", "MG996R"), ("tasks",), ("check", "desk-sorting", "--no-picture")],
+)
+def test_terminals_wrap_only_what_has_no_spaces(command: tuple[str, ...], width: int) -> None:
+    code, lines = in_terminal(width, *command)
+    assert code == 0
+    for line in lines:
+        assert len(line) <= width or len(line.split()) == 1 or "https://" in line, line
