@@ -32,7 +32,7 @@ def small_sheet() -> DataSheet:
 
 def large_sheet() -> DataSheet:
     """As much as a design can have: eight joints, with long names, and every change possible or not."""
-    joint = JointLine(1, "joint_1", "revolute", "pitch (y)", LONG, -2.4, 2.4, (-1.0, 1.0), (1.4, 1.4), 12.3, 4.5, 1.2)
+    joint = JointLine(1, "joint_1", "revolute", "y", LONG, -2.4, 2.4, (-1.0, 1.0), (1.4, 1.4), 12.3, 4.5, 1.2)
     impossible = Sensitivity("tube 1", "next stiffer", "60x2 is the stiffest of the space")
     change = Sensitivity("actuator 1", f"{LONG} → {LONG}", "", 1e-3, -2e-4, 3e-5, 0.1, -100.0, ("deflection <= 1",) * 3)
     source = "https://example.org/" + "a-long-path/" * 9

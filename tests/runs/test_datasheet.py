@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pinocchio
 import pytest
 
 import armwright as aw
+from armwright.problem.failure import Failure
 from armwright.problem.objectives import (
     BACKLASH_ERROR,
     DEFLECTION,
@@ -21,10 +23,15 @@ from armwright.problem.objectives import (
     TORQUE_UTILISATION,
     WORST_ERROR,
 )
+from armwright.report.datasheet import sheet_record
+from armwright.report.datasheet_pdf import verdict_of
+from armwright.robot.actuators import named_actuator
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_reader import read_urdf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.datasheet.design_sheet import design_sheet
+from armwright.runs.datasheet.design_sheet import Verdict, design_sheet, sheet_of
+from armwright.runs.datasheet.parts import price_source
+from armwright.runs.datasheet.sensitivities import variations, varied
 from armwright.runs.datasheet.sheet import DataSheet
 from armwright.runs.datasheet.urdf_sheet import read_actuators, urdf_sheet
 from armwright.runs.folder import read_run
@@ -161,6 +168,43 @@ def test_impossible_changes_say_so(sheet: DataSheet) -> None:
     reasons = {line.part: line.impossible for line in sheet.sensitivities if line.impossible}
     assert reasons["link 4"].startswith("the space allows at most 55 mm, it has 5")
     assert all("of the space" in reason for part, reason in reasons.items() if part != "link 4")
+
+
+def test_parts_are_numbered_like_the_joints_of_the_arm() -> None:
+    """A module of two joints has two actuators, and its link is after the second."""
+    content = {"joints": 2, "joint_types": ["O", "P"], "actuators": ["XM540-W270", "XM430-W350"], "motor_bodies": False}
+    space = DesignSpace.model_validate(content)
+    design = space.clipped((0.0, 0.0, 0.0), "OP", (0.1, 0.2))
+    weaker = aw.Design({**design.params, "motor_1": "XM430-W350", "motor_2": "XM430-W350"})
+    found = {variation.part: variation for variation in variations(space, weaker) if not variation.impossible}
+    assert list(found) == ["link 2", "link 3", "actuator 1, 2", "actuator 3"]
+    assert space.arm(varied(space, weaker, found["link 2"])).links[1].length == pytest.approx(0.11)
+    stronger = space.arm(varied(space, weaker, found["actuator 1, 2"]))
+    names = [joint.actuator.name for joint in stronger.joints if joint.actuator is not None]
+    assert names == ["XM540-W270", "XM540-W270", "XM430-W350"]
+
+
+def test_infeasible_designs_state_what_they_violate(sheet: DataSheet, history: History) -> None:
+    violations = history.trials[NUMBER].violations
+    assert len(sheet.violated) == sum(violation > 0.0 for violation in violations) > 0
+    assert verdict_of(sheet).startswith(f"Infeasible: {sheet.violated[0]}")
+
+
+def test_failed_evaluations_give_a_sheet_without_objectives(history: History) -> None:
+    trial = replace(
+        history.trials[NUMBER], number=0, values=(np.inf, np.inf), failure=Failure("exception", "no licence")
+    )
+    failed = replace(history, trials=[trial])
+    sheet = sheet_of(failed, failed.member(0), Verdict())
+    assert sheet.violated == ("its evaluation failed: no licence",)
+    assert {value for value, _ in sheet.objectives.values()} == {None}
+    json.dumps(sheet_record(sheet), allow_nan=False)
+
+
+def test_prices_keep_what_the_catalogue_says_of_them() -> None:
+    source = price_source(named_actuator("XM540-W270"))
+    assert source.startswith("price robotis.us")
+    assert source.count("(") == source.count(")")
 
 
 def test_price_is_the_sum_of_the_parts(sheet: DataSheet) -> None:

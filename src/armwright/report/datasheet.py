@@ -21,7 +21,7 @@ def write_datasheet(sheet: DataSheet, folder: Path) -> list[Path]:
         write_pdf(sheet, part)
         part.replace(folder / PDF)
         replace_file(folder / HTML, to_html(sheet).encode())
-        replace_file(folder / JSON, (json.dumps(sheet_record(sheet), indent=2) + "\n").encode())
+        replace_file(folder / JSON, (json.dumps(sheet_record(sheet), indent=2, allow_nan=False) + "\n").encode())
     return [folder / name for name in (HTML, PDF, JSON)]
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+from matplotlib import font_manager
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.lines import Line2D
 
 from armwright.report import datasheet_tables as tables
@@ -76,7 +76,7 @@ class TextColumn:
             self.paragraph(table.note)
 
     def _row(self, table: Table, row: Sequence[str], widths: Sequence[float], is_header: bool) -> None:
-        wrapped = [self._wrapped(cell, width) for cell, width in zip(row, widths, strict=True)]
+        wrapped = [self._wrapped(cell, width, is_header) for cell, width in zip(row, widths, strict=True)]
         gap, x = self._gap, self.x
         for column, (lines, width) in enumerate(zip(wrapped, widths, strict=True)):
             at_left = column in table.left
@@ -92,32 +92,47 @@ class TextColumn:
             self.figure.add_artist(Line2D(ends, [place, place], color=colour, linewidth=width))
 
     def _widths(self, table: Table, cells: Sequence[Sequence[str]]) -> list[float]:
-        """Return the widths of the columns [inch]; the widest left-aligned ones are narrowed until all fit."""
-        widths = [max(self._measure(text, bold=True) for text in column) for column in zip(*cells, strict=True)]
+        """Return the widths of the columns [inch]; the widest left-aligned ones are narrowed until all fit.
+
+        Names of columns of numbers are wrapped. Words are broken only if they have to be.
+        """
+        columns = list(zip(*cells, strict=True))
+        words = [
+            max((self._measure(word, bold=True) for text in column for word in text.split()), default=0.0)
+            for column in columns
+        ]
+        n_names = 1 if table.header else 0
+        wholes = [
+            max(self._measure(text, bold=True) for text in column[0 if number in table.left else n_names :])
+            for number, column in enumerate(columns)
+        ]
+        widths = [max(pair) for pair in zip(words, wholes, strict=True)]
         room = self.width - self._gap * (len(widths) - 1)
-        while table.left and sum(widths) > room:
-            widest = max(table.left, key=lambda column: widths[column])
-            if widths[widest] <= NARROWEST:
-                break
-            widths[widest] -= min(STEP, max(sum(widths) - room, 1e-3))
+        for least in (words, [NARROWEST] * len(columns)):
+            while sum(widths) > room:
+                wide = [column for column in table.left if widths[column] > least[column]]
+                if not wide:
+                    break
+                widest = max(wide, key=lambda column: widths[column])
+                widths[widest] = max(least[widest], widths[widest] - STEP)
         return widths
 
     @property
     def _gap(self) -> float:
-        return 1.0 * self.size * POINT
+        return 0.9 * self.size * POINT
 
-    def _wrapped(self, text: str, width: float) -> list[str]:
+    def _wrapped(self, text: str, width: float, bold: bool = False) -> list[str]:
         """Return the lines of a text; words that are too long are broken."""
         lines, line = list[str](), ""
         for word in text.split():
             together = f"{line} {word}".strip()
-            if self._measure(together) <= width + 1e-6:
+            if self._measure(together, bold) <= width + 1e-6:
                 line = together
                 continue
             lines += [line] if line else []
             line = word
-            while self._measure(line) > width + 1e-6 and len(line) > 1:
-                part = next(n for n in range(len(line) - 1, 0, -1) if n == 1 or self._measure(line[:n]) <= width)
+            while self._measure(line, bold) > width + 1e-6 and len(line) > 1:
+                part = next(n for n in range(len(line) - 1, 0, -1) if n == 1 or self._measure(line[:n], bold) <= width)
                 lines.append(line[:part])
                 line = line[part:]
         return [*lines, line]
@@ -145,7 +160,8 @@ class TextColumn:
 @cache
 def _advance(letter: str, bold: bool) -> float:
     """Return the width of a letter, as a multiple of the size of the text."""
-    font: Any = get_font(findfont(FontProperties(weight="bold" if bold else "normal")))
+    fonts: Any = font_manager
+    font = fonts.get_font(fonts.findfont(fonts.FontProperties(weight="bold" if bold else "normal")))
     font.set_size(1.0, 72.0)
     return font.load_char(ord(letter)).linearHoriAdvance / 2**16
 
@@ -170,8 +186,10 @@ def title_of(sheet: DataSheet) -> str:
 def verdict_of(sheet: DataSheet) -> str:
     """Return role, verdict and survival in one sentence; empty for an existing arm."""
     role = f"Recommended as {sheet.role}" if sheet.role else ""
-    parts = [part for part in (role, sheet.status and f"simulation: {sheet.status}", sheet.survival) if part]
-    return "; ".join(parts) + "." if parts else ""
+    broken = f"infeasible: {', '.join(sheet.violated)}" if sheet.violated else ""
+    parts = [part for part in (broken, role, sheet.status and f"simulation: {sheet.status}", sheet.survival) if part]
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
 def _first_page(sheet: DataSheet) -> Figure:

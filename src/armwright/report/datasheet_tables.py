@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from armwright.robot.build_sheet import AXIS_NAMES
 from armwright.runs.datasheet.sheet import NOT_STATED, DataSheet, JointLine, Sensitivity
 from armwright.tasks.moments import MAX_MASS
 
@@ -148,7 +149,7 @@ def reach_table(sheet: DataSheet) -> Table:
 
 def sensitivity_table(sheet: DataSheet) -> Table:
     """Return what changes of the design change."""
-    header = ("part", "change", "error [mm]", "deflection [mm]", "backlash [mm]", "mass [kg]", "price [USD]", "breaks")
+    header = ("part", "change", "error [mm]", "deflection [mm]", "backlash [mm]", "mass [g]", "price [USD]", "breaks")
     rows = tuple(_sensitivity_row(line) for line in sheet.sensitivities if not line.impossible)
     parts_by_reason: dict[str, list[str]] = {}
     for line in sheet.sensitivities:
@@ -156,7 +157,7 @@ def sensitivity_table(sheet: DataSheet) -> Table:
             parts_by_reason.setdefault(f"({line.change}): {line.impossible}", []).append(line.part)
     shown = [f"{', '.join(parts)} {reason}" for reason, parts in parts_by_reason.items()]
     note = f"Impossible: {'; '.join(shown)}." if shown else sheet.missing.get("sensitivities", "")
-    return Table("What a change changes", header, rows, (0, 1, 7), note)
+    return Table("Sensitivities", header, rows, (0, 1, 7), note)
 
 
 def _stated(sheet: DataSheet, key: str, unit: str, factor: float = 1.0) -> str:
@@ -176,10 +177,10 @@ def _joint_row(sheet: DataSheet, joint: JointLine) -> tuple[str, ...]:
     def share(value: float | None) -> str:
         return "–" if value is None else f"{value:.0%}"
 
-    name = joint.axis if joint.name == f"joint_{joint.number}" else f"{joint.name}, {joint.axis}"
+    axis = f"slide ({joint.axis})" if joint.kind == "prismatic" else AXIS_NAMES[joint.axis]
     return (
         str(joint.number),
-        name if joint.kind == "revolute" else f"{name}, {joint.kind}",
+        axis if joint.name == f"joint_{joint.number}" else f"{joint.name}, {axis}",
         NOT_STATED if not joint.actuator else "URDF" if joint.actuator == joint.name else joint.actuator,
         pair((joint.lower, joint.upper), " to "),
         pair(joint.used, " to "),
@@ -194,5 +195,5 @@ def _sensitivity_row(line: Sensitivity) -> tuple[str, ...]:
     errors = (line.position_error, line.deflection, line.backlash_error)
     shown = [number(value, 1e3, signed=True, missing="–") for value in errors]
     price = NOT_STATED if line.price is None else "0" if abs(line.price) < 0.005 else f"{line.price:+,.2f}"
-    shown += [number(line.mass, signed=True, missing="–"), price]
+    shown += [number(line.mass, 1e3, signed=True, missing="–"), price]
     return (line.part, line.change, *shown, ", ".join(line.broken))

@@ -11,7 +11,7 @@ from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import BACKLASH_ERROR, CYCLE_TIME, DEFLECTION, PRICE, WORST_ERROR
 from armwright.runs.assumptions import assumed_values, describe_assumed
-from armwright.runs.datasheet.joint_lines import joint_lines
+from armwright.runs.datasheet.joint_lines import joint_lines, known
 from armwright.runs.datasheet.over_reach import drawing_of, link_line, reach_lines
 from armwright.runs.datasheet.parts import mass_lines, parts_list
 from armwright.runs.datasheet.sensitivities import sensitivities
@@ -71,6 +71,7 @@ def sheet_of(history: History, member: FrontMember, verdict: Verdict) -> DataShe
         role=verdict.role,
         status=verdict.status,
         survival=verdict.survival,
+        violated=_violated(history, member.number),
         objectives=_objectives(history, member),
         reach=over_reach[-1].distance,
         mass=arm.mass,
@@ -109,9 +110,21 @@ def _verdict(run: Path, number: int, record: Mapping[str, Any] | None) -> Verdic
     return Verdict(status=f"{status}; not among the recommended designs")
 
 
-def _objectives(history: History, member: FrontMember) -> dict[str, tuple[float, str]]:
+def _objectives(history: History, member: FrontMember) -> dict[str, tuple[float | None, str]]:
     pairs = zip(history.problem.objectives, member.values, strict=True)
-    return {objective.name: (value, objective.unit) for objective, value in pairs}
+    return {objective.name: (known(value), objective.unit) for objective, value in pairs}
+
+
+def _violated(history: History, number: int) -> tuple[str, ...]:
+    """Return the constraints that a design violates, with what it has, or why its evaluation failed."""
+    trial = history.trials[number]
+    if trial.failure is not None:
+        return (f"its evaluation failed: {trial.failure.reason}",)
+    return tuple(
+        f"{constraint.description} (it has {constraint.measured(violation):.3g})"
+        for constraint, violation in zip(history.problem.constraints, trial.violations, strict=True)
+        if violation > 0.0
+    )
 
 
 def _known(quantity: Objective, evaluation: Evaluation) -> float | None:

@@ -11,7 +11,6 @@ from armwright.kinematics.cycle_loads import CycleLoads, holding_torques
 from armwright.kinematics.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.robot.arm import Arm
-from armwright.robot.build_sheet import AXIS_NAMES
 from armwright.runs.datasheet.sheet import JointLine
 
 
@@ -33,7 +32,7 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
             number=j + 1,
             name=names[k] if names else f"joint_{j + 1}",
             kind=joint.kind,
-            axis=AXIS_NAMES[joint.axis],
+            axis=joint.axis,
             actuator="" if joint.actuator is None else joint.actuator.name,
             lower=joint.lower,
             upper=joint.upper,

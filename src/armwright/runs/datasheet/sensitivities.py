@@ -21,10 +21,11 @@ from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import CategoricalParameter, Design, FloatParameter, Parameter
 
 LONGER = 0.01  # [m]
+ACTUATOR = "actuator"
 # Comparative, superlative, name of the part, and what a space may lack.
 WORDS = {
     "tube": ("stiffer", "stiffest", "tube", "tube of a known material"),
-    "motor": ("larger", "largest", "actuator", "actuator"),
+    "motor": ("larger", "largest", ACTUATOR, "actuator"),
 }
 
 
@@ -99,12 +100,12 @@ def variations(space: DesignSpace, design: Design) -> Iterator[Variation]:
     material = space.link_section.material
     has_price = material is not None and material.price_per_kg > 0.0
     links = [
-        _longer(name, float(free[name]), parameters[name], _part(space, name, "link"))
+        _longer(name, float(free[name]), parameters[name], _part(space, design, name, "link"))
         for name in _of_kind(free, "link")
     ]
-    tubes = _next(space, free, parameters, "tube", _tube_order(space))
+    tubes = _next(space, design, parameters, "tube", _tube_order(space))
     yield from (replace(variation, is_priced=has_price) for variation in (*links, *tubes))
-    yield from _next(space, free, parameters, "motor", _motor_order(space))
+    yield from _next(space, design, parameters, "motor", _motor_order(space))
 
 
 def _changes(measure: Callable[[Evaluation], Array], evaluation: Evaluation) -> Array:
@@ -120,10 +121,20 @@ def _of_kind(free: Mapping[str, float | str], kind: str) -> list[str]:
     return [name for name in free if name == kind or name.rpartition("_")[0] == kind]
 
 
-def _part(space: DesignSpace, name: str, kind: str) -> str:
-    """Return what a parameter changes, with what is tied to it: `link 1, 3`."""
-    numbers = [one.rpartition("_")[2] for one in (name, *(tied for tied, other in space.tie if other == name))]
-    return f"{kind} of all links" if name == kind else f"{kind} {', '.join(numbers)}"
+def _part(space: DesignSpace, design: Design, name: str, title: str) -> str:
+    """Return what a parameter changes, with what is tied to it, by the numbers of the arm's joints: `link 1, 3`.
+
+    A module of two joints has two actuators, and its link is after the second.
+    """
+    if "_" not in name:
+        return f"{title} of all links"
+    joints: dict[int, list[int]] = {}
+    for number, module in enumerate(design.module_of_joint, start=1):
+        joints.setdefault(module + 1, []).append(number)
+    modules = [int(one.rpartition("_")[2]) for one in (name, *(tied for tied, other in space.tie if other == name))]
+    changed = [joints[module] for module in modules if module in joints]
+    numbers = [number for of_module in changed for number in (of_module if title == ACTUATOR else of_module[-1:])]
+    return f"{title} {', '.join(map(str, numbers))}"
 
 
 def _longer(name: str, length: float, parameter: Parameter, part: str) -> Variation:
@@ -137,19 +148,20 @@ def _longer(name: str, length: float, parameter: Parameter, part: str) -> Variat
 
 def _next(
     space: DesignSpace,
-    free: Mapping[str, float | str],
+    design: Design,
     parameters: Mapping[str, Parameter],
     kind: str,
     order: Sequence[tuple[float, str]],
 ) -> Iterator[Variation]:
     """Yield the next choice of each tube or actuator; order: strength and name of the choices."""
     word, most, title, what = WORDS[kind]
+    free = space.free_values(design)
     names = _of_kind(free, kind)
     if not names:
         stated = "no" if not order else "one"
         yield Variation(f"each {title}", f"next {word}", impossible=f"the space names {stated} {what}")
     for name in names:
-        parameter, own, part = parameters[name], str(free[name]), _part(space, name, title)
+        parameter, own, part = parameters[name], str(free[name]), _part(space, design, name, title)
         assert isinstance(parameter, CategoricalParameter)
         strength = {choice: value for value, choice in order}
         stronger = [

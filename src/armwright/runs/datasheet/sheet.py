@@ -31,7 +31,7 @@ class JointLine:
         number: Its number, from 1; fixed joints count.
         name: Its name in the URDF.
         kind: Its type.
-        axis: Its axis.
+        axis: Its axis, with all joints at 0: x, y or z.
         actuator: The name of its actuator; empty if not stated.
         lower: The lower limit.
         upper: The upper limit.
@@ -188,6 +188,7 @@ class DataSheet:
         role: Why the design is recommended; empty if it is not.
         status: The verdict of the simulation.
         survival: Which perturbations it holds.
+        violated: The constraints that it violates, or why its evaluation failed.
         objectives: What the run evaluated, by name with the unit.
         reach: The horizontal reach of the tip from the first joint.
         mass: Without payload.
@@ -226,7 +227,8 @@ class DataSheet:
     role: str = ""
     status: str = ""
     survival: str = ""
-    objectives: Mapping[str, tuple[float, str]] = field(default_factory=dict[str, tuple[float, str]])
+    violated: tuple[str, ...] = ()
+    objectives: Mapping[str, tuple[float | None, str]] = field(default_factory=dict[str, tuple[float | None, str]])
     payload: float | None = None
     payload_at_full_reach: float | None = None
     position_error: float | None = None
