@@ -10,11 +10,14 @@ from armwright.kinematics.arm_arrays import FIXED, ArmArrays, carrying, stack_ar
 from armwright.kinematics.compliance import (
     Stiffness,
     backlash_errors,
+    backlash_over_reach,
+    deflections_over_reach,
     own_loads,
     tip_displacements,
     unit_payload,
 )
 from armwright.kinematics.forward import forward_kinematics
+from armwright.kinematics.reach_postures import postures_over_reach
 from armwright.robot.arm import AXES, GRAVITY, Arm, Joint, Link, MountedTool, uniform_link
 from armwright.tasks.payload import LoadShape
 from tests.support.frame_program import frame_displacement
@@ -146,3 +149,19 @@ def test_backlash_error_of_one_joint_is_half_its_backlash_times_the_lever() -> N
     arms = stack_arms([arm], "float64")
     found = backlash_errors(arms, forward_kinematics(arms, np.zeros((1, 1, 1))), np.full((1, 1), np.radians(0.25)))
     assert found[0, 0] == pytest.approx(0.35 * np.radians(0.25) / 2.0)
+
+
+def test_errors_at_full_reach_are_those_of_a_cantilever() -> None:
+    """A shoulder on an upright, rigid post, and one level link."""
+    length, mass, payload, bending, stiffness, play = 0.5, 0.4, 1.5, 60.0, 900.0, 0.002
+    joints = tuple(Joint("revolute", axis, -2.4, 2.4) for axis in ("z", "y"))
+    links = (uniform_link((0.0, 0.0, 0.1), 0.2, 0.01), uniform_link((0.0, 0.0, length), mass, 0.01))
+    postures = postures_over_reach(Arm((0.3, 0.1, 0.2), joints, links), (1.0,))
+    rigid = np.array([[np.inf, bending]])
+    (sag,) = deflections_over_reach(postures, Stiffness(rigid, rigid, np.full((1, 2), stiffness)), payload)
+    force, weight = payload * GRAVITY, mass * GRAVITY / length
+    moment = force * length + weight * length**2 / 2.0
+    expected = (force * length**3 / 3.0 + weight * length**4 / 8.0) / bending + moment / stiffness * length
+    assert sag == pytest.approx(expected, rel=1e-3)
+    (error,) = backlash_over_reach(postures, np.full((1, 2), play))
+    assert error == pytest.approx(2.0 * length * play / 2.0, rel=1e-3)  # both joints have the same lever

@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.payload_limits import payloads_over_reach
+from armwright.kinematics.payload_limits import held_payloads, payloads_over_reach
+from armwright.kinematics.reach_postures import postures_over_reach
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import PAYLOAD_CAPACITY, TORQUE_UTILISATION
 from armwright.robot.arm import GRAVITY, Actuator, Arm, Joint, uniform_link
@@ -101,3 +102,21 @@ def test_payload_at_full_reach_is_that_of_the_worst_posture() -> None:
 
 def test_weak_motors_hold_nothing_over_the_reach() -> None:
     assert payloads_over_reach(planar_arm(0.1)).payloads == (0.0, 0.0)
+
+
+def test_motors_are_at_their_limit_over_the_reach() -> None:
+    """By Pinocchio: they hold the stated payload in all postures found, and no more in one of them."""
+    arm = driven(moving_arms(1, 5, 3)[0], 90.0)
+    postures = postures_over_reach(arm, (1.0,))
+    (payload,) = held_payloads(postures).payloads
+    assert payload > 0.0
+    model = pinocchio.buildModelFromXML(to_urdf(arm))
+    tip = model.frames[model.getFrameId("tip")]
+    model.appendBodyToJoint(tip.parentJoint, pinocchio.Inertia(payload, np.zeros(3), np.zeros((3, 3))), tip.placement)
+    data = model.createData()
+    shares = [
+        FACTOR * np.abs(pinocchio.computeGeneralizedGravity(model, data, q.astype(float))).max() / 90.0
+        for found, is_there in postures.found()
+        for q in found.q[0, is_there]
+    ]
+    assert max(shares) == pytest.approx(1.0, rel=1e-3)

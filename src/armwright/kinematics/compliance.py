@@ -13,14 +13,16 @@ where M_t is the part of M along e, and M_b the rest. The tip moves by u + φ ×
 tip. A revolute joint of stiffness k rotates by its moment over k, a slide moves by its force over k.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import ArmArrays
-from armwright.kinematics.forward import Frames
+from armwright.kinematics.forward import Frames, forward_kinematics
 from armwright.kinematics.jacobian import jacobian_of
+from armwright.kinematics.reach_postures import ReachPostures
 from armwright.robot.arm import GRAVITY
 
 DOWN = np.array([0.0, 0.0, -GRAVITY])  # [m/s²]
@@ -104,6 +106,34 @@ def backlash_errors(arms: ArmArrays, frames: Frames, backlash: Array) -> Array:
     lever = np.linalg.norm(jacobian_of(arms, frames), axis=2)  # (N, K, D)
     # A running sum has the same bits whatever the number of joints of other arms.
     return np.cumsum(lever * (backlash / 2.0)[:, None], axis=-1)[..., -1]
+
+
+def deflections_over_reach(postures: ReachPostures, stiffness: Stiffness, payload: float) -> Array:
+    """Return (F,) how far weight and a payload [kg] move the tip at fractions of the reach [m]; NaN without postures.
+
+    The largest value of all postures found counts.
+    """
+
+    def moved(arms: ArmArrays, frames: Frames) -> Array:
+        by_payload = payload * tip_displacements(arms, frames, unit_payload(arms, frames), stiffness)
+        own = tip_displacements(arms, frames, own_loads(arms, frames), stiffness)
+        return np.linalg.norm(own + by_payload, axis=-1)
+
+    return _largest_over_reach(postures, moved)
+
+
+def backlash_over_reach(postures: ReachPostures, backlash: Array) -> Array:
+    """Return (F,) how far half of the backlash (1, D) moves the tip at most [m]; NaN without postures."""
+    return _largest_over_reach(postures, lambda arms, frames: backlash_errors(arms, frames, backlash))
+
+
+def _largest_over_reach(postures: ReachPostures, measure: Callable[[ArmArrays, Frames], Array]) -> Array:
+    """Return (F,) the largest measure (1, K) of the postures at each fraction of the reach; NaN without any."""
+    largest = np.full(len(postures.targets), np.nan)
+    for found, is_there in postures.found():
+        values = measure(postures.arms, forward_kinematics(postures.arms, found.q.astype(np.float64)))[0]
+        largest = np.fmax(largest, np.where(is_there, values, np.nan))
+    return np.fmax.reduce(postures.by_fraction(largest), axis=1)
 
 
 def _of_links(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Stiffness) -> Array:

@@ -56,6 +56,12 @@ def count_assumed(assumed: Assumed) -> str:
 def describe_assumed(assumed: Assumed) -> str:
     """Return all assumed values on one line, with units."""
     return "; ".join(
-        f"{name}: " + ", ".join(f"{key.replace('_', ' ')} {value:.3g} {UNITS[key]}" for key, value in values.items())
+        f"{name}: "
+        + ", ".join(f"{key.replace('_', ' ')} {_rounded(value)} {UNITS[key]}" for key, value in values.items())
         for name, values in assumed.items()
     )
+
+
+def _rounded(value: float) -> str:
+    """Return a value with three significant digits, a large one without an exponent."""
+    return f"{value:.3g}" if value < 1e3 else f"{value:,.0f}"

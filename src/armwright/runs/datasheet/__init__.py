@@ -1,0 +1,1 @@
+"""The data sheet of a design or of an existing arm."""

@@ -1,0 +1,128 @@
+"""Pages and HTML of data sheets: nothing overlaps, nothing is cut, nothing is run."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import matplotlib
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from armwright.report.datasheet import write_datasheet
+from armwright.report.datasheet_html import to_html
+from armwright.report.datasheet_pdf import draw_pages
+from armwright.report.datasheet_tables import number
+from armwright.report.style import RC
+from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.robot.urdf_reader import UrdfArm
+from armwright.runs.datasheet.sheet import DataSheet, JointLine, LinkLine, MassLine, Part, Sensitivity
+from armwright.runs.datasheet.urdf_sheet import urdf_sheet
+
+LONG = "XW540-T260-with-a-very-long-name-1234567"
+
+
+def small_sheet() -> DataSheet:
+    joints = tuple(Joint("revolute", axis, -2.0, 2.0) for axis in ("z", "y", "y"))
+    links = tuple(uniform_link((0.0, 0.0, length), 0.2, 0.01) for length in (0.1, 0.3, 0.2))
+    arm = Arm((0.0, 0.0, 0.1), joints, links)
+    return urdf_sheet(UrdfArm("small", arm, "base", "tip", ("a", "b", "c"), (1.0,) * 3, (0.0,) * 3))
+
+
+def large_sheet() -> DataSheet:
+    """As much as a design can have: eight joints, with long names, and every change possible or not."""
+    joint = JointLine(1, "joint_1", "revolute", "y", LONG, -2.4, 2.4, (-1.0, 1.0), (1.4, 1.4), 12.3, 4.5, 1.2)
+    impossible = Sensitivity("tube 1", "next stiffer", "60x2 is the stiffest of the space")
+    change = Sensitivity("actuator 1", f"{LONG} → {LONG}", "", 1e-3, -2e-4, 3e-5, 0.1, -100.0, ("deflection <= 1",) * 3)
+    source = "https://example.org/" + "a-long-path/" * 9
+    part = Part(LONG, 3, 1234.5, 3703.5, "A maker of coreless servos, 123.4 g each", source, "price of a reseller")
+    return replace(
+        small_sheet(),
+        design=12345,
+        joint_letters="YPPRPRPR",
+        status="verified",
+        survival="holds all but: " + "payload +10 % (thermal_utilisation 1.007 > 1), " * 5,
+        objectives=dict.fromkeys(("thermal_utilisation", "mass", "price", "torque", "length"), (1.0, "of allowed")),
+        joints=tuple(replace(joint, number=n) for n in range(1, 9)),
+        links=tuple(LinkLine(n, 0.123, 0.02, 0.001, 0.1) for n in range(1, 9)),
+        masses=tuple(MassLine(name, 0.1) for name in ("actuators", "column", "tool", *(f"link {n}" for n in range(8)))),
+        parts=(part,) * 8,
+        sensitivities=(change,) * 16 + (impossible,) * 8,
+        assumptions={f"assumption {n}": "a sentence about what is assumed of the values, " * 4 for n in range(8)},
+    )
+
+
+@pytest.fixture(scope="module", params=[small_sheet, large_sheet])
+def sheet(request: pytest.FixtureRequest) -> DataSheet:
+    return request.param()
+
+
+def boxes(page: Figure) -> Iterator[tuple[str, matplotlib.transforms.Bbox]]:
+    """The text of a page and of its drawings."""
+    FigureCanvasAgg(page).draw()
+    texts = list(page.texts)
+    for axes in page.axes:
+        texts += [*axes.texts, axes.title, axes.xaxis.label, axes.yaxis.label]
+        for index, axis in enumerate((axes.xaxis, axes.yaxis)):
+            low, high = axis.get_view_interval()
+            texts += [tick for tick in axis.get_ticklabels() if low <= tick.get_position()[index] <= high]
+    for text in texts:
+        if text.get_text().strip() and text.get_visible():
+            yield text.get_text(), text.get_window_extent()
+
+
+def test_no_text_overlaps_or_leaves_the_page(sheet: DataSheet) -> None:
+    with matplotlib.rc_context(RC):
+        for page in draw_pages(sheet):
+            found = list(boxes(page))
+            assert len(found) > 20
+            for text, box in found:
+                assert box.x0 >= 0 and box.y0 >= 0, text  # noqa: PT018
+                assert box.x1 <= page.bbox.x1 and box.y1 <= page.bbox.y1, text  # noqa: PT018
+            for (one, first), (other, second) in combinations(found, 2):
+                across = min(first.x1, second.x1) - max(first.x0, second.x0)
+                along = min(first.y1, second.y1) - max(first.y0, second.y0)
+                assert min(across, along) < 2.0, (one, other)
+
+
+@pytest.mark.slow
+def test_pdf_has_two_pages_and_is_the_same_each_time(sheet: DataSheet, tmp_path: Path) -> None:
+    written = [write_datasheet(sheet, tmp_path / name) for name in "ab"]
+    for first, second in zip(*written, strict=True):
+        assert first.read_bytes() == second.read_bytes()
+    assert written[0][1].read_bytes().count(b"/Type /Page ") == 2
+
+
+def test_html_shows_what_the_space_file_says_as_text(sheet: DataSheet) -> None:
+    part = Part("<script>alert(1)</script>", 1, detail='"><img src=x>', source="javascript:alert(1)")
+    page = to_html(replace(sheet, parts=(part,), name="<b>", not_modelled="nothing"))
+    assert "<script" not in page
+    assert "<img src=x>" not in page
+    assert "<b>" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+    assert "http" not in page.split("</head>")[0].replace("http-equiv", "")
+
+
+def test_html_states_each_key_figure(sheet: DataSheet) -> None:
+    page = to_html(sheet)
+    assert "horizontal reach" in page
+    assert "not stated (a URDF states no price)" in page
+
+
+@pytest.mark.parametrize(
+    ("value", "factor", "shown"),
+    [
+        (8.223e-8, 1e3, "0"),
+        (0.0, 1.0, "0"),
+        (-8e-8, 1.0, "0"),
+        (0.0123456, 1.0, "0.012"),
+        (1.23456, 1.0, "1.23"),
+        (12.3456, 1.0, "12.3"),
+        (0.5279, 1e3, "528"),
+        (12345.6, 1.0, "12,346"),
+        (None, 1.0, "not stated"),
+    ],
+)
+def test_numbers_have_sensible_digits(value: float | None, factor: float, shown: str) -> None:
+    assert number(value, factor) == shown
