@@ -11,7 +11,14 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from armwright.cli import experiment_commands, input_commands, output_commands, search_commands, simulate_command
+from armwright.cli import (
+    experiment_commands,
+    input_commands,
+    output_commands,
+    reach_map_command,
+    search_commands,
+    simulate_command,
+)
 from armwright.cli.signals import INTERRUPTED, install_handlers, open_closed_streams
 from armwright.exceptions import ArmwrightError
 
@@ -41,6 +48,7 @@ COMMANDS = {
         output_commands.pick,
         output_commands.export,
         simulate_command.simulate,
+        reach_map_command.reach_map,
         experiment_commands.compare,
         experiment_commands.compare_arms,
         experiment_commands.runs,

@@ -8,12 +8,15 @@ A. Kumar, K. J. Waldron: The workspaces of a mechanical manipulator, ASME J. Mec
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError
+from armwright.files import naming_write_errors
 from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.reachable_poses import (
     FoundPoses,
@@ -91,6 +94,32 @@ class ReachMap:
     bare: PoseCoverage
     usable: PoseCoverage
 
+    def coordinates(self, axis: int) -> Array:
+        """Return the (n,) coordinates of the points along x, y or z (0, 1 or 2) [m]."""
+        return np.moveaxis(self.points.reshape(*self.shape, 3), axis, 0)[:, 0, 0, axis]
+
+    def save(self, file: str | Path) -> None:
+        """Write the map as NumPy arrays (npz): points, shape, spacing, directions, and those of both coverages."""
+        arrays: dict[str, Any] = {
+            f"{prefix}{name}": values
+            for prefix, coverage in (("", self.bare), ("usable_", self.usable))
+            for name, values in (
+                ("reached", coverage.reached),
+                ("covered", coverage.covered),
+                ("share", coverage.share),
+                ("q", coverage.q.astype(np.float32)),
+            )
+        }
+        with naming_write_errors(Path(file)), Path(file).open("wb") as stream:
+            np.savez_compressed(
+                stream,
+                points=self.points,
+                shape=np.array(self.shape),
+                spacing=np.array(self.spacing),
+                directions=self.directions,
+                **arrays,
+            )
+
 
 def reach_map(
     arm: Arm | UrdfArm,
@@ -123,7 +152,8 @@ def reach_map(
             ignore torques.
         clearance: Least distance of the arm from itself and from obstacles [m]; None for 0 with obstacles, and to
             ignore it without.
-        obstacles: Obstacles, such as those of a task.
+        obstacles: Obstacles, such as those of a task. Links, motors and the tip have to be outside; the tool itself is
+            ignored.
         tolerance: Distance below which a point is reached [m].
         angle_tolerance: Angle below which a direction is reached [rad].
 

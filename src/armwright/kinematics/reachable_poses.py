@@ -108,9 +108,11 @@ class PoseSearch:
 
     def find_usable(self, bare: FoundPoses, conditions: PostureConditions) -> FoundPoses:
         """Find those of the poses found without conditions that also satisfy them."""
-        reached, q = self._flood(self.points, self.directions, conditions, bare.reached, bare.q)
+        solids = [obstacle.solid for obstacle in conditions.obstacles]  # in which the tip cannot be
+        free = np.all([np.ones(len(self.points)), *(~solid.contains(self.points) for solid in solids)], axis=0)
+        reached, q = self._flood(self.points, self.directions, conditions, bare.reached & free[:, None], bare.q)
         covered = reached.any(axis=1)
-        also = self._flood(self.points, None, conditions, (bare.covered & ~covered)[:, None])[0]
+        also = self._flood(self.points, None, conditions, (bare.covered & free & ~covered)[:, None])[0]
         return FoundPoses(reached, covered | also[:, 0], q)
 
     def _flood(
