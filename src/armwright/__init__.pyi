@@ -12,6 +12,7 @@ from .experiments.compare_arms import (
     compare_arms as compare_arms,
 )
 from .experiments.compare_runs import Comparison as Comparison, compare_runs as compare_runs
+from .kinematics.reach_map import PoseCoverage as PoseCoverage, ReachMap as ReachMap, reach_map as reach_map
 from .kinematics.solve import Solutions as Solutions, solve as solve
 from .llm.draft import Draft as Draft, draft as draft
 from .llm.model_options import ModelOptions as ModelOptions, PromptOptions as PromptOptions

@@ -71,6 +71,8 @@ FILES = {
                             "six-axis.yaml": "joints: 6\n"},
 }  # fmt: skip
 BEFORE = {
+    "docs/inverse-kinematics.md": [f"armwright optimize target-1 {SHORT} --out runs/mine",
+                                   "armwright export runs/mine --out my-arm.urdf"],
     "docs/exports.md": [f"armwright optimize target-1 {SHORT}"],
     "docs/page.md": [f"armwright optimize target-1 {SHORT} --out runs/{name}" for name in "ab"],
     "docs/language-models.md": [f"armwright optimize target-1 {SHORT} --out runs/mine"],

@@ -16,6 +16,7 @@ from armwright.cli import (
     experiment_commands,
     input_commands,
     output_commands,
+    reach_map_command,
     search_commands,
     simulate_command,
 )
@@ -49,6 +50,7 @@ COMMANDS = {
         output_commands.export,
         simulate_command.simulate,
         datasheet_command.datasheet,
+        reach_map_command.reach_map,
         experiment_commands.compare,
         experiment_commands.compare_arms,
         experiment_commands.runs,

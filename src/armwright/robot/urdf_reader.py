@@ -54,6 +54,10 @@ class UrdfArm:
         """Return the values (..., J) of the URDF's joints for those of the arm (..., J) [rad] or [m]."""
         return np.asarray(q) * self.signs + self.zeros
 
+    def values_in_arm(self, q: Sequence[float] | Array) -> Array:
+        """Return the values (..., J) of the arm's joints for those of the URDF (..., J) [rad] or [m]."""
+        return (np.asarray(q) - self.zeros) * self.signs
+
 
 def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = None) -> UrdfArm:
     """Read the serial arm of a URDF file.
