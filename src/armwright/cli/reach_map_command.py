@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.options import Json
-from armwright.cli.streams import open_console, plain_table, print_json
+from armwright.cli.streams import open_console, print_json
+from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
@@ -212,16 +213,13 @@ def _show(record: dict[str, Any]) -> None:
     console = open_console()
     console.print(f"{record['points']:,} points {record['spacing']:.3g} m apart, {record['directions']} directions")
     share = "all directions" if record["share"] >= 1.0 else f">= {100 * record['share']:g} % of directions"
-    numbers = ("reached [m³]", f"in {share} [m³]", "poses [%]")
-    table = plain_table("postures", *numbers, right=numbers)
-    rows: Sequence[tuple[str, Any]] = (
-        ("within joint limits", record["within_limits"]),
-        (record["conditions"], record["usable"]),
-    )
-    for name, values in rows:
-        if values is not None:
-            cells = (f"{values['volume']:.3g}", f"{values['dexterous_volume']:.3g}", f"{100 * values['poses']:.1f}")
-            table.add_row(name, *cells)
-    console.print(table)
+    columns = (Column("postures", least=24), *numbers("reached [m³]", f"in {share} [m³]", "poses [%]"))
+    conditions = {"within joint limits": record["within_limits"], record["conditions"]: record["usable"]}
+    rows = [
+        (name, f"{values['volume']:.3g}", f"{values['dexterous_volume']:.3g}", f"{100 * values['poses']:.1f}")
+        for name, values in conditions.items()
+        if values is not None
+    ]
+    print_table(console, Table(columns, rows, "--json prints all"))
     for file in record["files"]:
         console.print(str(file))

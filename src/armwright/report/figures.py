@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator, NullFormatter, StrMethodFormatter
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
@@ -150,7 +150,7 @@ def draw_search(history: History, search: Mapping[str, Any]) -> Figure:
     evaluations, volumes = np.array(search["hypervolume_history"]).T
     axes.step(evaluations, volumes, where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")  # the usual one writes markup
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))  # the usual one writes markup
     axes.xaxis.set_minor_formatter(NullFormatter())
     _label_hypervolume(axes, history, "Designs evaluated")
     return figure
