@@ -1,7 +1,6 @@
 """The command that maps in which directions an arm holds its tool: reach-map."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
