@@ -190,7 +190,7 @@ def test_version_and_help() -> None:
     assert commands == [
         *("init", "check", "tasks", "actuators", "draft"),
         *("design", "optimize", "refine", "experiment"),
-        *("pick", "export", "simulate", "datasheet", "compare", "compare-arms", "runs"),
+        *("pick", "export", "simulate", "datasheet", "reach-map", "compare", "compare-arms", "runs"),
         *("report", "live", "prompt", "doctor"),
     ]
     assert "--n-step" in armwright("optimize", "--help").stdout
