@@ -34,6 +34,8 @@ NO_WORKSPACE = (
     "uncovered_fraction needs a workspace in the task; try workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
 )
 
+CYCLE_GAP = 1e-4  # [m] that bodies keep along a cycle, because drives and samples are a little off its path
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -222,6 +224,11 @@ class Evaluation(Scene):
     def clearance(self) -> Array:
         """(N, T) the smaller of both [m]; below 0 where the arm is in an obstacle or in itself."""
         return np.minimum(*self._clearances)
+
+    @property
+    def penetration(self) -> Array:
+        """(N, T) how deep the arm is in an obstacle or in itself [m]; in a cycle from CYCLE_GAP apart."""
+        return np.maximum(0.0, (0.0 if self.plan is None else CYCLE_GAP) - self.clearance)
 
     @cached_property
     def _clearances(self) -> tuple[Array, Array]:

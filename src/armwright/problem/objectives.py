@@ -9,7 +9,7 @@ from armwright.exceptions import SettingsError, did_you_mean
 from armwright.kinematics.arm_arrays import FIXED
 from armwright.problem import compliance_quantities as compliance
 from armwright.problem import drive_quantities as drives
-from armwright.problem.evaluation import Evaluation
+from armwright.problem.evaluation import CYCLE_GAP, Evaluation
 from armwright.problem.objective import Objective
 from armwright.tasks.targets import REACHED
 
@@ -132,8 +132,8 @@ COLLISION = Objective(
     name="collision",
     unit="m",
     description="how deep the arm in the kept posture is in an obstacle or in itself, at the worst place; 0 where it "
-    "is free",
-    each=lambda e: np.maximum(0.0, -e.clearance),
+    f"is free, which along a cycle takes a gap of {1e3 * CYCLE_GAP:g} mm",
+    each=lambda e: e.penetration,
 )
 CLEARANCE_SHORTFALL = Objective(
     name="clearance_shortfall",

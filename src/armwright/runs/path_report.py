@@ -15,7 +15,7 @@ from armwright.kinematics.forward import forward_kinematics
 from armwright.kinematics.ik import solve_postures
 from armwright.kinematics.jacobian import jacobians
 from armwright.kinematics.motion_path import MotionPath
-from armwright.problem.evaluation import Evaluation
+from armwright.problem.evaluation import CYCLE_GAP, Evaluation
 from armwright.tasks.motions import CyclePlan
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.targets import REACHED
@@ -115,9 +115,10 @@ def describe_faults(evaluation: Evaluation, row: int) -> str:
         if name in extremes and extremes[name].value > bound:
             faults.append(_describe(name, extremes[name]))
     clearance = extremes.get("clearance")
-    if clearance is not None and clearance.value < 0.0:
-        via = _avoid(paths, row, evaluation.obstacles)
-        faults.append(f"collision, {-1e3 * clearance.value:.3g} mm deep ({clearance.place}): {via}")
+    if clearance is not None and clearance.value < CYCLE_GAP:
+        via, depth = _avoid(paths, row, evaluation.obstacles), -1e3 * clearance.value
+        where = f"collision, {depth:.3g} mm deep" if depth > 0.0 else f"only {-depth:.2g} mm apart"
+        faults.append(f"{where} ({clearance.place}): {via}")
     return "; ".join(faults)
 
 
