@@ -13,6 +13,7 @@ from armwright.experiments.compare_arms import MEASURES, ArmComparison, Compared
 from armwright.experiments.runner import CellOutcome
 from armwright.extras import install_command, missing_packages
 from armwright.problem.objectives import TORQUE_SCALE
+from armwright.runs.datasheet.sheet import NOT_MODELLED
 from armwright.study.cluster import Workers
 
 
@@ -92,6 +93,7 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     )
     if comparison.designs and space.is_toy:
         console.print(f"the designs have toy masses ({space.mass_note}); torques compare only with real ones (`mass:`)")
+    _show_prices(console, comparison)
     if comparison.positions:
         within = " x ".join(f"[{low:g}, {high:g}]" for low, high in (space.origin_x, space.origin_y, space.origin_z))
         console.print(
@@ -110,6 +112,15 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
             console.print(f"  {line}")
     if drawn:
         console.print(f"redrawn: {', '.join(map(str, drawn))}")
+
+
+def _show_prices(console: Console, comparison: ArmComparison) -> None:
+    """Print the known prices, and what neither price nor mass of designs include."""
+    priced = [arm for arm in (*comparison.arms, *comparison.designs) if arm.price is not None]
+    if priced:
+        console.print("prices: " + ", ".join(f"{arm.name} {arm.price:,.2f} USD" for arm in priced))
+    if comparison.designs:
+        console.print(f"masses and prices of designs do not include {NOT_MODELLED}")
 
 
 _ARM_COLUMNS = {
