@@ -223,6 +223,22 @@ def test_unknown_price_and_effort_are_not_compared(tmp_path: Path) -> None:
     assert write_figures(tmp_path / "run")
 
 
+@pytest.mark.slow
+def test_stated_prices_are_compared_and_bounded(tmp_path: Path) -> None:
+    space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
+    task = TASK.model_copy(update={"constraints": ("price <= 20000",)})
+    problem = aw.Problem(task, space, objectives=named_objectives(["position_error", "price"]))
+    aw.optimize(problem, proposer="none", n_init=4, n_total=4, verify=False, out=tmp_path / "run")
+    prices = {"ur5_robot": 28_000.0, "panda": 15_000.0}
+    found = compare_arms(task, [UR5, PANDA], tmp_path / "run", base=(0.0, 0.0, 0.0), prices=prices)
+    ur5, panda = found.arms
+    assert (ur5.price, ur5.values[1], panda.price, panda.values[1]) == (28_000.0, 28_000.0, 15_000.0, 15_000.0)
+    assert ur5.violated == ("price <= 20000 (it has 28,000)",)
+    assert panda.violated == ()
+    assert panda.dominates is not None
+    assert {design.price for design in found.designs} == {3 * 482.89}
+
+
 def test_violated_constraints_exclude_an_arm_from_the_front(tmp_path: Path) -> None:
     """A violated constraint is listed with its value; the clearance of a URDF is unknown."""
     task = TASK.model_copy(update={"constraints": ("mass <= 19", "self_clearance >= 0.01")})
@@ -321,10 +337,18 @@ def test_arm_names_without_network_or_package_are_refused(tmp_path: Path, monkey
 
 def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder: Path) -> None:
     Path("task.yaml").write_text(json.dumps(TASK.model_dump(mode="json", exclude_none=True)))
-    done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run, "--no-figures")
+    done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run, "--no-figures", "--price", "panda=15000")
     assert done.returncode == 0, done.stderr
     assert "…" not in done.stdout
-    for word in ("ur5_robot", "panda", "1,500 positions", "of the front, dominated by", 'tip is the link "ee_link"'):
+    for word in (
+        "ur5_robot",
+        "panda",
+        "1,500 positions",
+        "of the front, dominated by",
+        "panda 15,000.00 USD",
+        "do not include housings",
+        'tip is the link "ee_link"',
+    ):
         assert word in done.stdout
     told = json.loads(
         armwright("compare-arms", "task.yaml", UR5, "--run", run, "--base", "0,0.1,0", "--no-figures", "--json").stdout
@@ -335,6 +359,9 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
     for args, words in (
         (("task.yaml", UR5, "--base", "0,0"), '--base "0,0": expected three numbers with commas'),
         (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),
+        (("task.yaml", UR5, "--price", "ur5"), '--price "ur5": expected ARM=USD'),
+        (("task.yaml", UR5, "--price", "ur5_rob=1e4"), 'unknown arm "ur5_rob". Did you mean "ur5_robot"?'),
+        (("task.yaml", UR5, "--price", "ur5_robot=-1"), "expected a finite number of at least 0 USD, got -1.0"),
         (("target-1", UR5, "--run", run), "with other targets, another tool or other payloads"),
     ):
         done = armwright("compare-arms", *args)

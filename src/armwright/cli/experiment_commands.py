@@ -176,6 +176,10 @@ def compare_arms(
     space: SpaceFile = None,
     figures: Figures = True,
     seed: Annotated[int, typer.Option(help="Seed of the base search.")] = 0,
+    price: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ARM=USD", help="Price of an existing arm, such as ur5e=28000 (may be repeated)."),
+    ] = None,
     json_: Json = False,
     csv_: Csv = False,
 ) -> None:
@@ -194,6 +198,7 @@ def compare_arms(
         tip=tip,
         base_link=base_link,
         seed=seed,
+        prices=dict(map(_parse_price, price or ())),
     )
     drawn: list[Path] = []
     if run is not None and figures:
@@ -207,6 +212,17 @@ def compare_arms(
         print_csv(arm_rows(compared))
     else:
         show_arms(open_console(), compared, drawn)
+
+
+def _parse_price(text: str) -> tuple[str, float]:
+    """Parse `ur5e=28000` into the name of an arm and its price [USD]."""
+    name, _, price = text.rpartition("=")
+    try:
+        if name:
+            return name, float(price)
+    except ValueError:
+        pass
+    raise SettingsError(f'--price "{text}": expected ARM=USD, such as ur5e=28000')
 
 
 def _parse_point(text: str) -> tuple[float, float, float]:

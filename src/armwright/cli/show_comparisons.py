@@ -19,6 +19,7 @@ from armwright.extras import install_command, missing_packages
 from armwright.problem.objectives import TORQUE_SCALE
 from armwright.report.table_cells import remarks_on
 from armwright.report.tables import markdown, sections
+from armwright.runs.datasheet.sheet import NOT_MODELLED
 from armwright.study.cluster import Workers
 
 
@@ -127,6 +128,7 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     )
     if comparison.designs and space.is_toy:
         console.print(f"the designs have toy masses ({space.mass_note}); torques compare only with real ones (`mass:`)")
+    _show_prices(console, comparison)
     if comparison.positions:
         within = " x ".join(f"[{low:g}, {high:g}]" for low, high in (space.origin_x, space.origin_y, space.origin_z))
         console.print(
@@ -156,6 +158,7 @@ def arm_rows(comparison: ArmComparison) -> Iterator[dict[str, Any]]:
             "joints": arm.joints,
             "reach": arm.reach,
             "mass": arm.mass,
+            "price": "" if arm.price is None else arm.price,
             **dict(zip(("base_x", "base_y", "base_z"), arm.base, strict=True)),
             **arm.measures,
             **dict(zip(names, arm.values, strict=True)),
@@ -163,6 +166,15 @@ def arm_rows(comparison: ArmComparison) -> Iterator[dict[str, Any]]:
             "dominated_by": arm.dominated_by,
             "violated": "; ".join(arm.violated),
         }
+
+
+def _show_prices(console: Console, comparison: ArmComparison) -> None:
+    """Print the known prices, and what neither price nor mass of designs include."""
+    priced = [arm for arm in (*comparison.arms, *comparison.designs) if arm.price is not None]
+    if priced:
+        console.print("prices: " + ", ".join(f"{arm.name} {arm.price:,.2f} USD" for arm in priced))
+    if comparison.designs:
+        console.print(f"masses and prices of designs do not include {NOT_MODELLED}")
 
 
 _ARM_COLUMNS = {

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 
-from armwright.exceptions import RunFolderError, SettingsError, TaskError
+from armwright.exceptions import RunFolderError, SettingsError, TaskError, did_you_mean
 from armwright.experiments.base_placement import N_POSITIONS, known_values, placed_at, search_base, with_travel
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.pareto import front_indices, knee_index, paper_solution_indices
@@ -22,6 +22,7 @@ from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     PEAK_TORQUE,
     POSITION_ERROR,
+    PRICE,
     TORQUE,
     TORQUE_UTILISATION,
     UNREACHED_TARGETS,
@@ -37,6 +38,7 @@ from armwright.spaces.design_space import DesignSpace, default_space
 from armwright.spaces.tool_mount import with_tool
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
+from armwright.text import rounded
 
 EXISTING_ARMS = "existing_arms.json"  # in a run folder: the arms of its last comparison
 MEASURES = (POSITION_ERROR, TORQUE, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, TORQUE_UTILISATION)
@@ -50,6 +52,7 @@ class ComparedArm:
     values: of the problem's objectives; None if unknown, such as a price.
     measures: of the quantities in `MEASURES`, by name.
     dominates, dominated_by: numbers of designs on the run's front, see `dominance_counts`; None without a run.
+    price: of an existing arm as stated, of a design that of its parts with a price [USD]; None if unknown.
     violated: constraints of the task that it violates. Such an arm is not compared with feasible designs.
     notes: assumptions, changes and missing data.
     """
@@ -67,6 +70,7 @@ class ComparedArm:
     dominated_by: int | None = None
     violated: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    price: float | None = None
 
 
 _ARMS = TypeAdapter(tuple[ComparedArm, ...])
@@ -102,6 +106,7 @@ def compare_arms(
     tip: str | None = None,
     base_link: str | None = None,
     seed: int = 0,
+    prices: Mapping[str, float] | None = None,
 ) -> ArmComparison:
     """Evaluate existing arms on a task exactly as designs are evaluated.
 
@@ -115,6 +120,7 @@ def compare_arms(
         tip: Link of the URDFs that has to reach the targets, see `read_urdf`.
         base_link: Link of the URDFs that stands at the base, see `read_urdf`.
         seed: Seed of the search for the base.
+        prices: Prices of arms by name [USD]; a URDF states none.
     """
     task = task if isinstance(task, Task) else load_task(task)
     if not arms:
@@ -124,13 +130,15 @@ def compare_arms(
     history = None if run is None else _history(Path(run), task, space)
     problem = Problem(task, space or default_space(task.name)) if history is None else history.problem
     described = [arm if isinstance(arm, UrdfArm) else read_urdf(find_urdf(arm), tip, base_link) for arm in arms]
+    names = _names(arms, described)
+    stated = _check_prices(prices or {}, names)
     placed: list[Arm] = []
     compared: list[ComparedArm] = []
-    for name, arm in zip(_names(arms, described), described, strict=True):
+    for name, arm in zip(names, described, strict=True):
         geared = with_tool(with_travel(arm.arm, problem.space.travel), problem.task.tool)
         position = search_base(problem, geared, seed) if base is None else base
         placed.append(placed_at(geared, position))
-        compared.append(_compared(problem, history, name, placed[-1], position, arm.notes))
+        compared.append(_compared(problem, history, name, placed[-1], position, arm.notes, stated.get(name)))
     result = ArmComparison(
         problem=problem,
         arms=tuple(compared),
@@ -216,20 +224,43 @@ def _names(arms: Sequence[str | Path | UrdfArm], described: Sequence[UrdfArm]) -
     return [whole if short.count(name) > 1 else name for name, whole in zip(short, long, strict=True)]
 
 
+def _check_prices(prices: Mapping[str, float], names: Sequence[str]) -> Mapping[str, float]:
+    """Return the prices; SettingsError if one is of no arm, or no price."""
+    for name, price in prices.items():
+        if name not in names:
+            raise SettingsError(
+                f'price of an unknown arm "{name}".{did_you_mean(name, names)} Arms: {", ".join(names)}'
+            )
+        if not 0.0 <= price < np.inf:
+            raise SettingsError(f"price of {name}: expected a finite number of at least 0 USD, got {price}")
+    return prices
+
+
 def _compared(
-    problem: Problem, history: History | None, name: str, arm: Arm, base: Vector, notes: Sequence[str] = ()
+    problem: Problem,
+    history: History | None,
+    name: str,
+    arm: Arm,
+    base: Vector,
+    notes: Sequence[str] = (),
+    price: float | None = None,
 ) -> ComparedArm:
+    """Evaluate a placed arm; price: as stated [USD], in place of that of its parts."""
     evaluation = problem.physics_of_arms(stack_arms([arm]))
-    values = tuple(_value(objective, evaluation, minimised=True) for objective in problem.objectives)
-    bounds = [(constraint, _value(constraint.quantity, evaluation)) for constraint in problem.constraints]
+
+    def value(quantity: Objective, minimised: bool = False) -> float | None:
+        return price if quantity == PRICE and price is not None else _value(quantity, evaluation, minimised)
+
+    values = tuple(value(objective, minimised=True) for objective in problem.objectives)
+    bounds = [(constraint, value(constraint.quantity)) for constraint in problem.constraints]
     violated = tuple(
-        f"{constraint.description} (it has {value:.3g})"
-        for constraint, value in bounds
-        if value is not None and float(constraint(evaluation)[0]) > 0.0
+        f"{constraint.description} (it has {rounded(measured)})"
+        for constraint, measured in bounds
+        if measured is not None and float(constraint.violation(np.array(measured))) > 0.0
     )
-    unknown = [o.name for o, value in zip(problem.objectives, values, strict=True) if value is None]
+    unknown = [o.name for o, one in zip(problem.objectives, values, strict=True) if one is None]
     notes = [*notes, *(f"{name} unknown, so the arm cannot be compared with the front" for name in unknown)]
-    notes += [f"unknown whether it meets {constraint.description}" for constraint, value in bounds if value is None]
+    notes += [f"unknown whether it meets {constraint.description}" for constraint, one in bounds if one is None]
     counts = None if history is None else dominance_counts(values, violated, history)
     dominates, dominated_by = counts or (None, None)
     return ComparedArm(
@@ -244,6 +275,7 @@ def _compared(
         dominated_by=dominated_by,
         violated=violated,
         notes=tuple(notes),
+        price=value(PRICE),
     )
 
 

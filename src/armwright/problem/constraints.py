@@ -45,7 +45,11 @@ class Constraint:
 
     def __call__(self, evaluation: Evaluation) -> Array:
         """Return the (N,) violations of arms, divided by the scale; satisfied at <= 0."""
-        excess = self.quantity(evaluation) - self.bound
+        return self.violation(self.quantity(evaluation))
+
+    def violation(self, values: Array) -> Array:
+        """Return the violations of the quantity's values, divided by the scale; satisfied at <= 0."""
+        excess = values - self.bound
         return (excess if self.relation == "<=" else -excess) / self.scale
 
     def measured(self, violation: float) -> float:

@@ -9,6 +9,7 @@ from armwright.problem.objectives import BACKLASH_ERROR, STIFFNESS_QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import UNITS, ActuatorRecord, value_of
 from armwright.robot.arm import Arm
+from armwright.text import rounded
 
 STATIC = ("mass", "stall_torque", "peak_torque")
 ALONG_CYCLE = (
@@ -57,11 +58,6 @@ def describe_assumed(assumed: Assumed) -> str:
     """Return all assumed values on one line, with units."""
     return "; ".join(
         f"{name}: "
-        + ", ".join(f"{key.replace('_', ' ')} {_rounded(value)} {UNITS[key]}" for key, value in values.items())
+        + ", ".join(f"{key.replace('_', ' ')} {rounded(value)} {UNITS[key]}" for key, value in values.items())
         for name, values in assumed.items()
     )
-
-
-def _rounded(value: float) -> str:
-    """Return a value with three significant digits, a large one without an exponent."""
-    return f"{value:.3g}" if value < 1e3 else f"{value:,.0f}"

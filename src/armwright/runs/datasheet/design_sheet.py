@@ -24,6 +24,7 @@ from armwright.runs.results import read_summary
 from armwright.runs.selection import pick
 from armwright.runs.simulation_files import SIMULATION
 from armwright.runs.supply_record import supply_of
+from armwright.text import rounded
 
 NO_ACTUATORS = "the space names no actuators"
 
@@ -121,7 +122,7 @@ def _violated(history: History, number: int) -> tuple[str, ...]:
     if trial.failure is not None:
         return (f"its evaluation failed: {trial.failure.reason}",)
     return tuple(
-        f"{constraint.description} (it has {constraint.measured(violation):.3g})"
+        f"{constraint.description} (it has {rounded(constraint.measured(violation))})"
         for constraint, violation in zip(history.problem.constraints, trial.violations, strict=True)
         if violation > 0.0
     )
