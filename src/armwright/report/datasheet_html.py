@@ -25,7 +25,7 @@ h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin: 1.6rem 0 0.4rem; }
 .pair img { flex: 1 1 20rem; max-width: 100%; min-width: 0; }
 table { border-collapse: collapse; font-size: 0.85rem; }
 th, td { padding: 0.15rem 0.6rem 0.15rem 0; border-bottom: 1px solid #ddd; text-align: right; vertical-align: top; }
-th { border-bottom-color: #111; } .left { text-align: left; } p, li { font-size: 0.85rem; }
+th { border-bottom-color: #111; } .left { text-align: left; } p, li { font-size: 0.85rem; overflow-wrap: anywhere; }
 @media print { body { margin: 0; } h2, tr, img { break-inside: avoid; } }
 """
 
