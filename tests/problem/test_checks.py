@@ -330,6 +330,7 @@ def test_approach_beyond_reach_is_proven() -> None:
         ({"constraints": ["thermal_utilisation <= 1"]}, "objective thermal_utilisation needs actuators"),
         ({"objectives": ["path_error"]}, "need a cycle"),
         ({"objectives": ["uncovered_fraction"]}, "needs a workspace"),
+        ({"objectives": ["undexterous_fraction"]}, "need a workspace with directions"),
         (
             {"objectives": ["cycle_time"], "targets": [HERE, [0.4, 0, 0]], "cycle": "in_order"},
             "need the duration of each step",

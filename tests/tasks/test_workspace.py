@@ -12,10 +12,12 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import SettingsError, TaskError
+from armwright.kinematics.solve import solve
 from armwright.problem.evaluation import Evaluation, evaluate
-from armwright.problem.objectives import OBJECTIVES, UNCOVERED_FRACTION
+from armwright.problem.objectives import DEXTEROUS_VOLUME, OBJECTIVES, UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION
 from armwright.problem.problem import Outcomes, Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.rotations import cone_directions
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.catalogue import load_task, random_task
 from armwright.tasks.task import Task
@@ -210,3 +212,80 @@ def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
         app, ["optimize", "cover.yaml", "--objectives", "torque", "--n-total", "2", "--no-figures", "--out", "other"]
     )
     assert "no objective or constraint uses the task's workspace; quantities for it: uncovered_fraction" in told.output
+
+
+# Directions of the tool
+
+
+CONE: dict[str, Any] = {"axis": (0, 0, 1), "half_angle": 0.6, "count": 9, "share": 0.5}
+
+
+@pytest.mark.slow
+def test_dexterous_volume_is_that_of_many_restarts() -> None:
+    box = region(low=(-0.3, -0.3, 0.0), high=(0.3, 0.3, 0.3), points=40, directions=CONE)
+    arms = [paper_space(6).arm(design) for design in paper_space(6).sample(4, 1)]
+    together = evaluate(arms, [[0.1, 0.2, 0.3]], workspace=[box])
+    points = sample_regions((box,))
+    for arm, value in zip(arms, DEXTEROUS_VOLUME(together), strict=True):
+        alone = evaluate(arm, [[0.1, 0.2, 0.3]], workspace=[box])
+        assert DEXTEROUS_VOLUME(alone)[0] == value, "independent of the batch"
+        assert UNDEXTEROUS_FRACTION(alone)[0] == 1.0 - value
+        axes = np.tile(cone_directions(CONE["axis"], 0.6, 9), (40, 1))
+        peer = (
+            solve(arm, np.repeat(points, 9, axis=0), axes=axes, restarts=40, angle_tolerance=np.radians(1.0))
+            .reached[0]
+            .reshape(40, 9)
+        )
+        assert value == pytest.approx((peer.mean(axis=1) >= 0.5).mean(), abs=0.05)
+
+
+def test_dexterous_volume_of_padded_arms_is_their_own() -> None:
+    box = region(low=(-0.4, -0.4, 0.0), high=(0.4, 0.4, 0.4), points=20, directions=CONE)
+    short, long = paper_space(5).arm(paper_space(5).sample(1, 2)[0]), paper_space(7).arm(paper_space(7).sample(1, 2)[0])
+    both = evaluate([short, long], [[0.1, 0.2, 0.3]], workspace=[box])
+    alone = evaluate(short, [[0.1, 0.2, 0.3]], workspace=[box])
+    assert DEXTEROUS_VOLUME(both)[0] == DEXTEROUS_VOLUME(alone)[0]
+
+
+def test_regions_without_directions_do_not_count() -> None:
+    (arm,) = (paper_space(6).arm(design) for design in paper_space(6).sample(1, 1))
+    asked = region(points=20, directions=CONE)
+    first, second = (evaluate(arm, [[0.1, 0.2, 0.3]], workspace=boxes) for boxes in ([asked], [asked, region()]))
+    assert np.array_equal(DEXTEROUS_VOLUME(first), DEXTEROUS_VOLUME(second))
+    with pytest.raises(SettingsError, match="need a workspace with directions in the task; try workspace: "):
+        DEXTEROUS_VOLUME(evaluate(arm, [[0.1, 0.2, 0.3]], workspace=[region()]))
+
+
+def test_tasks_bound_and_minimise_directions_of_the_tool() -> None:
+    box = {"low": (-0.3, -0.3, 0.1), "high": (0.3, 0.3, 0.4), "points": 10, "directions": CONE}
+    asked = task(workspace=box, objectives=["undexterous_fraction", "length"], constraints=["dexterous_volume >= 0.5"])
+    assert Task.model_validate(asked.model_dump(mode="json")) == asked
+    problem = Problem(asked, paper_space(6))
+    outcomes = problem.evaluate(problem.space.sample(5, 3))
+    fraction = outcomes.values[:, 0]
+    assert np.all((fraction >= 0.0) & (fraction <= 1.0))
+    assert np.array_equal(outcomes.violations[:, 0] > 0.0, 1.0 - fraction < 0.5)
+
+
+def test_unstated_directions_leave_a_region_as_it_was() -> None:
+    assert region().describe() == "box from (0, 0, 0) to (1, 1, 1), 200 points"
+    assert region(directions={}).describe().endswith("200 points, 12 tool directions within 180° of (0, 0, -1)")
+
+
+@pytest.mark.parametrize(
+    ("directions", "message"),
+    [
+        ("{axis: [0, 0, 0]}", r"axis = \[0.0, 0.0, 0.0\] is no direction; try \[0, 0, -1\]"),
+        ("{axis: down}", "axis"),
+        ("{half_angle: 45}", "half_angle"),
+        ("{count: 0}", "count"),
+        ("{share: 0}", "share"),
+        ("{cone: 1}", "cone"),
+        ("{count: 100}", "workspace: expected at most 50000 points x directions in all boxes together, got 60000"),
+    ],
+)
+def test_invalid_directions_are_refused_in_one_line(directions: str, message: str) -> None:
+    text = f"name: x\nworkspace: {{low: [0, 0, 0], high: [1, 1, 1], points: 600, directions: {directions}}}"
+    with pytest.raises(TaskError, match=message) as refused:
+        parse_document(text, Task, TaskError, "it.yaml")
+    assert "\n" not in str(refused.value)

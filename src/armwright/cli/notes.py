@@ -3,7 +3,7 @@
 import shlex
 from pathlib import Path
 
-from armwright.problem.objectives import CLEARANCE_QUANTITIES, UNCOVERED_FRACTION
+from armwright.problem.objectives import CLEARANCE_QUANTITIES, WORKSPACE_QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.task import Task
@@ -14,7 +14,7 @@ def unused_parts(problem: Problem) -> list[str]:
     task = problem.task
     parts = (
         ("obstacles", task.obstacles, CLEARANCE_QUANTITIES),
-        ("workspace", task.workspace, (UNCOVERED_FRACTION,)),
+        ("workspace", task.workspace, WORKSPACE_QUANTITIES),
     )
     return [
         f"no objective or constraint uses the task's {part}; quantities for it: {', '.join(q.name for q in quantities)}"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.forward import forward_kinematics
@@ -73,7 +73,7 @@ class PostureSamples:
 
 def sample_postures(arm: ArmArrays, n: int = N_SAMPLES) -> PostureSamples:
     """Return random postures of one arm."""
-    shares = np.random.default_rng(0).uniform(size=(n, arm.dof))
+    shares = np.random.default_rng(0).uniform(size=(n, MAX_JOINTS))[:, : arm.dof]  # equal for padded arms
     lower, upper = arm.lower[0].astype(np.float64), arm.upper[0].astype(np.float64)
     q = np.where(arm.motion[0] == FIXED, 0.0, lower + shares * (upper - lower))
     frames = forward_kinematics(arm, q[None])
@@ -91,6 +91,7 @@ class PoseSearch:
         points: (P, 3) positions of the tip [m].
         directions: (M, 3) unit vectors along the tool's z axis.
         tolerances: Errors below which a pose is reached.
+        n_starts: Number of the nearest samples from which a pose is tried.
     """
 
     arm: ArmArrays
@@ -98,6 +99,7 @@ class PoseSearch:
     points: Array
     directions: Array
     tolerances: Tolerances
+    n_starts: int = N_STARTS
 
     def find(self) -> FoundPoses:
         """Find the poses within the joint limits."""
@@ -137,7 +139,8 @@ class PoseSearch:
         possible = np.ones(len(q), dtype=np.bool_) if possible is None else possible.reshape(-1)
         if not possible.any():
             return reached.reshape(-1, m), q.reshape(-1, m, self.arm.dof)
-        starts = [self.samples.q[nearest] for nearest in _nearest_samples(self.samples, points, directions).T]
+        nearest = _nearest_samples(self.samples, points, directions, self.n_starts)  # (K, S)
+        starts = [self.samples.q[column] for column in nearest.T]
         if first is not None:
             starts.insert(0, first.reshape(q.shape))
         neighbours = _neighbours(points, directions)  # (K, B)
@@ -224,13 +227,13 @@ def _satisfied(
     return satisfied
 
 
-def _nearest_samples(samples: PostureSamples, points: Array, directions: Array | None) -> NDArray[np.intp]:
-    """Return the (K, S) indices of the samples nearest to each pose."""
+def _nearest_samples(samples: PostureSamples, points: Array, directions: Array | None, n: int) -> NDArray[np.intp]:
+    """Return the (K, n) indices of the samples nearest to each pose."""
     if directions is None:
-        return _query(samples.tip, points, N_STARTS)
+        return _query(samples.tip, points, n)
     size = RADIAN * np.linalg.norm(np.ptp(samples.tip, axis=0)) / 2
     poses = np.hstack([np.repeat(points, len(directions), axis=0), size * np.tile(directions, (len(points), 1))])
-    return _query(np.hstack([samples.tip, size * samples.axis]), poses, N_STARTS)
+    return _query(np.hstack([samples.tip, size * samples.axis]), poses, n)
 
 
 def _neighbours(points: Array, directions: Array | None) -> NDArray[np.intp]:

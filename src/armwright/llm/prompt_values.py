@@ -18,8 +18,8 @@ from armwright.problem.objectives import (
     PATH_QUANTITIES,
     POSITION_ERROR,
     TIMED_QUANTITIES,
-    UNCOVERED_FRACTION,
     UNREACHED_TARGETS,
+    WORKSPACE_QUANTITIES,
 )
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
@@ -227,7 +227,7 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "restarts": task.restarts,
         "cycle": task.cycle_description,
         "cycle_times": task.cycle.describe_times() if task.cycle and problem.uses(*TIMED_QUANTITIES) else "",
-        "workspace": [region.describe() for region in task.workspace] if problem.uses(UNCOVERED_FRACTION) else [],
+        "workspace": [region.describe() for region in task.workspace] if problem.uses(*WORKSPACE_QUANTITIES) else [],
         "of_the_way": [quantity.symbol for quantity in PATH_QUANTITIES if problem.uses(quantity)],
         "n_targets": len(task.target_positions),
         "updates": UPDATES,

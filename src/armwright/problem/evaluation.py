@@ -20,6 +20,7 @@ from armwright.kinematics.jacobian import jacobian_of
 from armwright.kinematics.restarts import nearer_postures, random_starts
 from armwright.kinematics.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.torque_terms import TorqueTerms, torque_terms
+from armwright.problem.dexterous_volume import dexterous_volumes
 from armwright.robot.arm import Arm
 from armwright.spaces.tool_mount import carrying_tool
 from armwright.tasks.motions import CyclePlan
@@ -189,6 +190,11 @@ class Evaluation(Scene):
         points = sample_regions(self.workspace)
         reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
+
+    @cached_property
+    def dexterous_volume(self) -> Array:
+        """(N,) share of the workspace with enough directions; SettingsError if no region has directions."""
+        return dexterous_volumes(self.arms, self.workspace)
 
     @property
     def excess_error(self) -> Array:

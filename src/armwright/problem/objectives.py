@@ -189,6 +189,14 @@ UNCOVERED_FRACTION = Objective(
     each=lambda e: (e.workspace_error >= REACHED).mean(axis=1),
     over="arm",
 )
+UNDEXTEROUS_FRACTION = Objective(
+    name="undexterous_fraction",
+    unit="fraction",
+    symbol="E_undexterous",
+    description="the share of the workspace's points at which the tool reaches too few of the directions asked for",
+    each=lambda e: 1.0 - e.dexterous_volume,
+    over="arm",
+)
 ANISOTROPY = Objective(
     name="anisotropy",
     unit="fraction",
@@ -277,7 +285,8 @@ _ALL = (
     *PAPER_OBJECTIVES, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, RMS_TORQUE, TORQUE_UTILISATION, MASS, LENGTH,
     PRICE, JOINTS, ORIENTATION_ERROR, WORST_ANGLE, COLLISION, CLEARANCE_SHORTFALL, PATH_ERROR, PATH_ANGLE,
     JUMPS, CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION,
-    PEAK_CURRENT, MEAN_CURRENT, UNCOVERED_FRACTION, ANISOTROPY, DEFLECTION, PAYLOAD_DEFLECTION, BACKLASH_ERROR,
+    PEAK_CURRENT, MEAN_CURRENT, UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION, ANISOTROPY, DEFLECTION, PAYLOAD_DEFLECTION,
+    BACKLASH_ERROR,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 RENAMED = {
@@ -326,6 +335,15 @@ PAYLOAD_CAPACITY = Objective(
     each=compliance.payload_capacity,
     over="min",
 )
+DEXTEROUS_VOLUME = Objective(
+    name="dexterous_volume",
+    unit="fraction",
+    symbol="dexterous_volume",
+    description="the share of the workspace's points at which the tool reaches the stated share of the directions "
+    "asked for",
+    each=lambda e: e.dexterous_volume,
+    over="arm",
+)
 VOLTAGES = Objective(
     name="voltages",
     unit="voltages",
@@ -334,7 +352,7 @@ VOLTAGES = Objective(
     over="arm",
 )
 # More of these is better, so constraints can bound them, but they are no objectives.
-BENEFITS = (*CLEARANCES, MANIPULABILITY, PAYLOAD_CAPACITY)
+BENEFITS = (*CLEARANCES, MANIPULABILITY, PAYLOAD_CAPACITY, DEXTEROUS_VOLUME)
 QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*BENEFITS, VOLTAGES)}}
 
 # Quantities by what they depend on.
@@ -344,6 +362,7 @@ PATH_QUANTITIES = (*CLEARANCE_QUANTITIES, PEAK_TORQUE, TORQUE_UTILISATION)  # th
 TIMED_QUANTITIES = (
     CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION, PEAK_CURRENT, MEAN_CURRENT,
 )  # fmt: skip
+WORKSPACE_QUANTITIES = (UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION, DEXTEROUS_VOLUME)
 STIFFNESS_QUANTITIES = (DEFLECTION, PAYLOAD_DEFLECTION)
 MOTION_QUANTITIES = (*PATH_QUANTITIES, PATH_ERROR, PATH_ANGLE, JUMPS, *TIMED_QUANTITIES)
 

@@ -34,7 +34,7 @@ from armwright.tasks.targets import (
     stack_targets,
 )
 from armwright.tasks.tool import NO_TOOL, Tool, read_tool
-from armwright.tasks.workspace import MAX_POINTS, MAX_REGIONS, Region
+from armwright.tasks.workspace import MAX_POINTS, MAX_POSES, MAX_REGIONS, Region
 from armwright.yaml_documents import check_document
 
 MAX_PAYLOAD_FACTOR = 100.0
@@ -199,6 +199,12 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError("payload: expected one value for the whole cycle, got a list")
         if sum(region.points for region in self.workspace) > MAX_POINTS:
             raise ValueError(f"workspace: expected at most {MAX_POINTS} points in all boxes together")
+        n_poses = sum(region.points * region.directions.count for region in self.workspace if region.directions)
+        if n_poses > MAX_POSES:
+            raise ValueError(
+                f"workspace: expected at most {MAX_POSES} points x directions in all boxes together, got {n_poses}; "
+                "try fewer points"
+            )
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
             raise ValueError(f"reference_point: expected values above 0, got {list(self.reference_point)}")
         return self

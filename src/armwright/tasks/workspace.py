@@ -1,5 +1,6 @@
 """Regions that an arm should cover, as in task files, and the points that sample them."""
 
+import math
 from itertools import product
 from typing import Annotated, Self
 
@@ -7,10 +8,38 @@ import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.arrays import Array
+from armwright.rotations import cone_directions
 from armwright.tasks.targets import Position
 
 MAX_POINTS = 10_000
 MAX_REGIONS = 20
+MAX_DIRECTIONS = 100
+MAX_POSES = 50_000  # points with directions
+
+
+class ToolDirections(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """Directions of the tool's z axis that an arm should reach at each point: a cone, sampled evenly."""
+
+    axis: Position = (0.0, 0.0, -1.0)  # middle of the cone, of any length
+    half_angle: Annotated[float, Field(ge=0.0, le=math.pi)] = math.pi  # half the opening angle [rad]; π: all directions
+    count: Annotated[int, Field(ge=1, le=MAX_DIRECTIONS)] = 12
+    share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0  # of the directions that a dexterous point needs
+
+    @model_validator(mode="after")
+    def _check_axis(self) -> Self:
+        if math.hypot(*self.axis) < 1e-6:
+            raise ValueError(f"axis = {list(self.axis)} is no direction; try [0, 0, -1] for a tool that points down")
+        return self
+
+    @property
+    def vectors(self) -> Array:
+        """(M, 3) unit vectors in the cone."""
+        return cone_directions(self.axis, self.half_angle, self.count)
+
+    def describe(self) -> str:
+        """Return a description on one line."""
+        axis = ", ".join(f"{value:g}" for value in self.axis)
+        return f"{self.count} tool directions within {math.degrees(self.half_angle):.3g}° of ({axis})"
 
 
 class Region(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -19,6 +48,7 @@ class Region(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     low: Position  # smallest x, y and z [m]
     high: Position  # largest x, y and z [m]
     points: Annotated[int, Field(ge=1, le=MAX_POINTS)] = 200  # number of samples
+    directions: ToolDirections | None = None  # for dexterous_volume
 
     @model_validator(mode="after")
     def _check_corners(self) -> Self:
@@ -36,7 +66,8 @@ class Region(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def describe(self) -> str:
         """Return a description on one line."""
         low, high = (", ".join(f"{value:g}" for value in corner) for corner in (self.low, self.high))
-        return f"box from ({low}) to ({high}), {self.points} points"
+        ways = "" if self.directions is None else f", {self.directions.describe()}"
+        return f"box from ({low}) to ({high}), {self.points} points{ways}"
 
 
 def sample_regions(regions: tuple[Region, ...]) -> Array:

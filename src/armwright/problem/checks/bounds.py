@@ -158,7 +158,8 @@ def _intervals_of_task(problem: Problem) -> Mapping[str, Interval]:
     n = float(len(problem.task.targets))
     intervals |= {"unreached_targets": Interval(0.0, n), "jumps": Interval(0.0, n), "manipulability": Interval(0.0)}
     intervals["payload_capacity"] = Interval(0.0, MAX_MASS)
-    intervals |= dict.fromkeys(("uncovered_fraction", "anisotropy"), Interval(0.0, 1.0))
+    shares = ("uncovered_fraction", "undexterous_fraction", "dexterous_volume", "anisotropy")
+    intervals |= dict.fromkeys(shares, Interval(0.0, 1.0))
     intervals |= {quantity.name: Interval(-math.inf, FAR) for quantity in CLEARANCES}
     voltages = {actuator.voltage for actuator in problem.space.arm_actuators}
     intervals["voltages"] = Interval(0.0, float(len(voltages)))

@@ -3,9 +3,11 @@
 from armwright.exceptions import SettingsError
 from armwright.kinematics.cycle_loads import check_durations
 from armwright.problem.compliance_quantities import require_sections
+from armwright.problem.dexterous_volume import NO_DIRECTIONS
 from armwright.problem.drive_quantities import RATINGS, require_ratings
 from armwright.problem.evaluation import NO_CYCLE, NO_WORKSPACE
 from armwright.problem.objectives import (
+    DEXTEROUS_VOLUME,
     JUMPS,
     PATH_ANGLE,
     PATH_ERROR,
@@ -13,6 +15,7 @@ from armwright.problem.objectives import (
     STIFFNESS_QUANTITIES,
     TIMED_QUANTITIES,
     UNCOVERED_FRACTION,
+    UNDEXTEROUS_FRACTION,
 )
 from armwright.problem.problem import Problem
 
@@ -36,3 +39,6 @@ def check_requirements(problem: Problem) -> None:
             check_durations(actuation, plan)
         if quantity == UNCOVERED_FRACTION and not problem.task.workspace:
             raise SettingsError(NO_WORKSPACE)
+        has_directions = any(region.directions for region in problem.task.workspace)
+        if quantity in (DEXTEROUS_VOLUME, UNDEXTEROUS_FRACTION) and not has_directions:
+            raise SettingsError(NO_DIRECTIONS)

@@ -1,0 +1,42 @@
+"""The share of a workspace in which arms reach enough directions of the tool."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.exceptions import SettingsError
+from armwright.kinematics.arm_arrays import ArmArrays
+from armwright.kinematics.reachable_poses import PoseSearch, Tolerances, sample_postures
+from armwright.tasks.targets import ALIGNED, REACHED
+from armwright.tasks.workspace import Region, sample_regions
+
+# Fewer than for a reach map: 0.5 % more of the reachable poses are missed, in a seventh of the time.
+N_SAMPLES, N_STARTS = 2**11, 3
+NO_DIRECTIONS = (
+    "dexterous_volume and undexterous_fraction need a workspace with directions in the task; try workspace: "
+    "{low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4], directions: {axis: [0, 0, -1], half_angle: 0.5}}"
+)
+
+
+def dexterous_volumes(arms: ArmArrays, workspace: Sequence[Region]) -> Array:
+    """Return the (N,) shares of the points at which arms reach the stated share of directions.
+
+    Only regions with directions count.
+
+    Raises:
+        SettingsError: No region has directions.
+    """
+    asked = [(region, region.directions) for region in workspace if region.directions is not None]
+    if not asked:
+        raise SettingsError(NO_DIRECTIONS)
+    tolerances = Tolerances(REACHED, ALIGNED)
+    dexterous = np.zeros(len(arms))
+    for i in range(len(arms)):
+        arm = arms[i : i + 1]
+        samples = sample_postures(arm, N_SAMPLES)
+        for region, directions in asked:
+            points = sample_regions((region,))
+            found = PoseSearch(arm, samples, points, directions.vectors, tolerances, N_STARTS).find()
+            dexterous[i] += int((found.reached.mean(axis=1) >= directions.share).sum())
+    return dexterous / sum(region.points for region, _ in asked)
