@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
+from armwright.cli.activity import activity
 from armwright.cli.notes import unused_parts
 from armwright.cli.show_inputs import show_cycle, show_target_table, show_task
 from armwright.cli.streams import print_json
@@ -142,11 +143,13 @@ def run_check(
     """
     if not json_:
         show_check(console, problem)
-    findings, n_samples = find_faults(problem, written, deep)
+    with activity("evaluating random designs" if deep else "checking"):
+        findings, n_samples = find_faults(problem, written, deep)
     if picture is not None:
-        from armwright.report.task_figure import write_task_figure
+        with activity("drawing the picture"):
+            from armwright.report.task_figure import write_task_figure
 
-        write_task_figure(problem, picture)
+            write_task_figure(problem, picture)
     if json_:
         print_json({**record_check(problem, findings, n_samples), "picture": picture})
         stop_if_proven(findings)

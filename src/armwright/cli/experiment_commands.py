@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from armwright.cli.activity import activity
 from armwright.cli.options import (
     Csv,
     Figures,
@@ -131,9 +132,10 @@ def compare(
     from armwright.report.tables import comparison_record, write_tables
 
     console = open_console(check_formats(json_, csv_))
-    finished, unfinished = read_finished_runs(folders)
+    with activity("comparing the runs"):
+        finished, unfinished = read_finished_runs(folders)
+        comparison = compare_summaries(finished, baseline)
     notes = [f"{folder} is not finished and is left out" for folder in unfinished]
-    comparison = compare_summaries(finished, baseline)
     title = "Comparison of runs"
     if json_:
         print_json(comparison_record(comparison))
@@ -147,7 +149,8 @@ def compare(
         if figures:
             from armwright.report.comparison_figures import write_comparison_figures
 
-            drawn = write_comparison_figures(out, comparison)
+            with activity("drawing the figures"):
+                drawn = write_comparison_figures(out, comparison)
         show_files(console, tables, drawn)
 
 
@@ -189,23 +192,25 @@ def compare_arms(
     from armwright.spaces.design_space import load_space
 
     check_formats(json_, csv_)
-    compared = compare_arms(
-        task,
-        arms,
-        run,
-        space=None if space is None else load_space(space),
-        base=None if base is None else _parse_point(base),
-        tip=tip,
-        base_link=base_link,
-        seed=seed,
-        prices=dict(map(_parse_price, price or ())),
-    )
+    with activity(f"evaluating {', '.join(arms)}"):
+        compared = compare_arms(
+            task,
+            arms,
+            run,
+            space=None if space is None else load_space(space),
+            base=None if base is None else _parse_point(base),
+            tip=tip,
+            base_link=base_link,
+            seed=seed,
+            prices=dict(map(_parse_price, price or ())),
+        )
     drawn: list[Path] = []
     if run is not None and figures:
         from armwright.report.figures import write_figures
         from armwright.report.page import write_report
 
-        drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
+        with activity("drawing the page and the figures"):
+            drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
     if json_:
         print_json(comparison_record(compared))
     elif csv_:
@@ -244,7 +249,8 @@ def runs(
     from armwright.experiments.run_list import find_runs, list_runs
 
     check_formats(json_, csv_)
-    listed = list_runs(find_runs(folders or [Path("runs")]))
+    with activity("reading the runs"):
+        listed = list_runs(find_runs(folders or [Path("runs")]))
     if json_:
         print_json(listed)
     elif csv_:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from armwright.cli.activity import activity
 from armwright.cli.options import Csv, Json, ModelName, ModelOptionsFile, RunFolder, SpaceFile, load_problem
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json
 from armwright.exceptions import FailureError, SettingsError
@@ -39,7 +40,8 @@ def pick(
         raise SettingsError(f"-n {n}: expected a whole number from 1")
     conditions = [read_condition(text) for text in where or ()]
     weighed = None if weights is None else read_weights(weights)
-    history, picked = pick_from(run, conditions, by, weighed, robust)
+    with activity(f"reading {run}"):
+        history, picked = pick_from(run, conditions, by, weighed, robust)
     chosen = picked if all_ else picked[:n]
     names = [*(condition.name for condition in conditions), *([] if by is None else [by])]
     if csv_:
@@ -48,7 +50,8 @@ def pick(
     if all_ and not json_:
         show_picked_table(open_console(), history, chosen, names)
         return
-    survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
+    with activity("perturbing the chosen designs"):
+        survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
     if json_:
         print_json(list(picked_records(history, chosen, names, survival)))
         return
@@ -83,10 +86,12 @@ def export(
 
         if design is not None:
             raise SettingsError(f"--design {design} does not go with --format optuna, which exports the whole run")
-        study = export_study(run, out)
+        with activity(f"exporting {run}"):
+            study = export_study(run, out)
         print(f"{study.database}; to view it in a browser (pip install optuna-dashboard):\n  {study.dashboard_command}")
         return
-    text = export_design(run, design, format_)
+    with activity(f"exporting a design of {run}"):
+        text = export_design(run, design, format_)
     if out is None:
         print(text, end="")
         return
@@ -101,7 +106,9 @@ def report(
     from armwright.report.page import write_report
 
     for run in runs:
-        print(write_report(run))
+        with activity(f"writing the page of {run}"):
+            written = write_report(run)
+        print(written)
 
 
 def live(

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from armwright.cli.activity import activity
 from armwright.cli.options import (
     EVALUATION,
     OUTPUT,
@@ -286,7 +287,8 @@ def refine(
     from armwright.cli.show_results import show_refined
     from armwright.study.refine_run import refine_run
 
-    refined = refine_run(run, evaluations)
+    with activity("refining the designs of the front"):
+        refined = refine_run(run, evaluations)
     _draw(run)
     if json_:
         print_json({"folder": run, **refined.summary})
@@ -306,7 +308,7 @@ def _draw(folder: Path, has_time: Callable[[float], bool] = lambda _: True) -> l
     from armwright.runs.folder import RunFolder
     from armwright.runs.results import FIGURES, REPORT
 
-    with RunFolder(folder):
+    with activity("drawing the page and the figures"), RunFolder(folder):
         existing = sorted((folder / FIGURES).glob("*.png"))
         if not (folder / REPORT).is_file():
             write_report(folder)

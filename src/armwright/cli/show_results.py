@@ -231,8 +231,8 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
 def _front_table(history: History, robust: set[int] | None) -> Table:
     objectives = [SHORT_NAMES.get(o, o.name.replace("_", " ")) for o in history.problem.objectives]
     columns = (
-        *numbers("#"), Column("source", rank=3), *([] if robust is None else [Column("verdict", rank=1)]),
-        *numbers(*objectives), Column("joints"), Column("base [m]", rank=4), Column("links [m]", rank=5),
+        *numbers("#"), Column("source", rank=5), *([] if robust is None else [Column("verdict", rank=1)]),
+        *numbers(*objectives), Column("joints"), Column("base [m]", rank=4), Column("links [m]", rank=3),
     )  # fmt: skip
     reference = history.reference_point or (math.inf,) * len(objectives)
     inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.activity import activity
 from armwright.cli.options import Csv, Json, RunFolder
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json
 from armwright.cli.tables import Column, Table, numbers, print_table
@@ -44,11 +45,13 @@ def simulate(
     check_formats(json_, csv_)
     if (design is not None) + recommended + all_ > 1:
         raise SettingsError("--design, --recommended and --all choose the designs; use one of them")
-    _, history = read_run(run)
+    with activity(f"reading {run}"):
+        _, history = read_run(run)
     if design is not None and not 0 <= design < len(history):
         raise SettingsError(f"--design {design}: {run} has the designs 0 to {len(history) - 1}")
     simulator = Simulator(history)
-    choice = _simulate_chosen(simulator, design, all_)
+    with activity("simulating"):
+        choice = _simulate_chosen(simulator, design, all_)
     members = [simulator.members[number] for number in sorted(simulator.members)]
     record = simulation_record(members)
     with Folder(run) as folder:

@@ -107,6 +107,7 @@ class DirectSearch:
         finally:
             if state is not None:
                 self._save(state)
+        self._report(0, is_ended=True)
         return self._finish(ended, self.searched)
 
     @property
@@ -142,7 +143,7 @@ class DirectSearch:
         screen = {} if self.screen is None else self.screen.state()
         return {**state, **self.survey.state(), **self.search.state(), **screen}
 
-    def _report(self, evaluated: int) -> None:
+    def _report(self, evaluated: int, is_ended: bool = False) -> None:
         """Report the progress; evaluated: designs of the generation that is being evaluated."""
         if self.watch is None:
             return
@@ -157,6 +158,7 @@ class DirectSearch:
                 seconds_left=max(0.0, plan.search_left),
                 new_evaluations=search.evaluations + evaluated - self.resumed,
                 new_seconds=plan.search_seconds,
+                is_ended=is_ended,
             )
         )
 

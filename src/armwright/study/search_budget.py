@@ -65,6 +65,7 @@ class SearchProgress:
         seconds_left: search time that the budget leaves [s]; infinite without a limit.
         new_evaluations: designs evaluated in this session.
         new_seconds: search time of this session [s].
+        is_ended: whether the search has ended, and its front is verified now.
     """
 
     evaluations: int
@@ -75,6 +76,7 @@ class SearchProgress:
     seconds_left: float = math.inf
     new_evaluations: int = 0
     new_seconds: float = 0.0
+    is_ended: bool = False
 
     @property
     def share(self) -> float:
