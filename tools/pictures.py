@@ -116,8 +116,8 @@ def tutorial(folder: Path, page: Page, file: Path) -> None:
     for name, key in (("feeder.yaml", "name: feeder"), ("space.yaml", "name: servo-arm")):
         block = next(b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if b.startswith(key))
         (folder / name).write_text(block)
-    command = ["design", "feeder.yaml", "--space", "space.yaml", "--evaluations", 8000]
-    open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=0&target=3")
+    command = ["design", "feeder.yaml", "--space", "space.yaml", "--evaluations", 8000, "--seed", 1]
+    open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=1&target=3")
     page.screenshot(path=file)
 
 
