@@ -130,6 +130,7 @@ def open_arm(folder: Path, page: Page, task: str, space: str, evaluations: int, 
 
 def turn_arm(page: Page, drag: int, zoom: int) -> None:
     """Turn and enlarge the 3D view by the mouse."""
+    page.locator("#arm-box canvas").scroll_into_view_if_needed()
     box = page.locator("#arm-box canvas").bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -220,9 +221,9 @@ PICTURES: dict[str, Shot] = {
     "page-live.png": live_report,
     "tutorial.png": tutorial,
     "example-shelf.png": arm_of(
-        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=6&target=4", drag=90, zoom=250
+        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=2&target=4", drag=90, zoom=250
     ),
-    "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=4&target=3"),
+    "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=12&target=3"),
     "example-stiffness.png": stiffness,
     "compare-arms.png": existing_arms,
     "dashboard.png": dashboard,

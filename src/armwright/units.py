@@ -18,7 +18,7 @@ OTHER_UNITS: Mapping[str, tuple[str, float]] = {
 _KEYS = {
     "m": "targets position tolerance target_noise tip center size radius height z approach path low high stroke "
     "origin_x origin_y origin_z link outer_diameter wall foot tubes width depth shaft_offset",
-    "rad": "angle_tolerance angle rpy yaw joint_range limit backlash",
+    "rad": "angle_tolerance angle half_angle rpy yaw joint_range limit backlash",
     "kg": "payload mass bracket_mass kg",
     "s": "dwell time",
     "kg m²": "inertia rotor_inertia",

@@ -219,7 +219,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["target-1", "--prompt", "."], "prompt . is a folder, not a template file"),
         (["target-1", *model_options(memory="onw")], 'unknown memory "onw". Did you mean "own"?'),
         (["target-1", *model_options(answer="two")], 'unknown answer "two"'),
-        (["target-1", *model_options(proposals=0)], "proposals: Input should be greater than or equal to 1 (got 0)"),
+        (["target-1", *model_options(proposals=0)], "proposals: expected a number of at least 1, got 0"),
         (["target-1", "--after", "nowhere"], "nowhere is not a run folder"),
         (["target-2", "--after", "run"], "run is a run of another task: target-1"),
         (["--after", "run", "--space", "space.yaml"], "run is a run of another space: paper"),
