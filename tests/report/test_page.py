@@ -150,7 +150,7 @@ def test_front_outside_the_reference_box_is_shown(tmp_path: Path, tab: Tab) -> N
     high = tab.ask("[pareto.layout.xaxis.range[1], pareto.layout.yaxis.range[1]]")
     front = tab.ask("armwright.content.head.front.map((i) => Array.from(armwright.content.values(i)))")
     assert all(x < high[0] and y < high[1] for x, y in front)
-    assert tab.text("#repeat code").startswith("armwright optimize TASK.yaml ")
+    assert tab.text("#repeat code").startswith("armwright optimize run ")
 
 
 def test_axes_fit_the_designs_if_the_reference_point_is_far(tmp_path: Path, tab: Tab) -> None:

@@ -73,9 +73,9 @@ def test_commands_take_the_space_of_the_task_and_say_so() -> None:
 
 def test_repeated_command_leaves_out_the_space_of_the_task() -> None:
     config = run_config(load_problem("desk-sorting", None), FrontMethod(), 0)
-    assert "--space" not in repeat_command(config)
+    assert "--space" not in repeat_command(config, Path("run"))
     config = config.model_copy(update={"space": paper_space()})
-    assert "--space paper" in repeat_command(config)
+    assert "--space paper" in repeat_command(config, Path("run"))
 
 
 @pytest.mark.parametrize("name", OWN)

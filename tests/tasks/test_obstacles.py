@@ -179,7 +179,8 @@ def test_obstacles_reach_prompt_and_figures(tmp_path: Path) -> None:
     assert "Orientation does not matter. The inverse kinematics steers around nothing" in prompt
     named = config.task.model_copy(update={"name": "random-arm"})  # close to the names of built-in tasks
     for task in (config.task, named):
-        assert repeat_command(config.model_copy(update={"task": task})).startswith("armwright optimize TASK.yaml")
+        repeated = repeat_command(config.model_copy(update={"task": task}), tmp_path / "run")
+        assert repeated.startswith("armwright optimize run ")
     options = ["--objectives", "position_error", *size, "--no-figures", "--out", tmp_path / "other"]
     assert "no objective or constraint uses the task's obstacles" in armwright("optimize", file, *options)
 

@@ -15,7 +15,7 @@ EVALUATION, OUTPUT = "Evaluation", "Output"
 
 # Options
 TaskName = Annotated[
-    str, typer.Argument(metavar="TASK", help="A built-in task (see `armwright tasks`) or a YAML file.")
+    str, typer.Argument(metavar="TASK", help="A built-in task (see `armwright tasks`), a YAML file, or a run folder.")
 ]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 SpaceFile = Annotated[
@@ -126,8 +126,9 @@ def load_problem(
     """Load the task, space and evaluator that the options name.
 
     Args:
-        task: A built-in task or a task file.
-        space: A built-in space or a space file; None for the space of the task's name, else the paper's.
+        task: A built-in task, a task file, or a run folder, whose task it is.
+        space: A built-in space or a space file; None for that of the run folder, or of the task's name, else the
+            paper's.
         robust: Whether a design counts by its worst case within the build tolerance.
         device: "auto", "cpu" or "cuda".
         many: Whether many designs are evaluated at once, which makes "auto" prefer a GPU.
@@ -138,11 +139,13 @@ def load_problem(
     from armwright.problem.evaluators import load_evaluator
     from armwright.problem.objectives import PAPER_OBJECTIVES, named_objectives
     from armwright.problem.problem import Problem
+    from armwright.runs.folder import CONFIG, read_config
     from armwright.spaces.design_space import default_space, load_space
     from armwright.spaces.tolerance import TOLERANCE
     from armwright.tasks.catalogue import load_task
 
-    loaded = load_task(task)
+    run = read_config(Path(task)) if (Path(task) / CONFIG).is_file() else None
+    loaded = load_task(task) if run is None else run.task
     measured = None if evaluator is None else load_evaluator(evaluator)
     names = () if objectives is None else tuple(name.strip() for name in objectives.split(","))
     chosen = ()
@@ -154,9 +157,10 @@ def load_problem(
         # the task's reference point applies to its own objectives only
         resolution = tuple(pair for pair in loaded.resolution if pair[0] in names)
         loaded = loaded.model_copy(update={"objectives": names, "reference_point": None, "resolution": resolution})
+    default = default_space(loaded.name) if run is None else run.space
     return Problem(
         loaded,
-        default_space(loaded.name) if space is None else load_space(space),
+        default if space is None else load_space(space),
         tolerance=TOLERANCE if robust else 0.0,
         device=resolve_device(device, many),
         objectives=chosen,

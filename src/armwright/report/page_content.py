@@ -302,7 +302,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "is_toy": space.is_toy,
         "assumed": assumed_values(config.problem),
         "method": describe_method(config),
-        "command": repeat_command(config, any(trial.source == REFINE for trial in history), spent),
+        "command": repeat_command(config, folder, any(trial.source == REFINE for trial in history), spent),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
         "colours": {
             "front": FRONT,

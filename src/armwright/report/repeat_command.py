@@ -1,8 +1,10 @@
 """Reconstruct the command of a run from its settings."""
 
+import os
 import re
 import shlex
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
@@ -14,18 +16,18 @@ from armwright.spaces.design_space import builtin_spaces, default_space, load_sp
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.tasks.catalogue import builtin_names, load_task
 
-CUSTOM_TASK, CUSTOM_SPACE = "TASK.yaml", "SPACE.yaml"  # placeholders for files of the user
+AGAIN = "again"  # the folder of a repeated run that is refined afterwards
 DEFAULTS = {"sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200}
 
 
-def repeat_command(config: RunConfig, refined: bool = False, spent: int | None = None) -> str:
+def repeat_command(config: RunConfig, folder: Path, refined: bool = False, spent: int | None = None) -> str:
     """Return the shell command that repeats a run, without options at their defaults.
 
-    Custom tasks, spaces and initial designs appear as TASK.yaml, SPACE.yaml and DESIGN-1.json; their content is
-    in the run's config.yaml.
+    Task and space are read from the run folder unless both are built in. Initial designs appear as DESIGN-1.json.
 
     Args:
         config: The settings of the run.
+        folder: The run folder.
         refined: Whether the run was refined afterwards.
         spent: Evaluations of a direct search.
 
@@ -38,10 +40,11 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     builtin = load_task(name) if name in builtin_names() or re.fullmatch(r"random-\d+", name) else None
     is_builtin = builtin is not None and _content(builtin) == _content(config.task)
     spaces = [name for name in builtin_spaces() if _content(load_space(name)) == _content(config.space)]
+    is_named = is_builtin and bool(spaces)
     settings: dict[str, Any] = {}
     n_designs = 0
-    if _content(default_space(name)) != _content(config.space):
-        settings["space"] = spaces[0] if spaces else CUSTOM_SPACE
+    if is_named and _content(default_space(name)) != _content(config.space):
+        settings["space"] = spaces[0]
     if isinstance(config.method, FrontMethod):
         first = config.method.initial_designs or {}
         settings |= {"evaluations": spent, "from": first.get("run"), "proposer": first.get("proposer", {}).get("name")}
@@ -58,8 +61,15 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     if isinstance(config.method, Method) and _is_screen_off(config.method):
         options.append("--no-screen")
     options += ["--robust"] * (config.tolerance > 0.0)
-    line = shlex.join(["armwright", command, name if is_builtin else CUSTOM_TASK, *options, "--seed", str(config.seed)])
-    return f"{line} && armwright refine RUN" if refined else line
+    options += ["--seed", str(config.seed)] + ["--out", AGAIN] * refined
+    line = shlex.join(["armwright", command, name if is_named else _path_of(folder), *options])
+    return f"{line} && armwright refine {AGAIN}" if refined else line
+
+
+def _path_of(folder: Path) -> str:
+    """Return a folder relative to the current one; its name alone if it is elsewhere, as a page may be sent around."""
+    path = os.path.relpath(folder)
+    return folder.resolve().name if path.startswith(os.pardir) else path
 
 
 def _content(model: BaseModel) -> dict[str, Any]:
