@@ -118,6 +118,15 @@ def test_every_quantity_of_a_card_is_explained(run: Path, tab: Tab) -> None:
     assert explanation.locator("p").is_visible()
 
 
+def test_objectives_and_constraints_are_explained_below_the_table(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    tab.page.locator("#meanings summary").click()
+    stated = tab.page.locator("#meanings dt").all_inner_texts()
+    of_constraints = [constraint.quantity for constraint in problem().constraints]
+    quantities = {q.name: q for q in (*problem().objectives, *of_constraints)}
+    assert stated == [f"{q.label} [{q.unit}]" for q in quantities.values()]
+
+
 def test_cards_show_different_pictures_and_select_their_designs(
     run: Path, tab: Tab, recommended: list[Mapping[str, Any]]
 ) -> None:

@@ -12,6 +12,7 @@ export function openTable(shownContent) {
   content = shownContent;
   $("table-box").hidden = false;
   drawTable();
+  drawMeanings();
   listen((changed) => { if (changed.has("design")) mark(); });
 }
 
@@ -44,6 +45,15 @@ function columns() {
     made.push({ key: p.name, name: p.name.replaceAll("_", " ") + (p.unit ? ` [${p.unit}]` : ""), form, value: (i) => content.param(i, p.name) });
   }
   return made;
+}
+
+// Explains the objectives and the quantities that constraints bound.
+function drawMeanings() {
+  const { head } = content, names = [...content.objectives.map((o) => o.name), ...head.constraints.map((c) => c.name)];
+  const known = [...new Set(names)].filter((name) => name in head.quantities).map((name) => head.quantities[name]);
+  $("meanings").hidden = !known.length;
+  $("meanings").querySelector("dl").replaceChildren(...known.flatMap(({ label, unit, description }) =>
+    [element("dt", {}, `${label} [${unit.replace(" x ", " × ")}]`), element("dd", {}, description)]));
 }
 
 // Shows only these designs of the front, in this order until the table is sorted by a column.
