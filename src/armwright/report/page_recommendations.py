@@ -67,7 +67,7 @@ def recommended_designs(history: History, recommended: Sequence[Mapping[str, Any
 def explained() -> dict[str, dict[str, str]]:
     """Return label, unit and description of each quantity, by name."""
     return {
-        quantity.name: {"label": quantity.label, "unit": quantity.unit, "description": _sentence(quantity)}
+        quantity.name: {"label": quantity.label, "unit": quantity.unit, "description": _sentences(quantity)}
         for quantity in QUANTITIES.values()
     }
 
@@ -91,19 +91,17 @@ def _values(evaluation: Evaluation, name: str) -> Array | None:
 
 
 _OVER = {
-    "sum": "summed over the targets",
-    "max": "at the worst target",
-    "min": "at the target where it is smallest",
-    "rms": "as a root mean square over the targets",
+    "sum": " Summed over the targets.",
+    "max": " The worst target counts.",
+    "min": " The target where it is smallest counts.",
+    "rms": " The root mean square over the targets.",
     "arm": "",
 }
 
 
-def _sentence(quantity: Objective) -> str:
-    """Return what a quantity is."""
-    over = _OVER[quantity.over]
-    text = f"{quantity.description}{f', {over}' if over else ''}."
-    return text[0].upper() + text[1:]
+def _sentences(quantity: Objective) -> str:
+    """Return what a quantity is, and how the targets count."""
+    return f"{quantity.description[0].upper()}{quantity.description[1:]}.{_OVER[quantity.over]}"
 
 
 def _loads(history: History, evaluation: Evaluation, row: int, number: int) -> dict[str, Any] | None:
