@@ -132,10 +132,13 @@ def _show_assumed(console: Console, summary: dict[str, Any]) -> None:
 
 def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) -> None:
     """Print the recommended designs, whether they are verified in the simulator, and what they survive."""
+    roles: dict[str, list[str]] = {}
     for one in recommended:
         demoted = "".join(f"; #{other['design']} was demoted: {other['reason']}" for other in one["demoted"])
         survival = "perturbations not evaluated" if one["survival"] is None else one["survival"]["verdict"]
-        console.print(f"recommended, {one['role']}: #{one['design']}, {one['status']}; {survival}{demoted}")
+        roles.setdefault(f"#{one['design']}, {one['status']}; {survival}{demoted}", []).append(one["role"])
+    for described, names in roles.items():
+        console.print(f"recommended, {', '.join(names)}: {described}")
 
 
 def show_refined(console: Console, refined: RefinedRun) -> None:
