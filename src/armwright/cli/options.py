@@ -1,5 +1,6 @@
 """Options that several commands share, and the objects that they describe."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -144,7 +145,8 @@ def load_problem(
     from armwright.spaces.tolerance import TOLERANCE
     from armwright.tasks.catalogue import load_task
 
-    run = read_config(Path(task)) if (Path(task) / CONFIG).is_file() else None
+    is_run = os.path.isfile(os.path.join(task, CONFIG))  # unlike Path.is_file, False also for a name that is too long
+    run = read_config(Path(task)) if is_run else None
     loaded = load_task(task) if run is None else run.task
     measured = None if evaluator is None else load_evaluator(evaluator)
     names = () if objectives is None else tuple(name.strip() for name in objectives.split(","))
