@@ -16,7 +16,7 @@ from armwright.study.progress import Progress as StudyProgress
 from armwright.study.search_budget import SearchProgress
 
 LINE_INTERVAL = 10  # counted trials between two plain lines of a study
-VERIFYING = "verifying the front"  # in place of the state, so that the numbers before it are not cut
+VERIFYING = "verifying"  # after the hypervolume, in place of the rest of the state, which a narrow terminal would cut
 RATE_AFTER = 1.0  # [s] of search
 SHARE_INTERVAL = 0.1  # share of the budget between two plain lines of a search
 
@@ -51,7 +51,7 @@ def study_progress(console: Console) -> Generator[Callable[[StudyProgress], None
                 activity = {"proposing": f"asking {source} …", "paused": "paused"}.get(progress.doing, source)
                 waiting = f"  {progress.n_in_flight} in flight" if progress.n_in_flight else ""
                 is_ended = progress.doing == "finished" and done == progress.n_total
-                state = VERIFYING if is_ended else f"{state}  {activity}{waiting}"
+                state = f"hypervolume {volume}  {VERIFYING}" if is_ended else f"{state}  {activity}{waiting}"
                 update(total=progress.n_total, completed=done, count=count, state=state)
             elif progress.doing == "finished" and done and (done % LINE_INTERVAL == 0 or done == progress.n_total):
                 _print_at_once(console, f"{count}  {state}  {source}  {time.perf_counter() - started:.1f} s")
@@ -75,7 +75,7 @@ def search_progress(console: Console) -> Generator[Callable[[SearchProgress], No
             count = f"{progress.evaluations:9,} evaluations"
             state = f"{progress.seconds:6.1f} s  hypervolume {progress.hypervolume:.3f}  front {progress.front_size}"
             if progress.is_ended:
-                state = VERIFYING
+                state = f"hypervolume {progress.hypervolume:.3f}  {VERIFYING}"
             if update is not None:
                 update(total=1.0, completed=spent, count=count, state=state)
             elif spent >= due and not progress.is_ended:
