@@ -17,7 +17,7 @@ from armwright.llm import client
 from armwright.llm.draft import DRAFTS, Draft
 from armwright.llm.draft_prompt import MAX_DESCRIPTION_LENGTH, draft_prompt, draft_schema
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import estimated_tokens
+from armwright.llm.prompt import MAX_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.problem.objectives import OBJECTIVES
 from armwright.robot.actuators import catalogue
@@ -425,4 +425,4 @@ def test_draft_prompt_covers_all_file_keys() -> None:
     assert names == list(catalogue())
     assert all(f"- {name} (" in prompt for name in names)
     assert "prefixItems" not in json.dumps(schema["$defs"]["Task"])
-    assert estimated_tokens(prompt + json.dumps(schema)) < 13_000
+    assert estimated_tokens(prompt + json.dumps(schema)) < MAX_TOKENS
