@@ -11,7 +11,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
     "arms": {"robot_descriptions": "robot_descriptions", "xacrodoc": "xacrodoc"},
     "distributed": {"cryptography": "cryptography", "distributed": "distributed"},
     "gp": {"greenlet": "greenlet", "torch": "torch"},
-    "live": {"starlette": "starlette", "uvicorn": "uvicorn"},
+    "live": {"ruamel.yaml": "ruamel.yaml", "starlette": "starlette", "uvicorn": "uvicorn"},
     "llm": {
         "anthropic": "anthropic",
         "google.genai": "google-genai",

@@ -27,13 +27,18 @@ def read_document(path: Path, schema: type[Schema], error: type[Exception]) -> S
 
 def parse_document(text: str, schema: type[Schema], error: type[Exception], where: str) -> Schema:
     """Parse YAML text as a value of `schema`; `where` names it in messages."""
-    try:
-        data = yaml.load(text, Loader=_DocumentLoader)
-    except (yaml.YAMLError, RecursionError, ValueError) as fault:
-        raise error(f"{where} is not valid YAML: {_yaml_fault(fault)}") from fault
+    data = load_document(text, error, where)
     if not isinstance(data, dict):
         raise error(f"{where} must hold keys and values ({', '.join(document_keys(schema))}), one a line")
     return check_document(cast("dict[Any, Any]", data), schema, error, where)
+
+
+def load_document(text: str, error: type[Exception], where: str) -> Any:
+    """Return the content of YAML text without checking it against a schema."""
+    try:
+        return yaml.load(text, Loader=_DocumentLoader)
+    except (yaml.YAMLError, RecursionError, ValueError) as fault:
+        raise error(f"{where} is not valid YAML: {_yaml_fault(fault)}") from fault
 
 
 def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str) -> Schema:

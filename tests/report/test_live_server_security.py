@@ -17,8 +17,8 @@ import yaml
 from playwright.sync_api import Browser
 
 import armwright as aw
-from armwright.report.live_app import HEADERS
 from armwright.report.page import write_report
+from armwright.report.request_guard import HEADERS
 from armwright.runs.control import read_control
 from tests.fuzz.request_targets import a_server
 from tests.support.browser import FLAGS, Tab, program

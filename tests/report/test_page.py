@@ -20,7 +20,8 @@ import armwright as aw
 from armwright.exceptions import RunFolderError
 from armwright.kinematics.forward import joint_positions
 from armwright.pareto import front_indices
-from armwright.report.page import program, write_report
+from armwright.report.page import PAGE, write_report
+from armwright.report.page_assembly import program
 from armwright.report.page_content import RunContent
 from armwright.runs.conditions import read_condition
 from armwright.runs.folder import read_run
@@ -549,4 +550,4 @@ def test_unfinished_run_is_shown(run: Path, tmp_path: Path, tab: Tab) -> None:
 
 def test_page_modules_are_wrapped_in_functions() -> None:
     """No import or export statement is left in the page's modules."""
-    assert not re.search(r"^\s*(import|export) ", program(), re.MULTILINE)
+    assert not re.search(r"^\s*(import|export) ", program(PAGE), re.MULTILINE)

@@ -34,6 +34,7 @@ app = typer.Typer(
 COMMANDS = {
     "Before a run": (
         input_commands.init,
+        input_commands.edit,
         input_commands.check,
         input_commands.tasks,
         input_commands.actuators,

@@ -1,4 +1,4 @@
-"""Commands before a run: init, check, tasks, actuators, draft."""
+"""Commands before a run: init, edit, check, tasks, actuators, draft."""
 
 import os
 import shlex
@@ -55,6 +55,25 @@ def init(
     print(
         f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
     )
+
+
+def edit(
+    task: Annotated[Path, typer.Argument(metavar="TASK", help="The task file, such as my-task.yaml; it may be new.")],
+    space: Annotated[
+        Path | None,
+        typer.Option(help="The space file.", show_default="TASK's name with -space"),
+    ] = None,
+    port: Annotated[int, typer.Option(help="Port to listen on; 0: any free port.")] = 0,
+    open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+) -> None:
+    """Draw TASK and its design space in the browser, check them, and design arms (extra live).
+
+    Ctrl-C ends it, with a search that it has started.
+    """
+    from armwright.editor.edited_files import EditedFiles
+    from armwright.editor.server import serve_editor
+
+    serve_editor(EditedFiles(task, space), lambda address: print(address, flush=True), port, open_)
 
 
 def check(

@@ -8,6 +8,7 @@ from typing import Any
 
 from armwright.exceptions import ArmwrightError
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
+from armwright.report.datasheet_html import to_html
 from armwright.report.page_content import RunContent, design_files
 from armwright.runs.control import (
     CONTROL,
@@ -15,6 +16,7 @@ from armwright.runs.control import (
     read_control,
     read_status,
 )
+from armwright.runs.datasheet.design_sheet import design_sheet
 from armwright.runs.folder import CONFIG, is_held, read_config
 from armwright.runs.results import SUMMARY
 from armwright.runs.trials_file import TRIALS
@@ -59,11 +61,13 @@ class LiveRun:
             return None if self._content is None else self._content.packed(designs, calls, with_files=False)
 
     def file(self, number: int, kind: str) -> str | None:
-        """Return a design as text; None if it does not exist."""
+        """Return a design as text; None if it does not exist. kind: urdf, mjcf or datasheet."""
         with self._lock:
-            if self._content is None or number >= len(self._content.history) or kind not in ("urdf", "mjcf"):
+            if self._content is None or number >= len(self._content.history):
                 return None
-            return design_files(self._content.history, number)[kind]
+            if kind == "datasheet":
+                return to_html(design_sheet(self.folder, number))
+            return design_files(self._content.history, number).get(kind)
 
     def _read(self) -> None:
         if not (self.folder / CONFIG).is_file():

@@ -14,10 +14,15 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import TYPE_CHECKING, BinaryIO, cast
 
 from armwright.exceptions import FailureError, SettingsError
 from armwright.extras import check_extra
+
+if TYPE_CHECKING:
+    from starlette.applications import Starlette
+
+    from armwright.report.live_app import OpenPages
 
 LOOPBACK = "127.0.0.1"
 HTTP_PORT = 80  # omitted in addresses
@@ -43,14 +48,35 @@ def serve(
         FailureError: The address cannot be used.
     """
     check_extra("live", "the live page")
-    import uvicorn
-
     from armwright.report.live_app import OpenPages, live_app
+
+    pages, token = OpenPages(), secrets.token_urlsafe(24)
+    serve_app(lambda is_allowed, _: live_app(folder, token, is_allowed, pages), pages, tell, host, port, study)
+
+
+def serve_app(
+    make_app: Callable[[Callable[[str], bool], int], "Starlette"],
+    pages: "OpenPages",
+    tell: Callable[[str], None],
+    host: str,
+    port: int,
+    study: BinaryIO | None = None,
+) -> None:
+    """Serve an application as `serve` does.
+
+    Args:
+        make_app: Called with the check of Host headers and the port.
+        pages: Counts the open pages.
+        tell: As in `serve`, like the rest.
+        host: Address.
+        port: Port.
+        study: Pipe.
+    """
+    import uvicorn
 
     listener = _listen(host, port)
     port = listener.getsockname()[1]
-    pages = OpenPages()
-    app = live_app(folder, secrets.token_urlsafe(24), _hosts(host, listener), pages)
+    app = make_app(_hosts(host, listener), port)
     settings = uvicorn.Config(
         app, log_config=None, access_log=False, lifespan="on", timeout_graceful_shutdown=1, server_header=False
     )

@@ -1,4 +1,4 @@
-"""Points from CSV files."""
+"""Points from CSV files and pasted text."""
 
 import csv
 import math
@@ -29,9 +29,14 @@ def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) ->
     Raises:
         TaskError: If a line is not three finite numbers, or there is none.
     """
+    return parse_points(read_text(path, MAX_BYTES, TaskError), unit, str(path), offset)
+
+
+def parse_points(text: str, unit: str, where: str, offset: Point = (0.0, 0.0, 0.0)) -> tuple[Point, ...]:
+    """Return the points [m] of a text as `read_points` does; `where` names it in messages."""
     if unit not in UNITS:
         raise TaskError(f'unit: expected {" or ".join(UNITS)}, got "{unit}"')
-    lines = read_text(path, MAX_BYTES, TaskError).splitlines()
+    lines = text.splitlines()
     points: list[Point] = []
     rows = [(number, _split_row(line)) for number, line in enumerate(lines, start=1) if _holds_data(line)]
     if rows and not any(map(_is_number, rows[0][1][:3])):
@@ -40,12 +45,12 @@ def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) ->
         try:
             x, y, z = (float(cell) * UNITS[unit] for cell in row[:3])
         except ValueError as fault:
-            raise TaskError(f"{path}, line {number}: expected three numbers x, y, z, got {row[:3]}") from fault
+            raise TaskError(f"{where}, line {number}: expected three numbers x, y, z, got {row[:3]}") from fault
         if not all(math.isfinite(c) for c in (x, y, z)):
-            raise TaskError(f"{path}, line {number}: expected finite coordinates, got {row[:3]}")
+            raise TaskError(f"{where}, line {number}: expected finite coordinates, got {row[:3]}")
         points.append((_tidy(x + offset[0]), _tidy(y + offset[1]), _tidy(z + offset[2])))
     if not points:
-        raise TaskError(f"{path} has no points: expected three numbers x, y, z per line")
+        raise TaskError(f"{where} has no points: expected three numbers x, y, z per line")
     return tuple(points)
 
 

@@ -23,12 +23,13 @@ def task_template(file: Path, targets: tuple[Point, ...] = EXAMPLE_TARGETS) -> s
     text = (resources.files("armwright.tasks") / "template.yaml").read_text(encoding="utf-8")
     return Template(text).substitute(
         file=shlex.quote(str(file)),
-        name=json.dumps(_safe_name(file.stem)),
+        name=json.dumps(safe_name(file.stem)),
         targets="\n".join(f"  - [{x!r}, {y!r}, {z!r}]" for x, y, z in targets),
     )
 
 
-def _safe_name(stem: str) -> str:
+def safe_name(stem: str) -> str:
+    """Return the stem of a file as a name that tasks, spaces and run folders accept."""
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("._-")[:64].rstrip(".") or "task"
     try:
         return check_name(name)

@@ -3,12 +3,11 @@
 import { during } from "./cycle.js";
 import { describeMiss, postures, why } from "./design.js";
 import { PRISMATIC, chain, columnBody, length, motorBody, rail } from "./kinematics.js";
+import { arrow, ball, boxEdges, empty, floorParts, rod, segments } from "./shapes.js";
 import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, number, onTheme, shown } from "./format.js";
 
-const CELLS = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 50, 100]; // [m] possible sides of the grid's cells
-const MOST_CELLS = 16; // most cells along one side of the grid
 const MOVE = 700; // [ms] from one posture to the next
 const REST = 500; // [ms] at a target while playing
 const VIEW = [0.55, -1, 0.42]; // initial direction of the camera
@@ -28,7 +27,6 @@ let moving = null; // { from, to, began } in joint space
 let playing = false;
 let began = null; // time [ms] at which the played cycle began; null while not moving along one
 let turned = false; // whether the user has rotated the view
-let unit = {}; // unit shapes, shared by all parts
 
 export function openArm(shownContent) {
   content = shownContent;
@@ -123,7 +121,6 @@ export function drawnObstacles() {
 }
 
 function begin() {
-  unit = { rod: new THREE.CylinderGeometry(1, 1, 1, 20), cone: new THREE.CylinderGeometry(0, 1, 1, 20), ball: new THREE.SphereGeometry(1, 20, 14) };
   renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
   scene = new THREE.Scene();
   camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1e5);
@@ -192,18 +189,6 @@ function render() {
   if (renderer) renderer.render(scene, camera);
 }
 
-function empty(group) {
-  for (const { geometry } of group.children) if (!Object.values(unit).includes(geometry)) geometry?.dispose();
-  group.clear();
-}
-
-function ball(place, radius, material) {
-  const mesh = new THREE.Mesh(unit.ball, material);
-  mesh.position.set(...place);
-  mesh.scale.setScalar(radius);
-  return mesh;
-}
-
 // Returns the points of the selected design that must be visible: targets, and the arm in all postures.
 function extent() {
   const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high])];
@@ -249,45 +234,10 @@ function look() {
 
 function drawFloor() {
   empty(groups.floor);
-  const { low, high } = frame, span = Math.max(high[0] - low[0], high[1] - low[1], 0.5 * frame.radius);
-  const cell = CELLS.find((size) => span / size <= MOST_CELLS) ?? 100;
-  const [x0, x1, y0, y1] = [low[0], high[0], low[1], high[1]].map((v, k) => (k % 2 ? Math.ceil(v / cell) : Math.floor(v / cell)) * cell);
-  const z = low[2] - 0.02 * frame.radius, points = [];
-  for (let x = x0; x <= x1 + cell / 2; x += cell) points.push(x, y0, z, x, y1, z);
-  for (let y = y0; y <= y1 + cell / 2; y += cell) points.push(x0, y, z, x1, y, z);
-  groups.floor.add(segments(points, new THREE.LineBasicMaterial({ color: colour("line") })));
-  const isSeen = [low[0], low[1], low[2]].every((v, k) => v - frame.radius / 2 <= 0 && high[k] + frame.radius / 2 >= 0);
-  const corner = isSeen ? [0, 0, 0] : [x0, y0, z];
-  for (const [k, axis] of ["x", "y", "z"].entries()) {
-    const [end, place] = [[...corner], [...corner]];
-    end[k] += 0.3 * frame.radius;
-    place[k] += 0.37 * frame.radius;
-    groups.floor.add(segments([...corner, ...end], new THREE.LineBasicMaterial({ color: colour("soft") })));
-    groups.floor.add(label(axis, place));
-  }
+  const { parts, cell, isSeen } = floorParts(frame);
+  groups.floor.add(...parts);
   const where = isSeen ? "the axes are at the world's origin" : "the axes are at the grid's corner, not at the world's origin";
   $("arm-note").textContent = `Grid of ${number(cell)} m; ${where}; z is up. Drag to rotate; use the wheel or two fingers to zoom, and the arrow keys to step through the targets.`;
-}
-
-function segments(points, material) {
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
-  return new THREE.LineSegments(geometry, material);
-}
-
-function label(text, place) {
-  const canvas = document.createElement("canvas"), size = 64;
-  canvas.width = canvas.height = size;
-  const brush = canvas.getContext("2d");
-  brush.font = "44px system-ui, sans-serif";
-  brush.textAlign = "center";
-  brush.textBaseline = "middle";
-  brush.fillStyle = colour("soft");
-  brush.fillText(text, size / 2, size / 2);
-  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), transparent: true, depthTest: false }));
-  sprite.position.set(...place);
-  sprite.scale.setScalar(0.13 * frame.radius);
-  return sprite;
 }
 
 function drawObstacles() {
@@ -305,12 +255,7 @@ function drawLines() {
 // Draws the edges of the boxes to cover.
 function drawWorkspace() {
   empty(groups.workspace);
-  const points = content.head.workspace.flatMap(({ low, high }) => [0, 1, 2].flatMap((axis) => [0, 1, 2, 3].flatMap((corner) => {
-    const others = [0, 1, 2].filter((k) => k !== axis), [start, end] = [[...low], [...low]];
-    others.forEach((k, bit) => { start[k] = end[k] = corner >> bit & 1 ? high[k] : low[k]; });
-    end[axis] = high[axis];
-    return [...start, ...end];
-  })));
+  const points = content.head.workspace.flatMap(({ low, high }) => boxEdges(low, high));
   if (points.length) groups.workspace.add(segments(points, new THREE.LineBasicMaterial({ color: colour("soft") })));
 }
 
@@ -327,12 +272,7 @@ function drawGoal(target, t) {
   if (!n_angular[t]) return;
   for (const k of n_angular[t] === 3 ? [0, 1, 2] : [2]) {
     const way = rotation[t].map((row) => row[k]), long = k === 2 ? size : 0.6 * size;
-    const [end, neck] = [1, 0.72].map((share) => target.map((v, c) => v + share * long * way[c]));
-    const paint_ = n_angular[t] === 3 ? materials.joints[k] : materials.missed;
-    groups.goals.add(rod(target, end, 0.006 * frame.radius, paint_));
-    const head = rod(neck, end, 0.02 * frame.radius, paint_);
-    head.geometry = unit.cone;
-    groups.goals.add(head);
+    groups.goals.add(...arrow(target, way, long, 0.006 * frame.radius, n_angular[t] === 3 ? materials.joints[k] : materials.missed));
   }
 }
 
@@ -340,16 +280,6 @@ const ballSize = () => 0.028 * frame.radius;
 
 // Links have their own thickness, limited so that they stay visible and hide nothing.
 const thick = (arm, j) => Math.min(Math.max(arm.radius[j], 0.008 * frame.radius), 0.035 * frame.radius);
-
-// Returns a cylinder between two points.
-function rod(from, to, radius, material) {
-  const [a, b] = [new THREE.Vector3(...from), new THREE.Vector3(...to)], way = b.clone().sub(a);
-  const mesh = new THREE.Mesh(unit.rod, material);
-  mesh.scale.set(radius, Math.max(way.length(), 1e-6), radius);
-  mesh.position.copy(a.add(b).multiplyScalar(0.5));
-  if (way.length() > 0) mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), way.normalize());
-  return mesh;
-}
 
 function drawPosture(group, arm, q, paints) {
   empty(group);

@@ -5,8 +5,8 @@ import { listen, set, state } from "./state.js";
 import { $, element, metres, millimetres, number, quantity, save } from "./format.js";
 
 const AT_LIMIT = 1e-3; // rad or m
-const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv" };
-const ENDINGS = { urdf: "urdf", mjcf: "xml", csv: "csv" };
+const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv", datasheet: "text/html" };
+const ENDINGS = { urdf: "urdf", mjcf: "xml", csv: "csv", datasheet: "datasheet.html" };
 
 let content = null;
 let fetchFile = null; // where a server has what the page lacks
@@ -86,6 +86,7 @@ export function drawDesign() {
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
   for (const button of document.querySelectorAll(".download")) {
+    button.hidden = button.dataset.format === "datasheet" && !hasServer();
     button.disabled = button.dataset.format !== "csv" && !hasFiles;
     button.title = button.disabled ? "Files are available for the designs of the front" : `Download #${i} as ${button.textContent}`;
   }
@@ -198,6 +199,9 @@ export function showRow(row) {
   if (row.offsetTop - head < box.scrollTop) box.scrollTop = row.offsetTop - head;
   else if (end > box.scrollTop + box.clientHeight) box.scrollTop = end - box.clientHeight;
 }
+
+// Whether a server writes what this page does not hold.
+export const hasServer = () => fetchFile !== null;
 
 const download = (format) => downloadOf(state.design, format);
 

@@ -1,6 +1,6 @@
 // The page of a run in progress: fetches new content from its server, and sends requests of the user.
 
-import { $, duration, element } from "./format.js";
+import { $, duration, element, plural } from "./format.js";
 
 const AGAIN = 1000; // [ms] between attempts to reach a lost server
 
@@ -118,7 +118,7 @@ function doing() {
       return status.designs < status.planned ? `evaluating ${status.designs + 1} of ${status.planned}` : "writing the results";
     case "paused": return `paused for ${since()}, at ${status.designs} of ${status.planned}`;
     case "stopped": return `stopped at ${status.designs} of ${status.planned}; repeat the command to resume`;
-    case "finished": return `finished: ${status.designs} designs`;
+    case "finished": return `finished: ${plural(status.designs, "design")}`;
     default: return `not running, at ${status.designs}${status.planned ? ` of ${status.planned}` : ""}`;
   }
 }

@@ -1,7 +1,7 @@
 // The designs to build, or why there is none: what an engineer reads first.
 
 import { snapshot } from "./arm.js";
-import { downloadOf } from "./design.js";
+import { downloadOf, hasServer } from "./design.js";
 import { listen, set, state } from "./state.js";
 import { $, element, onTheme, plural, quantity, why } from "./format.js";
 
@@ -54,8 +54,10 @@ function card(one) {
     element("dl", { class: "asked" }, ...rows(one).flatMap(([label, value, text]) => [element("dt", {}, label, why(label, text)), element("dd", {}, value)])),
     ...survives(survival),
     element("p", { class: "buttons" }, element("button", { type: "button", onclick: show }, "Show"),
-      ...["urdf", "mjcf"].map((format) => element("button", { type: "button", onclick: () => downloadOf(design, format) }, format.toUpperCase()))));
+      ...downloads().map(([format, text]) => element("button", { type: "button", onclick: () => downloadOf(design, format) }, text))));
 }
+
+const downloads = () => [["urdf", "URDF"], ["mjcf", "MJCF"], ...(hasServer() ? [["datasheet", "Data sheet"]] : [])];
 
 function rows({ design, reach, quantities }) {
   const { quantities: explained } = content.head, measured = { ...quantities };

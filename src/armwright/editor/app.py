@@ -1,0 +1,246 @@
+"""The editor's HTTP application. Needs the extra `live`.
+
+/           the page; ?key=KEY: the address that the terminal shows
+/opened     the texts of both files, and the lists to choose from
+/assess     POST: texts and edits; the new texts and what they mean
+/points     POST: pasted points; as positions
+/save       POST: write both files
+/design     POST: write both files and search designs
+/stop       POST: end the search
+/job        the state of the search
+/run/       the live page of the search
+
+Everything but the first request needs the key, in a cookie: other users of this machine can connect to the port, but
+do not know the key. Requests that change anything also need the token of the page, and come from the page itself.
+"""
+
+import asyncio
+import secrets
+from collections.abc import AsyncGenerator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import asdict
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, Field, ValidationError
+from pydantic_core import to_json
+from starlette.applications import Starlette
+from starlette.datastructures import URL
+from starlette.middleware import Middleware
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, Router
+
+from armwright.editor.assessment import assess
+from armwright.editor.choices import choices
+from armwright.editor.design_run import DesignRun, next_folder
+from armwright.editor.edited_files import MAX_BYTES, ChangedOnDiskError, EditedFiles, Texts
+from armwright.editor.editor_page import render_editor
+from armwright.editor.yaml_edits import Edit, edit_text
+from armwright.exceptions import ArmwrightError, SpaceError, TaskError
+from armwright.report.live_app import LivePage, OpenPages
+from armwright.report.request_guard import Guard, read_request
+from armwright.tasks.points_file import parse_points
+from armwright.tasks.task import Task
+from armwright.yaml_documents import parse_document
+
+MAX_BODY = 4 * MAX_BYTES  # [bytes]; two texts, their quotes escaped
+MAX_EDITS = 10_000
+MIN_SECONDS, MAX_SECONDS = 5.0, 24 * 3600.0
+
+Text = Annotated[str, Field(max_length=MAX_BYTES)]
+Body = TypeVar("Body", bound=BaseModel)
+
+
+class TextsBody(BaseModel, frozen=True, extra="forbid"):
+    """The texts of both files; overwrite: even if they have changed on disk."""
+
+    task: Text
+    space: Text
+    overwrite: bool = False
+
+    @property
+    def texts(self) -> Texts:
+        """The texts alone."""
+        return Texts(self.task, self.space)
+
+
+class AssessBody(TextsBody, frozen=True):
+    """The texts, and edits of the task and the space."""
+
+    task_edits: tuple[Edit, ...] = Field(default=(), max_length=MAX_EDITS)
+    space_edits: tuple[Edit, ...] = Field(default=(), max_length=MAX_EDITS)
+
+
+class DesignBody(TextsBody, frozen=True):
+    """The texts, and the time of a search [s]."""
+
+    seconds: float = Field(ge=MIN_SECONDS, le=MAX_SECONDS)
+
+
+class PointsBody(BaseModel, frozen=True, extra="forbid"):
+    """Pasted points."""
+
+    text: Text
+    unit: str = "m"
+
+
+class StopBody(BaseModel, frozen=True, extra="forbid"):
+    """Nothing."""
+
+
+def editor_app(
+    files: EditedFiles, key: str, port: int, is_allowed: Callable[[str], bool], pages: OpenPages
+) -> Starlette:
+    """Return the editor's application.
+
+    Args:
+        files: The edited files.
+        key: What the first address carries, and then the cookie.
+        port: The port, for the name of the cookie: cookies are shared by all ports of a host.
+        is_allowed: Tells whether a Host header names this server.
+        pages: Counts the open live pages.
+    """
+    editor = Editor(files, pages)
+    middleware = [Middleware(Guard, is_allowed=is_allowed), Middleware(KeyGuard, key=key, cookie=f"armwright-{port}")]
+    return Starlette(routes=editor.routes(), middleware=middleware, lifespan=editor.lifespan)
+
+
+class KeyGuard:
+    """Refuse requests without the key, in the address of the page or in a cookie."""
+
+    def __init__(self, app: Any, key: str, cookie: str) -> None:
+        self._app = app
+        self._key = key
+        self._cookie = cookie
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        app = self._app
+        if scope["type"] == "http":
+            connection = HTTPConnection(scope)
+            if connection.url.path == "/" and self._is_key(connection.query_params.get("key", "")):
+                app = RedirectResponse(str(URL("/")), 303)
+                app.set_cookie(self._cookie, self._key, httponly=True, samesite="lax")
+            elif not self._is_key(connection.cookies.get(self._cookie, "")):
+                app = PlainTextResponse("open the address that `armwright edit` printed, with its key", 403)
+        await app(scope, receive, send)
+
+    def _is_key(self, text: str) -> bool:
+        return secrets.compare_digest(text.encode(), self._key.encode())
+
+
+class Editor:
+    """The editor's requests.
+
+    Args:
+        files: The edited files.
+        pages: Counts the open live pages.
+    """
+
+    def __init__(self, files: EditedFiles, pages: OpenPages) -> None:
+        self._files = files
+        self._pages = pages
+        self._token = secrets.token_urlsafe(24)
+        self._job: DesignRun | None = None
+        self._live: Router | None = None
+        self._watching: asyncio.Task[None] | None = None
+
+    def routes(self) -> list[Route | Mount]:
+        """Return the routes of the application."""
+        return [
+            Route("/", self.page),
+            Route("/opened", self.opened),
+            Route("/job", self.job),
+            Route("/assess", self._post(AssessBody, self.assess), methods=["POST"]),
+            Route("/points", self._post(PointsBody, self.points), methods=["POST"]),
+            Route("/save", self._post(TextsBody, self.save), methods=["POST"]),
+            Route("/design", self._post(DesignBody, self.design), methods=["POST"]),
+            Route("/stop", self._post(StopBody, self.stop), methods=["POST"]),
+            Mount("/run", app=self.run),
+        ]
+
+    @asynccontextmanager
+    async def lifespan(self, app: Starlette) -> AsyncGenerator[None]:
+        yield
+        if self._watching is not None:
+            self._watching.cancel()
+        if self._job is not None:
+            await asyncio.to_thread(self._job.close)
+
+    async def page(self, request: Request) -> Response:
+        return Response(render_editor(self._files.task.name, self._token), media_type="text/html; charset=utf-8")
+
+    async def opened(self, request: Request) -> Response:
+        names = {"task": str(self._files.task), "space": str(self._files.space)}
+        texts = asdict(self._files.texts())
+        return _json({"files": names, **texts, "exist": self._files.exist, "choices": choices()})
+
+    async def job(self, request: Request) -> Response:
+        return _json(None if self._job is None else self._job.status())
+
+    async def run(self, scope: Any, receive: Any, send: Any) -> None:
+        """Answer the requests of the live page."""
+        app = self._live or PlainTextResponse("no search has been started", 404)
+        await app(scope, receive, send)
+
+    async def assess(self, body: AssessBody) -> Response:
+        return _json(await asyncio.to_thread(self._assess, body))
+
+    async def points(self, body: PointsBody) -> Response:
+        return _json({"points": parse_points(body.text, body.unit, "pasted text")})
+
+    async def save(self, body: TextsBody) -> Response:
+        await asyncio.to_thread(self._files.save, body.texts, body.overwrite)
+        return Response(status_code=204)
+
+    async def design(self, body: DesignBody) -> Response:
+        if self._job is not None and self._job.is_running:
+            return PlainTextResponse("a search is running; stop it first", status_code=409)
+        name = parse_document(body.task, Task, TaskError, str(self._files.task)).name
+        await asyncio.to_thread(self._files.save, body.texts, body.overwrite)
+        self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
+        page = LivePage(self._job.folder, self._token, self._pages)
+        self._live = Router(page.routes())
+        if self._watching is not None:
+            self._watching.cancel()
+        self._watching = asyncio.create_task(page.watch())
+        return _json(self._job.status())
+
+    async def stop(self, body: StopBody) -> Response:
+        if self._job is not None:
+            self._job.stop()
+        return Response(status_code=204)
+
+    def _assess(self, body: AssessBody) -> dict[str, Any]:
+        files = self._files
+        texts = Texts(
+            edit_text(body.task, body.task_edits, str(files.task)) if body.task_edits else body.task,
+            edit_text(body.space, body.space_edits, str(files.space)) if body.space_edits else body.space,
+        )
+        return {"texts": asdict(texts), **asdict(assess(texts, files))}
+
+    def _post(
+        self, schema: type[Body], handle: Callable[[Body], Awaitable[Response]]
+    ) -> Callable[[Request], Awaitable[Response]]:
+        """Return the handler of a request of the page with such a body."""
+
+        async def answer(request: Request) -> Response:
+            body = await read_request(request, self._token, MAX_BODY)
+            if isinstance(body, Response):
+                return body
+            try:
+                return await handle(schema.model_validate_json(body))
+            except ValidationError:
+                return PlainTextResponse("the request is not one of the page", status_code=422)
+            except ChangedOnDiskError as fault:
+                return PlainTextResponse(str(fault), status_code=409)
+            except (TaskError, SpaceError) as fault:
+                return PlainTextResponse(str(fault), status_code=400)
+            except ArmwrightError as fault:
+                return PlainTextResponse(str(fault), status_code=500)
+
+        return answer
+
+
+def _json(content: Any) -> Response:
+    """Return JSON; numbers that it lacks become null, and dates text."""
+    return Response(to_json(content, inf_nan_mode="null", fallback=str), media_type="application/json")

@@ -1,0 +1,112 @@
+"""What the texts of a task and a space mean, and what is wrong with them, for the page."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from armwright.editor.edited_files import EditedFiles, Texts
+from armwright.exceptions import ArmwrightError, SpaceError, TaskError
+from armwright.problem.checks.finding import SUSPECTED, Finding
+from armwright.problem.checks.instant import check_instantly
+from armwright.problem.checks.reach import base_box, longest_reach
+from armwright.problem.problem import Problem
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.decimal_commas import find_decimal_commas
+from armwright.tasks.task import Task
+from armwright.yaml_documents import load_document, parse_document
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What two texts mean.
+
+    Attributes:
+        task: The content of the task text as read, valid or not; None if it is not YAML.
+        space: Likewise of the space text.
+        errors: Why no search can start, one message a line.
+        findings: What is suspicious.
+        scene: What to draw; None for a task that is not valid.
+        meaning: The task and the space in words; empty unless both are valid.
+    """
+
+    task: Any
+    space: Any
+    errors: list[str] = field(default_factory=list[str])
+    findings: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
+    scene: dict[str, Any] | None = None
+    meaning: dict[str, str] = field(default_factory=dict[str, str])
+
+
+def assess(texts: Texts, files: EditedFiles) -> Assessment:
+    """Return what the texts of the edited files mean; it needs no kernels."""
+    names = str(files.task), str(files.space)
+    faults: list[ArmwrightError] = []
+
+    def attempt(make: Callable[[], Any]) -> Any:
+        try:
+            return make()
+        except ArmwrightError as fault:
+            faults.append(fault)
+            return None
+
+    contents = [
+        attempt(lambda: load_document(texts.task, TaskError, names[0])),
+        attempt(lambda: load_document(texts.space, SpaceError, names[1])),
+    ]
+    faults.clear()  # they come again
+    task: Task | None = attempt(lambda: parse_document(texts.task, Task, TaskError, names[0]))
+    space: DesignSpace | None = attempt(lambda: parse_document(texts.space, DesignSpace, SpaceError, names[1]))
+    problem: Problem | None = None
+    if task is not None and space is not None:
+        problem = attempt(lambda: Problem(task, space))
+    findings: list[Finding] = [] if faults else list(_decimal_commas(texts, names))
+    if problem is not None:
+        found: list[Finding] | None = attempt(lambda: check_instantly(problem))
+        findings += found or []
+    return Assessment(
+        task=contents[0],
+        space=contents[1],
+        errors=[*map(str, faults), *(str(finding) for finding in findings if finding.is_proven)],
+        findings=[asdict(finding) for finding in findings if not finding.is_proven],
+        scene=None if task is None else _scene(task, problem),
+        meaning={} if problem is None else _meaning(problem),
+    )
+
+
+def _decimal_commas(texts: Texts, names: tuple[str, str]) -> Iterator[Finding]:
+    for text, name in zip((texts.task, texts.space), names, strict=True):
+        for message in find_decimal_commas(text):
+            yield Finding(f"{name}, {message}", SUSPECTED)
+
+
+def _scene(task: Task, problem: Problem | None) -> dict[str, Any]:
+    """Return what is drawn, positions in [m]; the bases are those that the space allows."""
+    arrays = task.target_arrays
+    lines: list[Any] = []
+    if task.cycle is not None:
+        plan = task.plan(task.target_positions)
+        pairs = [(motion.start, motion.end) for motion in plan.motions if motion.by == "line"]
+        lines = [plan.poses.position[list(pair)].tolist() for pair in pairs]
+    return {
+        "targets": task.targets,
+        "names": task.target_names,
+        "n_angular": arrays.n_angular.tolist(),
+        "rotation": arrays.rotation.tolist(),
+        "obstacles": [asdict(obstacle.solid) | {"description": obstacle.describe()} for obstacle in task.obstacles],
+        "workspace": [{"low": region.low, "high": region.high} for region in task.workspace],
+        "lines": lines,
+        "bases": None if problem is None else [corner.tolist() for corner in base_box(problem.space)],
+    }
+
+
+def _meaning(problem: Problem) -> dict[str, str]:
+    task, space = problem.task, problem.space
+    low, high = space.min_joints, space.max_joints
+    constraints = ", ".join(constraint.description for constraint in problem.constraints)
+    return {
+        "cycle": task.cycle_description or "none",
+        "minimised": ", ".join(objective.name for objective in problem.objectives),
+        "constraints, stated and implied": constraints or "none",
+        "joints": f"{low}" if low == high else f"{low} to {high}",
+        "reach of the longest arm": f"{longest_reach(problem):.3g} m",
+    }

@@ -1,0 +1,39 @@
+"""The lists of the page: quantities, actuators, materials."""
+
+from typing import Any
+
+from armwright.problem.objectives import OBJECTIVES, QUANTITIES
+from armwright.robot.actuators import ActuatorRecord, catalogue
+from armwright.robot.tubes import MATERIALS
+from armwright.tasks.points_file import UNITS
+
+
+def choices() -> dict[str, Any]:
+    """Return what a user can choose from, in JSON types."""
+    return {
+        "quantities": [
+            {
+                "name": quantity.name,
+                "label": quantity.label,
+                "unit": quantity.unit,
+                "description": quantity.description,
+                "is_objective": quantity.name in OBJECTIVES,
+            }
+            for quantity in sorted(QUANTITIES.values(), key=lambda quantity: quantity.label)
+        ],
+        "actuators": [_describe(record) for record in catalogue().values()],
+        "materials": list(MATERIALS),
+        "units": list(UNITS),
+    }
+
+
+def _describe(record: ActuatorRecord) -> dict[str, Any]:
+    completed = record.completed()
+    return {
+        "name": record.name,
+        "maker": record.maker,
+        "torque": completed.peak_torque or completed.rated_torque,  # [N m]
+        "mass": record.mass,  # [kg]
+        "voltage": record.voltage,  # [V]
+        "price": record.price,  # [USD]
+    }

@@ -1,0 +1,106 @@
+"""The two files that the editor writes: a task and its design space."""
+
+import os
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from string import Template
+
+from armwright.exceptions import FailureError, TaskError, UsageError
+from armwright.files import naming_write_errors, read_text, replace_file
+from armwright.tasks.task_template import safe_name, task_template
+
+MAX_BYTES = 256 * 1024  # a task of 3,000 targets; forms for more would be slow
+SUFFIXES = (".yaml", ".yml")
+
+
+class ChangedOnDiskError(UsageError):
+    """A file that somebody else has changed since it was read."""
+
+
+@dataclass(frozen=True)
+class Texts:
+    """The text of a task file and of a space file."""
+
+    task: str
+    space: str
+
+
+class EditedFiles:
+    """A task file and a space file. Those that do not exist yet begin with a template and are written by `save`.
+
+    Args:
+        task: The task file.
+        space: The space file; by default `default_space_file`.
+
+    Raises:
+        TaskError: A name does not end in .yaml, or a file cannot be read.
+    """
+
+    def __init__(self, task: Path, space: Path | None = None) -> None:
+        self.task = task
+        self.space = space or default_space_file(task)
+        for file in (self.task, self.space):
+            if file.suffix not in SUFFIXES:
+                raise TaskError(f"{file}: expected a name that ends in .yaml, such as {file.stem}.yaml")
+            if not file.parent.is_dir():
+                raise TaskError(f"{file}: there is no folder {file.parent}")
+        self._seen = {file: _read(file) for file in (self.task, self.space)}
+
+    @property
+    def exist(self) -> bool:
+        """Whether both files were there when they were last read or written."""
+        return None not in self._seen.values()
+
+    def texts(self) -> Texts:
+        """Return the files as they were last read or written, or the templates."""
+        task, space = self._seen[self.task], self._seen[self.space]
+        return Texts(
+            task_template(self.task) if task is None else task, space_template(self.space) if space is None else space
+        )
+
+    def save(self, texts: Texts, overwrite: bool = False) -> None:
+        """Write both files.
+
+        Args:
+            texts: Their content.
+            overwrite: Whether to replace files that have changed since they were last read.
+
+        Raises:
+            ChangedOnDiskError: A file has changed, and `overwrite` is False.
+            FailureError: A file cannot be written.
+        """
+        given = {self.task: texts.task, self.space: texts.space}
+        if not overwrite:
+            for file in given:
+                if _read(file) != self._seen[file]:
+                    raise ChangedOnDiskError(f"{file} has changed on disk since it was opened")
+        for file, text in given.items():
+            if text != self._seen[file] or overwrite:
+                _write(file, text)
+                self._seen[file] = text
+
+
+def default_space_file(task: Path) -> Path:
+    """Return the space file that belongs to a task file: `NAME-space.yaml` for `NAME.yaml` and `NAME-task.yaml`."""
+    return task.with_name(f"{task.stem.removesuffix('-task')}-space{task.suffix}")
+
+
+def space_template(file: Path) -> str:
+    """Return a commented space file to edit; the file's stem becomes its name."""
+    text = (resources.files("armwright.editor") / "space-template.yaml").read_text(encoding="utf-8")
+    return Template(text).substitute(name=safe_name(file.stem))
+
+
+def _read(file: Path) -> str | None:
+    """Return the text of a file; None if it does not exist."""
+    return read_text(file, MAX_BYTES, TaskError) if os.path.lexists(file) else None
+
+
+def _write(file: Path, text: str) -> None:
+    target = file.resolve()  # a link stays one
+    with naming_write_errors(file, error=FailureError):
+        mode = target.stat().st_mode if target.exists() else None
+        replace_file(target, text.encode())
+        if mode is not None:
+            target.chmod(mode)

@@ -1,0 +1,208 @@
+// The task in space. Targets can be dragged: along the ground, or with Shift upwards and downwards.
+
+import { change, opened } from "./editor-document.js";
+import { $, colour, element, number, onTheme } from "./format.js";
+import { choose, chosen, listenToChoice, placeEdit } from "./editor-targets.js";
+import { arrow, ball, boxEdges, empty, floorParts, letters, segments } from "./shapes.js";
+import { solidParts } from "./solids.js";
+
+const VIEW = [0.55, -1, 0.55]; // initial direction of the camera
+const BALL = 0.025, ARROW = 0.14, LETTER = 0.09; // as shares of the frame's radius
+const GRID = 0.001; // [m] to which dragged targets are rounded
+const MOST_NAMED = 60; // targets with their names
+const [TARGET, NOW, OBSTACLE, BASE] = ["#CC79A7", "#E69F00", "#6E7F91", "#0072B2"];
+
+let scene = null, camera = null, controls = null, renderer = null;
+let drawn = null; // the scene of the server that is shown
+let frame = null; // { low, high, centre, radius }
+let dragged = null; // { index, plane, from, start, mesh }
+let turned = false; // whether the user has rotated the view
+const groups = {};
+
+export function openScene() {
+  try {
+    begin();
+  } catch {
+    scene = null;
+    $("scene").replaceChildren(element("p", { class: "note" }, "This browser shows no 3D graphics (WebGL). The tables below do the same."));
+    $("reset").disabled = true;
+    return;
+  }
+  $("reset").addEventListener("click", () => {
+    [frame, turned] = [null, false];
+    drawScene();
+  });
+  listenToChoice(paintChoice);
+  onTheme(drawScene);
+}
+
+// Returns where the targets are drawn, on the canvas [px]; for tests.
+export function targetPlaces() {
+  const { left, top, width, height } = renderer.domElement.getBoundingClientRect();
+  return groups.targets.children.map((mesh) => {
+    const place = mesh.position.clone().project(camera);
+    return [left + ((place.x + 1) / 2) * width, top + ((1 - place.y) / 2) * height];
+  });
+}
+
+function begin() {
+  renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+  scene = new THREE.Scene();
+  camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1e5);
+  camera.up.set(0, 0, 1);
+  scene.add(new THREE.HemisphereLight(0xffffff, 0x8890a0, 2.2));
+  const sun = new THREE.DirectionalLight(0xffffff, 1.6);
+  sun.position.set(3, -5, 8);
+  scene.add(sun);
+  for (const name of ["floor", "bases", "obstacles", "lines", "targets", "ways", "names"]) {
+    groups[name] = new THREE.Group();
+    scene.add(groups[name]);
+  }
+  const canvas = renderer.domElement;
+  $("scene").append(canvas);
+  // Before the controls, which would turn the view.
+  canvas.addEventListener("pointerdown", grab, { capture: true });
+  canvas.addEventListener("pointermove", drag);
+  canvas.addEventListener("pointerup", drop);
+  canvas.addEventListener("pointercancel", drop);
+  controls = new THREE.OrbitControls(camera, canvas);
+  canvas.style.touchAction = "pan-y";
+  controls.addEventListener("change", render);
+  controls.addEventListener("start", () => { turned = true; });
+  new ResizeObserver(fit).observe($("scene"));
+  fit();
+}
+
+function fit() {
+  const box = $("scene");
+  if (!box.clientWidth) return;
+  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+  renderer.setSize(box.clientWidth, box.clientHeight);
+  camera.aspect = box.clientWidth / box.clientHeight;
+  camera.updateProjectionMatrix();
+  if (frame !== null) look();
+}
+
+function render() {
+  renderer.render(scene, camera);
+}
+
+// Draws what the server reads in the files; while a file is not valid, the last scene stays.
+export function drawScene() {
+  if (!scene || dragged !== null) return;
+  drawn = opened.assessed?.scene ?? drawn;
+  if (drawn === null) {
+    $("scene-note").textContent = "The scene appears as soon as the task file is valid.";
+    return;
+  }
+  reframe();
+  $("scene-note").textContent = opened.assessed.scene === null ? "The task file is not valid; this is how it was before." : describe();
+  const { radius } = frame;
+  const solid = (paint) => new THREE.MeshLambertMaterial({ color: paint });
+  const thin = (paint) => new THREE.LineBasicMaterial({ color: paint });
+  for (const group of Object.values(groups)) empty(group);
+  groups.floor.add(...floorParts(frame).parts);
+  const faint = new THREE.MeshLambertMaterial({ color: OBSTACLE, transparent: true, opacity: 0.3, depthWrite: false });
+  for (const one of drawn.obstacles) groups.obstacles.add(...solidParts(one, frame, { face: faint, edge: thin(OBSTACLE) }));
+  if (drawn.bases) {
+    groups.bases.add(segments(boxEdges(...drawn.bases), thin(BASE)));
+    groups.bases.add(letters("base", drawn.bases[1], LETTER * radius, "left"));
+  }
+  if (drawn.lines.length) groups.lines.add(segments(drawn.lines.flat(2), thin(TARGET)));
+  for (const { low, high } of drawn.workspace) groups.lines.add(segments(boxEdges(low, high), thin(colour("soft"))));
+  drawn.targets.forEach((target, t) => {
+    groups.targets.add(ball(target, BALL * radius, solid(TARGET)));
+    const axes = { 0: [], 2: [2], 3: [0, 1, 2] }[drawn.n_angular[t]];
+    for (const k of axes) {
+      const way = drawn.rotation[t].map((row) => row[k]), long = (k === 2 ? 1 : 0.6) * ARROW * radius;
+      groups.ways.add(...arrow(target, way, long, 0.005 * radius, solid(TARGET)));
+    }
+    if (t < MOST_NAMED) groups.names.add(letters(drawn.names[t], target, LETTER * radius, "left"));
+  });
+  paintChoice();
+}
+
+function describe() {
+  const bases = drawn.bases ? "; the blue box holds the allowed bases" : "";
+  return `Grid of ${number(floorParts(frame).cell)} m; z is up${bases}. Drag a target along the ground, with Shift up and down; drag elsewhere to rotate.`;
+}
+
+function paintChoice() {
+  if (!scene || frame === null) return;
+  groups.targets.children.forEach((mesh, t) => {
+    mesh.material.color.set(t === chosen() ? NOW : TARGET);
+    mesh.scale.setScalar((t === chosen() ? 1.5 : 1) * BALL * frame.radius);
+  });
+  render();
+}
+
+function reframe() {
+  const points = [...drawn.targets, ...(drawn.bases ?? []), ...drawn.workspace.flatMap(({ low, high }) => [low, high])];
+  const low = [0, 1, 2].map((k) => points.reduce((least, p) => Math.min(least, p[k]), Infinity));
+  const high = [0, 1, 2].map((k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity));
+  const radius = Math.max(1e-2, Math.hypot(...high.map((v, k) => v - low[k])) / 2);
+  const isFar = frame === null || radius > 1.2 * frame.radius || radius < 0.5 * frame.radius
+    || low.some((v, k) => v < frame.low[k] - 0.4 * frame.radius) || high.some((v, k) => v > frame.high[k] + 0.4 * frame.radius);
+  if (!isFar) return;
+  frame = { low, high, radius, centre: low.map((v, k) => (v + high[k]) / 2) };
+  look();
+}
+
+function look() {
+  const far = (1.1 * frame.radius) / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, camera.aspect);
+  const way = turned ? camera.position.clone().sub(controls.target) : new THREE.Vector3(...VIEW);
+  controls.target.set(...frame.centre);
+  camera.position.copy(controls.target).addScaledVector(way.normalize(), far);
+  camera.near = far / 100;
+  camera.far = 10 * far;
+  camera.updateProjectionMatrix();
+  controls.update();
+  render();
+}
+
+function ray(event) {
+  const box = renderer.domElement.getBoundingClientRect();
+  const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+  const caster = new THREE.Raycaster();
+  caster.setFromCamera(at, camera);
+  return caster;
+}
+
+function grab(event) {
+  if (event.button !== 0 || frame === null) return;
+  const [hit] = ray(event).intersectObjects(groups.targets.children);
+  if (!hit) return;
+  event.stopImmediatePropagation();
+  event.preventDefault();
+  const index = groups.targets.children.indexOf(hit.object), place = hit.object.position.clone();
+  choose(index);
+  const up = event.shiftKey, normal = new THREE.Vector3(0, 0, 1);
+  if (up) {
+    camera.getWorldDirection(normal);
+    normal.z = 0;
+    normal.normalize();
+  }
+  const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, place);
+  dragged = { index, up, plane, place, from: ray(event).ray.intersectPlane(plane, new THREE.Vector3()), mesh: hit.object, moved: false };
+  renderer.domElement.setPointerCapture(event.pointerId);
+}
+
+function drag(event) {
+  if (dragged === null) return;
+  const { plane, from, place, mesh, up } = dragged, at = ray(event).ray.intersectPlane(plane, new THREE.Vector3());
+  if (at === null || from === null) return;
+  const shift = at.sub(from), round = (v) => Math.round(v / GRID) * GRID;
+  if (up) mesh.position.setZ(round(place.z + shift.z));
+  else mesh.position.set(round(place.x + shift.x), round(place.y + shift.y), place.z);
+  dragged.moved = true;
+  const [x, y, z] = mesh.position.toArray().map((v) => number(v, 6));
+  $("scene-note").textContent = `Target ${drawn.names[dragged.index]} at (${x}, ${y}, ${z}) m`;
+  render();
+}
+
+function drop() {
+  if (dragged === null) return;
+  const { index, mesh, moved } = dragged;
+  dragged = null;
+  if (moved) change({ task: placeEdit(index, mesh.position.toArray()) });
+}

@@ -1,0 +1,69 @@
+// Draws a task and its design space beside their files, and starts searches.
+
+import { change, complain, idle, isSaved, openDocument, opened, save, show, undo } from "./editor-document.js";
+import { drawForms, openForms } from "./editor-forms.js";
+import { openJob } from "./editor-job.js";
+import { drawScene, openScene, targetPlaces } from "./editor-scene.js";
+import { $, element, plural } from "./format.js";
+
+function draw() {
+  const field = $("text"), { assessed, texts, shown } = opened;
+  if (field.value !== texts[shown]) {
+    const top = field.scrollTop;
+    field.value = texts[shown];
+    field.scrollTop = top;
+  }
+  $("file-name").textContent = opened.files[shown];
+  for (const button of $("files").children) button.setAttribute("aria-pressed", button.dataset.file === shown);
+  $("saved").textContent = isSaved() ? "saved" : "not saved";
+  $("save").disabled = isSaved();
+  $("undo").disabled = !opened.history.length;
+  drawCheck(assessed);
+  drawForms();
+  drawScene();
+}
+
+function drawCheck({ errors, findings, meaning }) {
+  $("verdict").textContent = errors.length ? "No search can start yet"
+    : findings.length ? `Ready, with ${plural(findings.length, "warning")}` : "Ready";
+  $("verdict").className = errors.length ? "error" : "good";
+  $("findings").replaceChildren(
+    ...errors.map((text) => element("li", { class: "error" }, text)),
+    ...findings.map(({ message, evidence }) => element("li", {}, `${message} (${evidence})`)),
+  );
+  $("meaning").replaceChildren(...Object.entries(meaning).flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]));
+}
+
+function listenToKeys() {
+  for (const button of $("files").children) button.addEventListener("click", () => show(button.dataset.file));
+  $("save").addEventListener("click", save);
+  $("undo").addEventListener("click", undo);
+  addEventListener("keydown", (event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.key !== "s") return;
+    event.preventDefault();
+    save();
+  });
+  addEventListener("beforeunload", (event) => {
+    if (!isSaved()) event.preventDefault();
+  });
+}
+
+async function start() {
+  try {
+    const reply = await (await fetch("opened")).json();
+    $("title").textContent = reply.files.task;
+    openForms(reply.choices);
+    openScene();
+    openJob();
+    listenToKeys();
+    await openDocument(reply, draw);
+    $("loading").hidden = true;
+  } catch (fault) {
+    $("loading").textContent = `This page cannot be shown: ${fault.message}`;
+    throw fault;
+  }
+}
+
+// For the console and for tests.
+window.armwright = { change, complain, idle, opened, targetPlaces };
+start();

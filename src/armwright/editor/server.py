@@ -1,0 +1,50 @@
+"""Serve the editor to browsers on this machine."""
+
+import html
+import secrets
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from armwright.editor.edited_files import EditedFiles
+from armwright.extras import check_extra
+from armwright.report.live_server import LOOPBACK, serve_app
+
+
+def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0, opens_browser: bool = False) -> None:
+    """Serve the editor of two files until Ctrl-C, on this machine only.
+
+    Args:
+        files: The task file and the space file.
+        tell: Called with the address, which holds the key, once it can be opened.
+        port: Port to listen on; 0 for any free one.
+        opens_browser: Whether to open the address in the user's browser.
+
+    Raises:
+        MissingExtraError: The extra `live` is not installed.
+        FailureError: The port cannot be used.
+    """
+    check_extra("live", "the editor")
+    from armwright.editor.app import editor_app
+    from armwright.report.live_app import OpenPages
+
+    key, pages = secrets.token_urlsafe(24), OpenPages()
+    with TemporaryDirectory(prefix="armwright-") as private:
+
+        def announce(server: str) -> None:
+            address = f"{server}?key={key}"
+            tell(address)
+            if opens_browser:
+                _open(address, Path(private))
+
+        serve_app(
+            lambda is_allowed, port: editor_app(files, key, port, is_allowed, pages), pages, announce, LOOPBACK, port
+        )
+
+
+def _open(address: str, private: Path) -> None:
+    """Open an address in the browser by a file: other users see the arguments of processes."""
+    page = private / "open.html"
+    page.write_text(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">\n', encoding="utf-8")
+    webbrowser.open(page.as_uri())

@@ -1,0 +1,81 @@
+"""The files that the editor opens and writes."""
+
+import stat
+from pathlib import Path
+
+import pytest
+
+import armwright as aw
+from armwright.editor.edited_files import MAX_BYTES, ChangedOnDiskError, EditedFiles, Texts, default_space_file
+from armwright.exceptions import FailureError, TaskError
+
+
+@pytest.mark.parametrize(
+    ("task", "space"),
+    [("my.yaml", "my-space.yaml"), ("a/my-task.yml", "a/my-space.yml"), ("task.yaml", "task-space.yaml")],
+)
+def test_a_space_file_is_named_after_its_task(task: str, space: str) -> None:
+    assert default_space_file(Path(task)) == Path(space)
+
+
+def test_new_files_begin_with_templates_and_are_written_by_save(tmp_path: Path) -> None:
+    files = EditedFiles(tmp_path / "new.yaml")
+    assert not files.exist
+    files.save(files.texts())
+    assert files.exist
+    task, space = aw.load_task(tmp_path / "new.yaml"), aw.load_space(tmp_path / "new-space.yaml")
+    assert task.name == "new"
+    assert space.actuators
+    assert aw.Problem(task, space).objectives
+
+
+def test_a_file_that_changed_on_disk_is_kept(tmp_path: Path) -> None:
+    files = EditedFiles(tmp_path / "new.yaml")
+    files.save(files.texts())
+    (tmp_path / "new.yaml").write_text("name: theirs\n")
+    mine = Texts("name: mine\n", files.texts().space)
+    with pytest.raises(ChangedOnDiskError, match=r"new\.yaml has changed"):
+        files.save(mine)
+    assert (tmp_path / "new.yaml").read_text() == "name: theirs\n"
+    files.save(mine, overwrite=True)
+    assert (tmp_path / "new.yaml").read_text() == "name: mine\n"
+    files.save(Texts("name: later\n", mine.space))
+
+
+def test_a_file_that_appeared_meanwhile_is_kept(tmp_path: Path) -> None:
+    files = EditedFiles(tmp_path / "new.yaml")
+    (tmp_path / "new-space.yaml").write_text("name: theirs\n")
+    with pytest.raises(ChangedOnDiskError, match=r"new-space\.yaml"):
+        files.save(files.texts())
+    assert not (tmp_path / "new.yaml").exists()
+
+
+def test_links_and_modes_stay(tmp_path: Path) -> None:
+    (tmp_path / "real.yaml").write_text("name: one\n")
+    (tmp_path / "real.yaml").chmod(0o600)
+    (tmp_path / "link.yaml").symlink_to(tmp_path / "real.yaml")
+    files = EditedFiles(tmp_path / "link.yaml")
+    files.save(Texts("name: two\n", files.texts().space))
+    assert (tmp_path / "link.yaml").is_symlink()
+    assert (tmp_path / "real.yaml").read_text() == "name: two\n"
+    assert stat.S_IMODE((tmp_path / "real.yaml").stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize("name", ["task.txt", "task", "nowhere/task.yaml"])
+def test_names_that_cannot_be_task_files_are_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(TaskError, match=r"expected a name|there is no folder"):
+        EditedFiles(tmp_path / name)
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"#" * (MAX_BYTES + 1)])
+def test_what_is_no_text_or_too_long_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "task.yaml").write_bytes(content)
+    with pytest.raises(TaskError, match=r"task\.yaml"):
+        EditedFiles(tmp_path / "task.yaml")
+
+
+def test_a_folder_in_the_place_of_a_file_is_an_error(tmp_path: Path) -> None:
+    files = EditedFiles(tmp_path / "task.yaml")
+    (tmp_path / "task.yaml").mkdir()
+    with pytest.raises((FailureError, TaskError)):
+        files.save(files.texts(), overwrite=True)

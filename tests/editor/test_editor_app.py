@@ -1,0 +1,202 @@
+"""The editor's server: its requests, and attacks by other pages, other users and hostile texts."""
+
+import http.client
+import json
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import armwright as aw
+from armwright.editor.app import MAX_BODY
+from armwright.report.request_guard import HEADERS
+from tests.support.editor import ServedEditor, served_editor
+from tests.support.live_server import ask
+
+POSTS = ("/assess", "/points", "/save", "/design", "/stop")
+GETS = ("/", "/opened", "/job", "/run/", "/run/run", "/run/events")
+
+
+@pytest.fixture
+def editor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ServedEditor]:
+    monkeypatch.chdir(tmp_path)
+    with served_editor(tmp_path / "my-task.yaml") as served:
+        yield served
+
+
+def texts(editor: ServedEditor) -> dict[str, str]:
+    opened = json.loads(editor.get("/opened")[1])
+    return {"task": opened["task"], "space": opened["space"]}
+
+
+def right_body(editor: ServedEditor, path: str) -> dict[str, Any]:
+    return {
+        "/assess": texts(editor),
+        "/points": {"text": "1,2,3"},
+        "/save": texts(editor),
+        "/design": {**texts(editor), "seconds": 5},
+        "/stop": {},
+    }[path]
+
+
+def said(port: int, *lines: str) -> tuple[int, dict[str, str]]:
+    with socket.create_connection(("127.0.0.1", port)) as connection:
+        connection.sendall("\r\n".join([*lines, "", ""]).encode())
+        answer = http.client.HTTPResponse(connection)
+        answer.begin()
+        return answer.status, {name.lower(): value for name, value in answer.getheaders()}
+
+
+def test_edits_are_applied_assessed_and_saved(editor: ServedEditor) -> None:
+    edits = [{"path": ["targets", 0], "value": {"name": "left", "position": [0.3, 0, 0.1]}}]
+    status, reply = editor.post(
+        "/assess", {**texts(editor), "task_edits": edits, "space_edits": [{"path": ["joints"], "value": 5}]}
+    )
+    assert status == 200
+    found = json.loads(reply)
+    assert found["scene"]["names"][0] == "left"
+    assert found["meaning"]["joints"] == "5"
+    assert editor.post("/save", found["texts"])[0] == 204
+    assert aw.load_task(editor.task).target_names[0] == "left"
+    assert aw.load_space(editor.task.with_name("my-space.yaml")).joints == 5
+
+
+def test_a_file_that_changed_on_disk_is_a_conflict(editor: ServedEditor) -> None:
+    mine = texts(editor)
+    editor.task.write_text("name: theirs\n")
+    status, reason = editor.post("/save", mine)
+    assert (status, editor.task.read_text()) == (409, "name: theirs\n")
+    assert b"has changed on disk" in reason
+    assert editor.post("/save", {**mine, "overwrite": True})[0] == 204
+    assert editor.task.read_text() == mine["task"]
+
+
+def test_pasted_points_are_converted(editor: ServedEditor) -> None:
+    assert json.loads(editor.post("/points", {"text": "x;y;z\n100;20;-3\n", "unit": "mm"})[1]) == {
+        "points": [[0.1, 0.02, -0.003]]
+    }
+    status, reason = editor.post("/points", {"text": "1, 2\n"})
+    assert (status, b"line 1" in reason) == (400, True)
+
+
+def test_a_search_needs_a_valid_task_and_writes_nothing_without(editor: ServedEditor) -> None:
+    status, reason = editor.post("/design", {**texts(editor), "task": "name: 7", "seconds": 5})
+    assert (status, b"my-task.yaml" in reason) == (400, True)
+    assert not editor.task.exists()
+    assert json.loads(editor.get("/job")[1]) is None
+
+
+@pytest.mark.parametrize("path", GETS)
+def test_nothing_is_shown_without_the_key(editor: ServedEditor, path: str) -> None:
+    assert ask(editor.port, "GET", path)[0] == 403
+    assert ask(editor.port, "GET", path, Cookie=f"armwright-{editor.port}=wrong")[0] == 403
+    assert ask(editor.port, "GET", f"{path}?key=wrong")[0] == 403
+    assert ask(editor.port, "GET", path, Cookie=f"armwright-1={editor.key}")[0] == 403
+    if path != "/":  # only the page's own address takes the key
+        assert ask(editor.port, "GET", f"{path}?key={editor.key}")[0] == 403
+
+
+@pytest.mark.parametrize("path", POSTS)
+def test_only_the_page_itself_changes_anything(editor: ServedEditor, path: str) -> None:
+    body = right_body(editor, path)
+    for refused, headers in (
+        (403, {"Cookie": ""}),
+        (403, {"Cookie": f"armwright-{editor.port}=x"}),
+        (403, {"X_Armwright_Token": ""}),
+        (403, {"X_Armwright_Token": editor.key}),
+        (403, {"Origin": ""}),
+        (403, {"Origin": "http://evil.example"}),
+        (403, {"Origin": f"http://localhost:{editor.port}"}),
+        (415, {"Content_Type": "text/plain"}),
+        (421, {"Host": "evil.example"}),
+    ):
+        assert editor.post(path, body, **headers)[0] == refused
+        assert not editor.task.exists()
+    assert editor.get(path)[0] == 405
+    assert ask(editor.port, "OPTIONS", path, Cookie=editor.cookie)[0] == 405
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"[]",
+        b"null",
+        b"\xff",
+        b"[" * 10_000,
+        b'{"task": 1}',
+        b'{"path": "/etc/passwd", "task": "", "space": ""}',
+        b'{"seconds": NaN}',
+    ],
+)
+def test_bodies_that_the_page_never_sends_are_refused(editor: ServedEditor, body: bytes) -> None:
+    for path in POSTS:
+        assert editor.post(path, body)[0] == 422
+    assert not editor.task.exists()
+
+
+def test_large_bodies_are_refused(editor: ServedEditor) -> None:
+    assert editor.post("/assess", b'{"task": "' + b"#" * MAX_BODY + b'"}')[0] == 413
+    assert editor.post("/assess", {**texts(editor), "task_edits": [{"path": ["a"] * 50}]})[0] == 422
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/my-task.yaml",
+        "/../my-task.yaml",
+        "/run/../opened/x",
+        "/run/%2e%2e/%2e%2e/etc/passwd",
+        "//etc/passwd",
+        "/opened/",
+        "/vendor/three.min.js",
+    ],
+)
+def test_no_file_is_served_by_name(editor: ServedEditor, path: str) -> None:
+    assert editor.get(path)[0] in (307, 404)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        "a: &a [x, x]\nb: [*a, *a]\n",
+        "!!python/object/apply:os.system ['true']",
+        "targets: " + "[" * 2_000,
+        "1:" * 5_000,
+        "name: x\x00y",
+        "\ud800",
+        "#" * 250_000,
+    ],
+)
+def test_hostile_texts_are_assessed(editor: ServedEditor, task: str) -> None:
+    status, reply = editor.post("/assess", {"task": task, "space": task, "task_edits": []})
+    assert status in (200, 422)
+    assert status == 422 or json.loads(reply)["errors"]
+    assert editor.post("/assess", {"task": task, "space": "", "task_edits": [{"path": ["payload"], "value": 1}]})[
+        0
+    ] in (200, 400, 422)
+
+
+def test_responses_have_security_headers(editor: ServedEditor) -> None:
+    host, cookie = f"Host: 127.0.0.1:{editor.port}", f"Cookie: {editor.cookie}"
+    for status, lines in (
+        (200, ("GET / HTTP/1.1", host, cookie)),
+        (200, ("GET /opened HTTP/1.1", host, cookie)),
+        (403, ("GET / HTTP/1.1", host)),
+        (404, ("GET /run/ HTTP/1.1", host, cookie)),
+        (421, ("GET / HTTP/1.1", "Host: evil.example", cookie)),
+    ):
+        got, headers = said(editor.port, *lines)
+        assert got == status
+        assert {name: headers.get(name.lower()) for name in HEADERS} == dict(HEADERS)
+
+
+def test_the_key_becomes_a_cookie_that_scripts_cannot_read(editor: ServedEditor) -> None:
+    status, headers = said(editor.port, f"GET /?key={editor.key} HTTP/1.1", f"Host: 127.0.0.1:{editor.port}")
+    assert (status, headers["location"]) == (303, "/")
+    assert {part.strip().lower() for part in headers["set-cookie"].split(";")} >= {"httponly", "samesite=lax", "path=/"}
+    page = editor.get("/")[1].decode()
+    assert editor.key not in page
+    assert "default-src 'none'" in page
