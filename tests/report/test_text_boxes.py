@@ -16,9 +16,9 @@ from armwright.report import drawing
 from armwright.report.figures import write_figures
 from armwright.report.page import write_report
 from tests.support.browser import Tab
+from tests.support.text_boxes import TOUCHING, check_texts, overlap
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-TOUCHING = 3.0  # [px] of margins that text boxes may share; a letter is 14 px high
 WIDTHS = (1280, 390)
 
 
@@ -71,11 +71,6 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[Bbox, list[tuple[s
     return found
 
 
-def overlap(one: Bbox, other: Bbox) -> float:
-    """The smaller side of what two boxes share [px]."""
-    return min(min(one.x1, other.x1) - max(one.x0, other.x0), min(one.y1, other.y1) - max(one.y0, other.y0))
-
-
 def test_texts_of_figures_are_whole_and_apart(run: Path, drawn: dict[str, tuple[Bbox, list[tuple[str, Bbox]]]]) -> None:
     write_figures(run)
     assert len(drawn) >= 3
@@ -95,34 +90,10 @@ def tab(browser: Browser) -> Iterator[Tab]:
     opened.close()
 
 
-# Boxes of the lines of all visible texts outside of scrolling boxes, with their texts.
-TEXTS = """() => {
-    const found = [], walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-    const isLeftOut = "script, style, option, .scroll, .modebar, noscript, details:not([open]) > :not(summary)";
-    for (let node = walk.nextNode(); node; node = walk.nextNode()) {
-        const parent = node.parentElement, text = node.textContent.trim();
-        if (!text || !parent.checkVisibility({ visibilityProperty: true, opacityProperty: true })) continue;
-        if (parent.closest(isLeftOut)) continue;
-        const range = document.createRange();
-        range.selectNodeContents(node);
-        for (const { left, top, right, bottom, width } of range.getClientRects()) {
-            if (width > 0) found.push([text, left, top + scrollY, right, bottom + scrollY]);
-        }
-    }
-    return found;
-}"""
-
-
 @pytest.mark.parametrize("width", WIDTHS)
 def test_texts_of_the_page_are_whole_and_apart(run: Path, tab: Tab, width: int) -> None:
     write_report(run)
     tab.page.set_viewport_size({"width": width, "height": 900})
     tab.open(run / "report.html")
     tab.page.locator("#arm canvas").wait_for()
-    texts = [(text, Bbox.from_extents(*box)) for text, *box in tab.ask(TEXTS)]
-    assert len(texts) > 30
-    for text, box in texts:
-        assert box.x0 > -1, text
-        assert box.x1 < width + 1, f"{text!r} leaves the page"
-    for (text, box), (other, its) in combinations(texts, 2):
-        assert overlap(box, its) < TOUCHING, f"{text!r} lies on {other!r}"
+    check_texts(tab, least=31)

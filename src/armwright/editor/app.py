@@ -170,7 +170,7 @@ class Editor:
         return Response(render_editor(self._files.task.name, self._token), media_type="text/html; charset=utf-8")
 
     async def opened(self, request: Request) -> Response:
-        names = {"task": str(self._files.task), "space": str(self._files.space)}
+        names = {"task": self._files.task.name, "space": self._files.space.name}
         texts = asdict(self._files.texts())
         return _json({"files": names, **texts, "exist": self._files.exist, "choices": choices()})
 

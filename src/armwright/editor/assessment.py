@@ -92,7 +92,9 @@ def _scene(task: Task, problem: Problem | None) -> dict[str, Any]:
         "names": task.target_names,
         "n_angular": arrays.n_angular.tolist(),
         "rotation": arrays.rotation.tolist(),
-        "obstacles": [asdict(obstacle.solid) | {"description": obstacle.describe()} for obstacle in task.obstacles],
+        "obstacles": [
+            asdict(obstacle.solid) | {"rotation": obstacle.solid.rotation.tolist()} for obstacle in task.obstacles
+        ],
         "workspace": [{"low": region.low, "high": region.high} for region in task.workspace],
         "lines": lines,
         "bases": None if problem is None else [corner.tolist() for corner in base_box(problem.space)],

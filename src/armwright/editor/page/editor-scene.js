@@ -8,6 +8,7 @@ import { solidParts } from "./solids.js";
 
 const VIEW = [0.55, -1, 0.55]; // initial direction of the camera
 const BALL = 0.025, ARROW = 0.14, LETTER = 0.09; // as shares of the frame's radius
+const GRIP = 1.6; // times the radius of a ball, within which it is grabbed
 const GRID = 0.001; // [m] to which dragged targets are rounded
 const MOST_NAMED = 60; // targets with their names
 const [TARGET, NOW, OBSTACLE, BASE] = ["#CC79A7", "#E69F00", "#6E7F91", "#0072B2"];
@@ -15,7 +16,7 @@ const [TARGET, NOW, OBSTACLE, BASE] = ["#CC79A7", "#E69F00", "#6E7F91", "#0072B2
 let scene = null, camera = null, controls = null, renderer = null;
 let drawn = null; // the scene of the server that is shown
 let frame = null; // { low, high, centre, radius }
-let dragged = null; // { index, plane, from, start, mesh }
+let dragged = null; // { index, up, normal, place, from, mesh, moved }
 let turned = false; // whether the user has rotated the view
 const groups = {};
 
@@ -160,36 +161,45 @@ function look() {
   render();
 }
 
-function ray(event) {
+// Returns the line of sight through a point of the canvas: { from, way }.
+function sight(event) {
   const box = renderer.domElement.getBoundingClientRect();
-  const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
-  const caster = new THREE.Raycaster();
-  caster.setFromCamera(at, camera);
-  return caster;
+  const x = ((event.clientX - box.left) / box.width) * 2 - 1, y = 1 - ((event.clientY - box.top) / box.height) * 2;
+  return { from: camera.position, way: new THREE.Vector3(x, y, 0.5).unproject(camera).sub(camera.position).normalize() };
+}
+
+// Returns where a line of sight meets the plane through a point; null if it does not.
+function meet({ from, way }, normal, place) {
+  const far = normal.dot(place.clone().sub(from)) / normal.dot(way);
+  return far > 0 && Number.isFinite(far) ? from.clone().addScaledVector(way, far) : null;
+}
+
+// Returns the index of the nearest target on a line of sight; -1 for none.
+function hit({ from, way }) {
+  const far = groups.targets.children.map((mesh) => {
+    const along = mesh.position.clone().sub(from), depth = along.dot(way);
+    return along.addScaledVector(way, -depth).length() < GRIP * mesh.scale.x ? depth : Infinity;
+  });
+  const nearest = Math.min(...far);
+  return nearest < Infinity ? far.indexOf(nearest) : -1;
 }
 
 function grab(event) {
   if (event.button !== 0 || frame === null) return;
-  const [hit] = ray(event).intersectObjects(groups.targets.children);
-  if (!hit) return;
+  const line = sight(event), index = hit(line);
+  if (index < 0) return;
   event.stopImmediatePropagation();
   event.preventDefault();
-  const index = groups.targets.children.indexOf(hit.object), place = hit.object.position.clone();
+  const mesh = groups.targets.children[index], place = mesh.position.clone(), up = event.shiftKey, normal = new THREE.Vector3(0, 0, 1);
   choose(index);
-  const up = event.shiftKey, normal = new THREE.Vector3(0, 0, 1);
-  if (up) {
-    camera.getWorldDirection(normal);
-    normal.z = 0;
-    normal.normalize();
-  }
-  const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, place);
-  dragged = { index, up, plane, place, from: ray(event).ray.intersectPlane(plane, new THREE.Vector3()), mesh: hit.object, moved: false };
+  if (up) normal.copy(line.way).setZ(0).normalize();
+  dragged = { index, up, normal, place, from: meet(line, normal, place), mesh, moved: false };
   renderer.domElement.setPointerCapture(event.pointerId);
 }
 
 function drag(event) {
   if (dragged === null) return;
-  const { plane, from, place, mesh, up } = dragged, at = ray(event).ray.intersectPlane(plane, new THREE.Vector3());
+  const { normal, from, place, mesh, up } = dragged, at = meet(sight(event), normal, place);
   if (at === null || from === null) return;
   const shift = at.sub(from), round = (v) => Math.round(v / GRID) * GRID;
   if (up) mesh.position.setZ(round(place.z + shift.z));
