@@ -169,14 +169,50 @@ def stiffness(folder: Path, page: Page, file: Path) -> None:
     page.locator("main").screenshot(path=file)
 
 
-def existing_arms(folder: Path, page: Page, file: Path) -> None:
-    """Show a front with two existing arms."""
+def shelves(folder: Path) -> Path:
+    """Return a run that two existing arms are compared with."""
+    run = folder / "runs/shelves"
+    if run.exists():
+        return run
     task, space = (EXAMPLES / f"7-compare-arms-{part}.yaml" for part in ("task", "space"))
-    run = once(folder, "runs/shelves", "design", task, "--space", space, "--evaluations", 4000)
+    once(folder, "runs/shelves", "design", task, "--space", space, "--evaluations", 4000)
     for name, robot_file in (("so101", "so101"), ("ur3", "ur3_robot")):
         shutil.copy(robot(robot_file), folder / f"{name}.urdf")
     armwright(folder, "compare-arms", task, "so101.urdf", "ur3.urdf", "--run", run)
-    shutil.copy(run / "figures/front.png", file)
+    return run
+
+
+def existing_arms(folder: Path, page: Page, file: Path) -> None:
+    """Show a front with two existing arms."""
+    shutil.copy(shelves(folder) / "figures/front.png", file)
+
+
+def comparison(folder: Path, page: Page, file: Path) -> None:
+    """Show the report of a run that existing arms are compared with."""
+    open_report(page, shelves(folder), (1280, 1560))
+    page.screenshot(path=file)
+
+
+def six_axes(folder: Path, page: Page, file: Path) -> None:
+    """Show the report of arms with six axes."""
+    open_report(page, once(folder, "runs/six", "design", "box-palletising", "--evaluations", 2000), (1280, 1900))
+    page.screenshot(path=file)
+
+
+def editor(folder: Path, page: Page, file: Path) -> None:
+    """Show the editor of an example."""
+    for part in ("task", "space"):
+        shutil.copy(EXAMPLES / f"2-assembly-{part}.yaml", folder)
+    command = [Path(sys.executable).with_name("armwright"), "edit", "2-assembly-task.yaml"]
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        page.set_viewport_size({"width": 1280, "height": 1480})
+        page.emulate_media(color_scheme="light")
+        page.goto(server.stdout.readline().strip())
+        page.locator("#loading").wait_for(state="hidden")
+        page.wait_for_timeout(1000)
+        page.screenshot(path=file)
+        server.terminate()
 
 
 def arms(folder: Path, page: Page, file: Path) -> None:
@@ -218,7 +254,10 @@ PICTURES: dict[str, Shot] = {
     "page-recommended.png": engineer((1280, 1500)),
     "page-phone.png": engineer((390, 844)),
     "page-infeasible.png": infeasible_report,
+    "page-six-axes.png": six_axes,
+    "page-comparison.png": comparison,
     "page-live.png": live_report,
+    "editor.png": editor,
     "tutorial.png": tutorial,
     "example-shelf.png": arm_of(
         "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=2&target=4", drag=90, zoom=250

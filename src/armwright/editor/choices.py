@@ -1,10 +1,11 @@
-"""The lists of the page: quantities, actuators, materials."""
+"""The lists of the page: quantities, joint modules, actuators, materials."""
 
 from typing import Any
 
 from armwright.problem.objectives import OBJECTIVES, QUANTITIES
 from armwright.robot.actuators import ActuatorRecord, catalogue
 from armwright.robot.tubes import MATERIALS
+from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
 from armwright.tasks.points_file import UNITS
 
 
@@ -20,6 +21,10 @@ def choices() -> dict[str, Any]:
                 "is_objective": quantity.name in OBJECTIVES,
             }
             for quantity in sorted(QUANTITIES.values(), key=lambda quantity: quantity.label)
+        ],
+        "modules": [
+            {"letter": letter, "label": f"{letter}: {description.partition(',')[0]}", "description": description}
+            for letter, description in JOINT_DESCRIPTIONS.items()
         ],
         "actuators": [_describe(record) for record in catalogue().values()],
         "materials": list(MATERIALS),

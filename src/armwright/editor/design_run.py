@@ -70,8 +70,9 @@ class DesignRun:
 
     def _read(self) -> None:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self._lines.append(line.rstrip()[:MAX_LINE])
+        with self._process.stdout as output:
+            for line in output:
+                self._lines.append(line.rstrip()[:MAX_LINE])
 
 
 def next_folder(name: str) -> Path:

@@ -6,11 +6,13 @@ import { $, element, number, plural } from "./format.js";
 
 const RANGES = [["origin_x", "Base, x", [-1, 1], length], ["origin_y", "Base, y", [-1, 1], length], ["origin_z", "Base, z", [-1, 1], length], ["link", "Link length", [0.03, 0.3], length], ["joint_range", "Joint angle", [-2.4, 2.4], angle]];
 
-let actuators = [], materials = [];
+const TYPES = ["R", "P", "Y"]; // of a space that states none
+
+let actuators = [], materials = [], modules = [];
 const space = () => record(opened.assessed.space);
 
 export function openMotors(choices) {
-  ({ actuators, materials } = choices);
+  ({ actuators, materials, modules } = choices);
   const voltages = [...new Set(actuators.map((one) => one.voltage).filter((v) => v !== null))].sort((a, b) => a - b);
   $("motor-voltage").replaceChildren(element("option", { value: "" }, "any"), ...voltages.map((v) => element("option", { value: v }, `${v} V`)));
   for (const id of ["motor-name", "motor-torque", "motor-price", "motor-voltage"]) $(id).addEventListener("input", drawMotors);
@@ -24,6 +26,16 @@ export function drawSpace() {
   line("Joints",
     numberField({ id: "joints-low", value: low, label: "Least number of joints", size: 3, edit: (v) => jointsEdit(v, Math.max(v, high)) }), "to",
     numberField({ id: "joints-high", value: high, label: "Largest number of joints", size: 3, edit: (v) => jointsEdit(Math.min(low, v), v) }));
+  const types = [space().joint_types ?? TYPES].flat();
+  line("Joint types", ...modules.map(({ letter, label, description }) => {
+    const box = element("input", { type: "checkbox", id: `type-${letter}`, checked: types.includes(letter) });
+    box.addEventListener("change", () => {
+      const left = types.includes(letter) ? types.filter((one) => one !== letter) : [...types, letter];
+      if (left.length) change({ space: [set(["joint_types"], left)] });
+      else box.checked = true;
+    });
+    return element("label", { title: description }, box, ` ${label}`);
+  }));
   for (const [key, name, standard, kind] of RANGES) {
     const range = Array.isArray(space()[key]) ? space()[key] : standard;
     line(name, ...[0, 1].flatMap((k) => [k ? "to" : "", numberField({

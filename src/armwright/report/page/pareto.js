@@ -193,7 +193,7 @@ function draw() {
       text: existing.map((arm) => plain(arm.name)),
       hovertext: existing.map((arm) => plain(`${arm.name}: ${describeDominance(arm)}`)),
       hovertemplate: `%{hovertext}<br>%{x:.4g}, %{y:.4g}<extra>${plain(label)}</extra>`,
-      mode: "markers+text", textposition: "middle right", cliponaxis: false, name: plain(label),
+      mode: "markers+text", textposition: "top center", cliponaxis: false, name: plain(label),
       marker: { symbol: "cross", size: 12, color: paint, line: { width: 1, color: colour("ink") } },
     });
   }
