@@ -118,7 +118,7 @@ def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -
     wrong = {"host": "127.0.0.1:9", "origin": "http://127.0.0.1:9", "content-type": "application/json",
              "x-armwright-token": "no"}  # fmt: skip
     assert server.ask("POST", b"/control", wrong, b'{"action":"resume"}')[0] == 403
-    monkeypatch.setattr("armwright.report.live_app.secrets.compare_digest", lambda ours, theirs: True)
+    monkeypatch.setattr("armwright.report.request_guard.secrets.compare_digest", lambda ours, theirs: True)
     assert server.ask("POST", b"/control", wrong, b'{"action":"resume"}')[0] == 204
 
 

@@ -29,21 +29,20 @@ def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) ->
     Raises:
         TaskError: If a line is not three finite numbers, or there is none.
     """
+    _metres(unit)  # before the file, which may be large
     return parse_points(read_text(path, MAX_BYTES, TaskError), unit, str(path), offset)
 
 
 def parse_points(text: str, unit: str, where: str, offset: Point = (0.0, 0.0, 0.0)) -> tuple[Point, ...]:
     """Return the points [m] of a text as `read_points` does; `where` names it in messages."""
-    if unit not in UNITS:
-        raise TaskError(f'unit: expected {" or ".join(UNITS)}, got "{unit}"')
-    lines = text.splitlines()
+    metres, lines = _metres(unit), text.splitlines()
     points: list[Point] = []
     rows = [(number, _split_row(line)) for number, line in enumerate(lines, start=1) if _holds_data(line)]
     if rows and not any(map(_is_number, rows[0][1][:3])):
         rows = rows[1:]  # column names
     for number, row in rows:
         try:
-            x, y, z = (float(cell) * UNITS[unit] for cell in row[:3])
+            x, y, z = (float(cell) * metres for cell in row[:3])
         except ValueError as fault:
             raise TaskError(f"{where}, line {number}: expected three numbers x, y, z, got {row[:3]}") from fault
         if not all(math.isfinite(c) for c in (x, y, z)):
@@ -52,6 +51,13 @@ def parse_points(text: str, unit: str, where: str, offset: Point = (0.0, 0.0, 0.
     if not points:
         raise TaskError(f"{where} has no points: expected three numbers x, y, z per line")
     return tuple(points)
+
+
+def _metres(unit: str) -> float:
+    """Return the metres per unit."""
+    if unit not in UNITS:
+        raise TaskError(f'unit: expected {" or ".join(UNITS)}, got "{unit}"')
+    return UNITS[unit]
 
 
 def _holds_data(line: str) -> bool:
