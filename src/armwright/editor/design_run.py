@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from collections import deque
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ class DesignRun:
     def __init__(self, task: Path, space: Path, seconds: float, folder: Path) -> None:
         self.folder = folder
         self.seconds = seconds
+        self._began = time.monotonic()
         self._lines: deque[str] = deque(maxlen=MAX_LINES)
         options = ["--space", str(space), "--budget", f"{seconds:g}s", "--out", str(folder)]
         # -P: never import modules from the working directory.
@@ -50,6 +52,7 @@ class DesignRun:
             "exit_code": self._process.poll(),
             "folder": str(self.folder),
             "seconds": self.seconds,
+            "elapsed": time.monotonic() - self._began,
             "lines": list(self._lines),
         }
 

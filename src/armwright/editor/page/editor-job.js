@@ -6,8 +6,6 @@ import { $, duration } from "./format.js";
 const EVERY = 500; // [ms] between two questions
 const LEAST = 5; // [s] of a budget
 
-let began = null;
-
 export function openJob() {
   $("run").addEventListener("click", start);
   $("budget").addEventListener("keydown", (event) => {
@@ -27,7 +25,6 @@ async function start() {
     complain(`No search can start yet: ${opened.assessed.errors[0]}`);
     return;
   }
-  began = performance.now();
   await design(seconds);
   await look();
 }
@@ -43,11 +40,10 @@ async function look() {
   }
   $("job").hidden = job === null;
   if (job === null) return;
-  const used = began === null ? 0 : (performance.now() - began) / 1000;
-  $("job-state").textContent = state(job, used);
+  $("job-state").textContent = state(job);
   $("job-progress").hidden = !job.running;
   $("job-progress").max = job.seconds;
-  $("job-progress").value = used;
+  $("job-progress").value = job.elapsed;
   $("job-stop").hidden = !job.running;
   $("job-page").hidden = job.running || job.exit_code !== 0;
   $("run").disabled = job.running;
@@ -58,8 +54,8 @@ async function look() {
   else if (job.exit_code) $("job-details").open = true;
 }
 
-function state({ running, exit_code, folder, lines }, used) {
-  if (running) return `Designing arms into ${folder}, for ${duration(used)}: ${lines.at(-1) ?? "starting"}`;
+function state({ running, exit_code, folder, elapsed, lines }) {
+  if (running) return `Designing arms into ${folder}, for ${duration(elapsed)}: ${lines.at(-1) ?? "starting"}`;
   if (exit_code === 0) return `Finished: ${folder}`;
   if (exit_code === 130) return `Stopped; repeat the command in the terminal to go on: ${folder}`;
   return `Failed with exit code ${exit_code}: ${lines.at(-1) ?? ""}`;
