@@ -15,7 +15,7 @@ import pytest
 from armwright.cli import app as cli
 
 WIDTH = "80"
-PATIENCE = int(os.environ.get("PATIENCE", 600))  # [s] for what takes moments; only a test that hangs waits so long
+PATIENCE = 600  # [s] for what takes moments; only a test that hangs waits so long
 PROGRAM = str(Path(cli.__file__).with_name("__main__.py"))  # as `python -m armwright` has it
 
 
