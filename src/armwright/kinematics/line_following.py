@@ -12,7 +12,7 @@ from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.devices import Device, load_path
 from armwright.tasks.motions import LineSamples, Poses
 
-CHUNK = 2**12  # samples that a thread takes at a time
+CHUNK: dict[Device, int] = {"cpu": 2**12, "cuda": 2**20}  # samples; a thread's share, and a GPU's at a time
 
 IndexArray = NDArray[np.intp]
 
@@ -65,7 +65,7 @@ def follow_lines(arms: ArmArrays, samples: LineSamples, entry: Array, device: De
         for values, result in zip(vars(paths).values(), results, strict=True):
             values[chunk] = result.numpy()
 
-    in_chunks(solve, n, max(1, CHUNK // (s * k)), device)
+    in_chunks(solve, n, max(1, CHUNK[device] // (s * k)), device)
     return paths
 
 
@@ -82,7 +82,7 @@ def tool_errors(arms: ArmArrays, poses: Poses, q: Array, device: Device = "cpu")
         wp.launch(kernels.tool_errors, (len(part), len(poses)), inputs=inputs, device=device)
         errors[chunk] = found.numpy()
 
-    in_chunks(solve, len(arms), max(1, CHUNK // len(poses)), device)
+    in_chunks(solve, len(arms), max(1, CHUNK[device] // len(poses)), device)
     return errors
 
 

@@ -13,7 +13,7 @@ from armwright.kinematics.cycle_path import CyclePaths
 from armwright.kinematics.devices import Device, load_dynamics
 from armwright.kinematics.motion_path import MotionPath
 
-CHUNK = 2**12  # samples that a thread takes at a time
+CHUNK: dict[Device, int] = {"cpu": 2**12, "cuda": 2**20}  # samples; a thread's share, and a GPU's at a time
 
 
 @dataclass(frozen=True)
@@ -105,5 +105,5 @@ def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, p
         wp.launch(kernels.torque_terms, q[chunk].shape[:2], inputs=inputs, device=device)
         terms[:, chunk] = found.numpy()
 
-    in_chunks(solve, len(arms), max(1, CHUNK // q.shape[1]), device)
+    in_chunks(solve, len(arms), max(1, CHUNK[device] // q.shape[1]), device)
     return terms
