@@ -30,7 +30,7 @@ import json
 import os
 import time
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -121,7 +121,8 @@ class Run:
 
     Attributes:
         evaluator, task, method, seed: what was run.
-        values: objectives of each evaluation; None where it failed.
+        evaluations, failed: how many, and how many of them failed.
+        hypervolumes: after each of COUNTS evaluations.
         seconds: wall time of the whole run, and of the evaluations alone [s].
     """
 
@@ -129,20 +130,15 @@ class Run:
     task: str
     method: str
     seed: int
-    values: list[list[float] | None]
+    evaluations: int
+    failed: int
+    hypervolumes: Mapping[str, float]
     seconds: float
     evaluation_seconds: float
 
     @property
     def key(self) -> tuple[str, str, str, int]:
         return self.evaluator, self.task, self.method, self.seed
-
-    def hypervolumes(self, counts: Sequence[int]) -> dict[int, float]:
-        """Return the hypervolume after each of these numbers of evaluations."""
-        point = reference_point(Cell(self.evaluator, self.task))
-        rows = np.array([[np.inf] * len(point) if value is None else value for value in self.values])
-        curve = hypervolume_history(rows, point)
-        return {count: float(curve[count - 1]) for count in counts if count <= len(curve)}
 
 
 @lru_cache
@@ -187,15 +183,27 @@ def execute(cell: Cell, method: str, seed: int, evaluations: int) -> Run:
         problem, **settings, n_init=N_INIT, n_total=evaluations - N_INIT, seed=seed, allow_failures=True
     )
     seconds = time.perf_counter() - started
-    values = [None if trial.failure else list(trial.values) for trial in found.trials]
-    return Run(cell.evaluator, cell.task, method, seed, values, seconds, found.summary["seconds"]["evaluation"])
+    point = reference_point(cell)
+    values = np.array([[np.inf] * len(point) if trial.failure else trial.values for trial in found.trials])
+    curve = hypervolume_history(values, point)
+    return Run(
+        cell.evaluator,
+        cell.task,
+        method,
+        seed,
+        len(values),
+        sum(trial.failure is not None for trial in found.trials),
+        {str(count): float(curve[count - 1]) for count in COUNTS if count <= len(curve)},
+        round(seconds, 2),
+        round(found.summary["seconds"]["evaluation"], 2),
+    )
 
 
 def read(file: Path) -> list[Run]:
     """Return the finished runs, the longest of each kind; lines that a kill truncated do not count."""
     lines = file.read_bytes().split(b"\n") if file.exists() else []
     lines = [line for line in lines if line.endswith(b"}")]
-    runs = sorted((Run(**json.loads(line)) for line in lines), key=lambda run: len(run.values))
+    runs = sorted((Run(**json.loads(line)) for line in lines), key=lambda run: run.evaluations)
     return list({run.key: run for run in runs}.values())
 
 
@@ -208,7 +216,7 @@ def append(file: Path, run: Run) -> None:
 
 def work(options: argparse.Namespace, file: Path) -> None:
     """Execute the runs of the plan that are missing."""
-    done = {run.key for run in read(file) if len(run.values) >= options.evaluations}
+    done = {run.key for run in read(file) if run.evaluations >= options.evaluations}
     part, parts = options.share
     deadline = time.monotonic() + 3600.0 * options.hours
     unusable: set[str] = set()
@@ -234,9 +242,9 @@ def table(runs: Iterable[Run], options: argparse.Namespace) -> Mapping[tuple[Cel
     times: dict[tuple[Cell, str], list[float]] = {}
     for run in runs:
         cell = Cell(run.evaluator, run.task)
-        times.setdefault((cell, run.method), []).append(1e3 * (run.seconds - run.evaluation_seconds) / len(run.values))
-        for count, volume in run.hypervolumes(COUNTS).items():
-            found.setdefault((cell, run.method, count), {})[run.seed] = volume
+        times.setdefault((cell, run.method), []).append(1e3 * (run.seconds - run.evaluation_seconds) / run.evaluations)
+        for count, volume in run.hypervolumes.items():
+            found.setdefault((cell, run.method, int(count)), {})[run.seed] = volume
     for cell in CELLS:
         rows = [(method, count) for name, method, count in found if name == cell]
         methods = [method for method in METHODS if method in {method for method, _ in rows}]
