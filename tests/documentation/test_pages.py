@@ -26,7 +26,7 @@ from armwright.llm.configuration import load_model_options
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests import ROOT
-from tests.support.documentation import PAGES, Block, Command, blocks, code_spans, commands
+from tests.support.documentation import PAGES, Block, Command, blocks, code_spans, commands, sections
 from tests.support.robots import robot
 
 # Commands that are not run, by what they match as a whole; the first that matches counts.
@@ -54,6 +54,8 @@ LONG = re.compile(r"armwright experiment (paper|recorded|rules|n-step|samplers|s
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
 
 FOLLOWED = [page for page in PAGES if commands(page) or any(block.language == "python" for block in blocks(page))]
+# Pages of minutes whose sections need nothing of each other: each is followed by itself.
+BY_SECTION = ("docs/examples.md",)
 MAX_WAIT = 900.0  # [s] for a command; only one that waits forever takes this long
 
 # What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
@@ -230,9 +232,27 @@ def file_of(block: Block) -> str | None:
     return found[1] if found else None
 
 
+FOLLOWED_BY_SECTION = {
+    f"{page}, {section}": (page, own)
+    for page in BY_SECTION
+    for section, own in sections(page).items()
+    if any(block.language in ("sh", "python") for block in own)
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("page", FOLLOWED)
+@pytest.mark.parametrize("page", [page for page in FOLLOWED if page not in BY_SECTION])
 def test_page_can_be_followed(page: str, in_folder: Path) -> None:
+    follow(page, blocks(page), in_folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("section", FOLLOWED_BY_SECTION)
+def test_section_can_be_followed(section: str, in_folder: Path) -> None:
+    follow(*FOLLOWED_BY_SECTION[section], in_folder)
+
+
+def follow(page: str, shown: Sequence[Block], in_folder: Path) -> None:
     """Run commands and programs and write files in order, in one folder."""
     shutil.copytree(ROOT / "examples", in_folder / "examples")
     for name, file in (("ur3", "ur3_robot"), ("so101", "so101")):
@@ -243,7 +263,7 @@ def test_page_can_be_followed(page: str, in_folder: Path) -> None:
         shell(line, in_folder, page)
     run = {command.where: command for command in commands(page)}
     said = ""  # by what was run last
-    for block in blocks(page):
+    for block in shown:
         for number in range(len(block.text.splitlines()) + 1):
             command = run.get(f"{page}:{block.line + number}")
             if command is not None:

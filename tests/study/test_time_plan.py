@@ -16,6 +16,7 @@ from armwright.problem.problem import Outcomes, Problem
 from armwright.runs.history import History
 from armwright.runs.results import read_summary
 from armwright.runs.verification import Verification
+from armwright.spaces.design_space import default_space
 from armwright.study import direct_search
 from armwright.study.front_run import find_front
 from armwright.study.search_budget import SearchBudget, SearchProgress, read_seconds
@@ -130,6 +131,26 @@ def test_run_ends_on_time(
     more = find_front(PROBLEM, budget=plan_of(clock, seconds=2 * seconds), stop_at_stall=False, out=tmp_path / "run")
     assert clock.now - before <= seconds + max(3.0, 0.2 * seconds)
     assert more.summary["search"]["evaluations"] > more.resumed == again.resumed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("of_a_design", "is_short"), [(0.1, True), (0.001, False)])
+def test_search_of_a_cycle_is_short_where_time_is(
+    clock: Clock, slow_evaluation: Callable[[float], None], tmp_path: Path, of_a_design: float, is_short: bool
+) -> None:
+    class StopError(Exception):
+        pass
+
+    def stop(progress: SearchProgress) -> None:
+        if progress.evaluations >= 300:
+            raise StopError
+
+    slow_evaluation(of_a_design)
+    problem = Problem(load_task("screwing"), default_space("screwing"))
+    with pytest.raises(StopError):
+        find_front(problem, budget=plan_of(clock, seconds=60.0), out=tmp_path, watch=stop)
+    with np.load(tmp_path / "search.npz") as state:
+        assert bool(state["is_short"]) == is_short
 
 
 def test_evaluations_do_not_depend_on_the_clock(

@@ -47,6 +47,17 @@ def blocks(page: str) -> list[Block]:
     return found
 
 
+def sections(page: str) -> dict[str, list[Block]]:
+    """The blocks below each heading of the second level, in their order."""
+    found: dict[str, list[Block]] = {}
+    tokens = MarkdownIt().parse((ROOT / page).read_text(encoding="utf-8"))
+    headings = [(t.map[0], tokens[i + 1].content) for i, t in enumerate(tokens) if t.tag == "h2" and t.map]
+    for block in blocks(page):
+        above = [title for line, title in headings if line < block.line]
+        found.setdefault(above[-1] if above else "", []).append(block)
+    return found
+
+
 def commands(page: str) -> list[Command]:
     """The commands of a page, in their order."""
     return [

@@ -13,6 +13,9 @@ between them make good steps.
 A pool hardly ever recovers a structure it has lost. A part of the evaluations therefore goes to a side pool that starts
 at random, evolves on its own and joins the main pool after a while. Then the next one starts. While nothing is found
 that counts, such as a feasible design, side pools start earlier and live shorter: the main pool may be stuck.
+
+Random designs take most of a short search, and few of them are good. It therefore begins with fewer, and the others
+come along with children. Longer searches would lose structures that way: evolved designs displace newcomers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -33,6 +36,8 @@ CAPACITIES = (100, 1000)  # designs in the pool: first and final
 EVALUATIONS_PER_MEMBER = 200  # the pool grows by one design per so many evaluations
 SMALLEST_BATCH = 100  # designs per generation; later as many as the pool holds
 FIRST_BATCH = 500  # random designs at the start
+SHORT_FIRST_BATCH, SHORT_SHARE = 200, 0.5  # of a short search: random designs at first, and then of each generation
+SHORT = 1_200  # evaluations below which that finds more where children are screened
 PER_NUMBER = 20  # designs of each number of joints that stay in the pool, though all may be infeasible
 LEADING = 12  # structures whose best designs stay in the pool
 SIDE_FROM = 25_000  # evaluations
@@ -46,7 +51,7 @@ STALL_GROWTH = 3e-4  # of the hypervolume, relative, over that share
 
 
 # Attributes of a search, without the leading underscore, that make up its state.
-_COUNTERS = ("generation", "evaluations", "side_evaluations", "side_age")
+_COUNTERS = ("generation", "evaluations", "is_short", "side_evaluations", "side_age")
 _ARRAYS = ("matrix", "values", "front_matrix", "front_values", "side_matrix", "side_values", "reference_point")
 
 
@@ -62,6 +67,7 @@ class FrontSearch:
         seed: of all random numbers.
         known: (N, P) designs that the first batch includes.
         vary: makes new designs from a pool, as `variation.offspring` does.
+        is_short: whether few evaluations will follow; asked once, after the first generation. None for no, never.
     """
 
     def __init__(
@@ -72,10 +78,14 @@ class FrontSearch:
         seed: int,
         known: Array | None = None,
         vary: Callable[[Array, Indices, DesignEncoding, int, np.random.Generator], Array] = offspring,
+        is_short: Callable[[], bool] | None = None,
     ) -> None:
         self._encoding = DesignEncoding(parameters)
         self._evaluate = evaluate
         self._vary = vary
+        self._ask_whether_short = is_short
+        self._first_batch = FIRST_BATCH if is_short is None else SHORT_FIRST_BATCH
+        self._is_short = 0
         self._reference_point = np.asarray(reference_point, dtype=np.float64)
         self._seed = seed
         self._known = np.empty((0, len(self._encoding))) if known is None else known
@@ -130,9 +140,13 @@ class FrontSearch:
         """Return the (N, P) designs to evaluate next; the same ones until `tell` is called."""
         rng = np.random.default_rng(derived_seed(self._seed, self._generation))
         if self._generation == 0:
-            return np.vstack([self._known, self._encoding.random(FIRST_BATCH, rng)])
+            return np.vstack([self._known, self._encoding.random(self._first_batch, rng)])
         if not self._is_side_generation:
-            return self._offspring(self._matrix, self._values, max(SMALLEST_BATCH, self._capacity), rng)
+            n_random = self._random_in_generation
+            if n_random and not self._is_short:
+                return self._encoding.random(n_random, rng)
+            children = self._offspring(self._matrix, self._values, max(SMALLEST_BATCH, self._capacity) - n_random, rng)
+            return np.vstack([children, self._encoding.random(n_random, rng)]) if n_random else children
         if not len(self._side_matrix):
             return self._encoding.random(FIRST_BATCH, rng)
         return self._offspring(self._side_matrix, self._side_values, SMALLEST_BATCH, rng)
@@ -142,6 +156,8 @@ class FrontSearch:
         is_side_generation = self._is_side_generation
         self._generation += 1
         self._evaluations += len(matrix)
+        if self._generation == 1 and self._ask_whether_short is not None:
+            self._is_short = int(self._ask_whether_short())
         if is_side_generation:
             self._side_evaluations += len(matrix)
             self._side_age += len(matrix)
@@ -184,6 +200,13 @@ class FrontSearch:
     def _capacity(self) -> int:
         smallest, largest = CAPACITIES
         return min(max(smallest, self._evaluations // EVALUATIONS_PER_MEMBER), largest)
+
+    @property
+    def _random_in_generation(self) -> int:
+        """Number of random designs in a generation after the first: what that lacked, at once or bit by bit."""
+        left = FIRST_BATCH - self._first_batch
+        each = round(SHORT_SHARE * SMALLEST_BATCH) if self._is_short else left
+        return min(max(0, left - each * (self._generation - 1)), each)
 
     @property
     def _is_side_generation(self) -> bool:

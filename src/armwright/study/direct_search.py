@@ -23,7 +23,7 @@ from armwright.runs.simulated_run import Simulator
 from armwright.runs.survival import evaluate_survival
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify, verify_front
-from armwright.search.front_search import FrontSearch
+from armwright.search.front_search import SHORT, FrontSearch
 from armwright.search.screening import Screen, pays
 from armwright.search.variation import offspring
 from armwright.study.progress import RunResult
@@ -62,7 +62,15 @@ class DirectSearch:
         self.screen = Screen(problem, lambda: self.survey.point) if pays(problem) else None
         vary = offspring if self.screen is None else self.screen.offspring
         parameters = problem.space.parameters
-        self.search = FrontSearch(parameters, self._evaluate, self.survey.point, config.seed, matrix, vary)
+        self.search = FrontSearch(
+            parameters,
+            self._evaluate,
+            self.survey.point,
+            config.seed,
+            matrix,
+            vary,
+            is_short=None if self.screen is None else self._is_short,
+        )
         self.seconds = 0.0  # of earlier sessions
         self.resumed = 0  # evaluations of earlier sessions
         self.ended_after = 0.0  # largest time budget that has ended the search [s]
@@ -135,6 +143,12 @@ class DirectSearch:
     def _is_exhausted(self) -> bool:
         """True if no evaluations are left in the budget."""
         return self.search.evaluations >= (self.plan.budget.evaluations or math.inf)
+
+    def _is_short(self) -> bool:
+        """Return whether the budget leaves few evaluations, judged by the rate of the first ones."""
+        rate = self.search.evaluations / max(self.plan.search_seconds, 1e-9)
+        affordable = self.search.evaluations + rate * max(0.0, self.plan.search_left)
+        return min(affordable, self.plan.budget.evaluations or math.inf) < SHORT
 
     def _state(self) -> dict[str, Any]:
         """Return what a later session needs."""

@@ -1,8 +1,8 @@
 """Plan of the wall-clock time of a search: how much for evaluations, and how much for what follows them.
 
 Until the cost of results is measured on designs of the run, a fixed share is reserved for them. Afterwards, the reserve
-is the cost of simulating and perturbing the recommended designs, and of verifying the front, at most 300 designs. If
-verification takes more than a share of the budget, fewer designs of the front are kept.
+is the cost of simulating and perturbing the recommended designs, at most three, and of verifying the front, at most 300
+designs. If verification takes more than a share of the budget, fewer designs of the front are kept.
 """
 
 import math
@@ -25,7 +25,7 @@ UNKNOWN_SHARE = 0.3  # of the budget for results whose costs are unknown
 MEASURED_AT = 0.2  # spent share of the budget from which on costs are measured
 DRAWING_SHARE, DRAWING_SECONDS = 0.15, (2.5, 6.0)  # [s]: page and figures
 RECOMMENDED = 3  # designs
-SIMULATIONS = 9  # of these, each as it is and with assumed values halved and doubled
+SIMULATIONS = 3  # of each: as it is, and with assumed values halved and doubled
 CHUNK_SHARE, CHUNK_SECONDS = 0.02, (0.5, 5.0)  # of the budget between two looks at the clock, and its bounds [s]
 FILES_SECONDS, CYCLE_FILES_SECONDS = 0.004, 0.05  # [s] of a design's files and its part of the page; with a cycle
 SMALLEST_CHUNK, CHUNK_GROWTH = 16, 4  # designs, of which fewer take nearly as long; largest factor to the next chunk
@@ -153,15 +153,15 @@ class TimePlan:
         """Time for results, without page and figures [s]."""
         if self.costs is None:
             return UNKNOWN_SHARE * self._limit
-        n_designs = max(FEW_DESIGNS, min(MAX_DESIGNS, self.n_found))
-        all_designs = min(RESULTS_SHARE * self._limit, n_designs * self.costs.design)
-        few_designs = min(FEW_SHARE * self._limit, FEW_DESIGNS * self.costs.design)
+        all_designs = min(RESULTS_SHARE * self._limit, min(MAX_DESIGNS, self.n_found) * self.costs.design)
+        few_designs = min(FEW_SHARE * self._limit, min(FEW_DESIGNS, self.n_found) * self.costs.design)
         return self._for_recommended + max(all_designs, few_designs)
 
     @property
     def _for_recommended(self) -> float:
         """Time to simulate and perturb the recommended designs [s]."""
-        return min(RECOMMENDED_SHARE * self._limit, self._seconds_for(SIMULATIONS, RECOMMENDED))
+        recommended = min(RECOMMENDED, self.n_found)
+        return min(RECOMMENDED_SHARE * self._limit, self._seconds_for(SIMULATIONS * recommended, recommended))
 
     def _seconds_for(self, simulations: int, survivals: int) -> float:
         """Return the time of simulations and evaluations of survival, as far as it is known [s]."""
