@@ -1,28 +1,22 @@
 """Our search on a problem and on sub-spaces of it, without run folder and clock, as benchmarks compare it."""
 
 import itertools
-import math
 from collections.abc import Iterator
 
 from armwright.arrays import Array
 from armwright.pareto import default_reference_point
 from armwright.problem.problem import Problem
-from armwright.search.front_search import SHORT, FrontSearch
+from armwright.search.front_search import FrontSearch
 from armwright.search.screening import Screen, pays
 from armwright.search.variation import offspring
 from armwright.spaces.design_parameters import conditional_parameters
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import CategoricalParameter
+from armwright.study.direct_search import SHORT, SHORT_FIRST_BATCH
 
 
-def new_search(
-    problem: Problem,
-    reference_point: tuple[float, ...],
-    seed: int,
-    screen: Screen | None,
-    evaluations: float = math.inf,
-) -> FrontSearch:
-    """A search of so many evaluations that has not begun; `screen` chooses its designs, if there is one."""
+def new_search(problem: Problem, reference_point: tuple[float, ...], seed: int, screen: Screen | None) -> FrontSearch:
+    """A search that has not begun; `screen` chooses its designs, if there is one."""
 
     def evaluate(matrix: Array) -> Array:
         outcomes = problem.evaluate_matrix(matrix)
@@ -31,15 +25,15 @@ def new_search(
         return outcomes.penalised
 
     vary = offspring if screen is None else screen.offspring
-    is_short = None if screen is None else lambda: evaluations < SHORT
-    return FrontSearch(problem.space.parameters, evaluate, reference_point, seed, vary=vary, is_short=is_short)
+    return FrontSearch(problem.space.parameters, evaluate, reference_point, seed, vary=vary)
 
 
 def searched(problem: Problem, reference_point: tuple[float, ...], seed: int, evaluations: int) -> FrontSearch:
-    """A search after so many evaluations, screened where `armwright design` screens."""
-    search = new_search(
-        problem, reference_point, seed, Screen(problem, lambda: reference_point) if pays(problem) else None, evaluations
-    )
+    """A search after so many evaluations, screened and started as by `armwright design`."""
+    screen = Screen(problem, lambda: reference_point) if pays(problem) else None
+    search = new_search(problem, reference_point, seed, screen)
+    if screen is not None and evaluations < SHORT:
+        search.step(SHORT_FIRST_BATCH)
     while search.evaluations < evaluations:
         search.step()
     return search

@@ -11,12 +11,11 @@ from armwright.search.encoding import DesignEncoding
 from armwright.search.front_search import (
     CAPACITIES,
     FIRST_BATCH,
+    LATE_SHARE,
     LOST_FROM,
     LOST_LIFE,
     LOST_SHARE,
     PER_NUMBER,
-    SHORT_FIRST_BATCH,
-    SHORT_SHARE,
     SMALLEST_BATCH,
     FrontSearch,
 )
@@ -98,7 +97,7 @@ def test_evaluations_count_every_batch():
     assert stepped(made(), 3).evaluations == FIRST_BATCH + 2 * SMALLEST_BATCH
 
 
-def test_short_search_draws_as_many_random_designs():
+def test_random_designs_that_the_first_generation_lacks_come_later():
     """A generation's last designs are the random ones, which `vary` does not make."""
     asked = []
 
@@ -106,9 +105,8 @@ def test_short_search_draws_as_many_random_designs():
         asked.append(n)
         return offspring(pool, ranks, encoding, n, rng)
 
-    search = made(is_short=lambda: True, vary=vary)
-    first = search.ask()
-    assert len(first) == SHORT_FIRST_BATCH
+    search = made(vary=vary)
+    first = search.ask()[:200]
     search.tell(first, dtlz2(2)(first))
     drawn, numbers = [first], []
     while search.evaluations < 2_000:
@@ -117,34 +115,21 @@ def test_short_search_draws_as_many_random_designs():
         drawn.append(batch[asked[-1] :])
         numbers.append(len(drawn[-1]))
         search.tell(batch, dtlz2(2)(batch))
-    assert numbers[:7] == [*[round(SHORT_SHARE * SMALLEST_BATCH)] * 6, 0]
+    assert numbers[:7] == [*[round(LATE_SHARE * SMALLEST_BATCH)] * 6, 0]
     assert sum(len(designs) for designs in drawn) == FIRST_BATCH
     units = np.vstack(drawn)[:, 2:6]
     assert np.quantile(units, [0.1, 0.5, 0.9]) == pytest.approx([0.1, 0.5, 0.9], abs=0.03)  # over the whole range
 
 
-def test_search_asks_once_whether_it_is_short():
-    answers = []
+def test_search_with_a_cut_first_generation_continues_after_a_restore():
+    def cut():
+        search = made()
+        search.step(200)
+        return search
 
-    def is_short():
-        answers.append(search.evaluations)
-        return False
-
-    search = made(is_short=is_short)
-    sizes = []
-    for _ in range(4):
-        sizes.append(len(search.ask()))
-        search.step()
-    assert answers == [SHORT_FIRST_BATCH]
-    assert sizes == [SHORT_FIRST_BATCH, FIRST_BATCH - SHORT_FIRST_BATCH, SMALLEST_BATCH, SMALLEST_BATCH]
-
-
-@pytest.mark.parametrize("is_short", [True, False])
-def test_short_search_continues_after_a_restore(is_short):
-    """A restored search does not ask again."""
-    whole = stepped(made(is_short=lambda: is_short), 8)
-    restored = made(is_short=lambda: not is_short)
-    restored.restore(stepped(made(is_short=lambda: is_short), 3).state())
+    whole = stepped(cut(), 8)
+    restored = made()
+    restored.restore(stepped(cut(), 3).state())
     assert_same(stepped(restored, 5), whole)
 
 

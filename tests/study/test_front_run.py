@@ -16,10 +16,10 @@ from armwright.report.figures import write_figures
 from armwright.runs.folder import read_run
 from armwright.runs.front_gap import known_front
 from armwright.runs.results import read_summary, verify_run
-from armwright.search.front_search import SHORT_FIRST_BATCH, SHORT_SHARE, SMALLEST_BATCH, FrontSearch
+from armwright.search.front_search import LATE_SHARE, SMALLEST_BATCH, FrontSearch
 from armwright.search.screening import CANDIDATES
 from armwright.spaces.design_space import default_space, paper_space
-from armwright.study.direct_search import FrontRun
+from armwright.study.direct_search import SHORT_FIRST_BATCH, FrontRun
 from armwright.study.front_run import find_front
 from armwright.study.search_budget import SearchProgress
 from armwright.study.study import optimize
@@ -119,7 +119,7 @@ def test_resumed_front_run_of_a_cycle_is_screened_identically(tmp_path: Path) ->
     assert np.array_equal(run.history.values, whole.history.values)
     screening = run.summary["search"]["screening"]
     assert screening == whole.summary["search"]["screening"]
-    each = round((1.0 - SHORT_SHARE) * SMALLEST_BATCH)  # of five generations of 100
+    each = round((1.0 - LATE_SHARE) * SMALLEST_BATCH)  # of five generations of 100
     assert run.summary["search"]["evaluations"] == SHORT_FIRST_BATCH + 5 * SMALLEST_BATCH
     assert screening["considered"] == CANDIDATES * 5 * each
     assert screening["evaluated_though_rejected"] >= 0.05 * 5 * each

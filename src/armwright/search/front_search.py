@@ -14,8 +14,8 @@ A pool hardly ever recovers a structure it has lost. A part of the evaluations t
 at random, evolves on its own and joins the main pool after a while. Then the next one starts. While nothing is found
 that counts, such as a feasible design, side pools start earlier and live shorter: the main pool may be stuck.
 
-Random designs take most of a short search, and few of them are good. It therefore begins with fewer, and the others
-come along with children. Longer searches would lose structures that way: evolved designs displace newcomers.
+Random designs would take most of a short search. Its first generation may be cut: the random designs that it lacks come
+along with children. Longer searches would lose structures that way, because evolved designs displace newcomers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,8 +36,7 @@ CAPACITIES = (100, 1000)  # designs in the pool: first and final
 EVALUATIONS_PER_MEMBER = 200  # the pool grows by one design per so many evaluations
 SMALLEST_BATCH = 100  # designs per generation; later as many as the pool holds
 FIRST_BATCH = 500  # random designs at the start
-SHORT_FIRST_BATCH, SHORT_SHARE = 200, 0.5  # of a short search: random designs at first, and then of each generation
-SHORT = 1_200  # evaluations below which that finds more where children are screened
+LATE_SHARE = 0.5  # of each generation: random designs that the first one lacks
 PER_NUMBER = 20  # designs of each number of joints that stay in the pool, though all may be infeasible
 LEADING = 12  # structures whose best designs stay in the pool
 SIDE_FROM = 25_000  # evaluations
@@ -51,7 +50,7 @@ STALL_GROWTH = 3e-4  # of the hypervolume, relative, over that share
 
 
 # Attributes of a search, without the leading underscore, that make up its state.
-_COUNTERS = ("generation", "evaluations", "is_short", "side_evaluations", "side_age")
+_COUNTERS = ("generation", "evaluations", "random_left", "side_evaluations", "side_age")
 _ARRAYS = ("matrix", "values", "front_matrix", "front_values", "side_matrix", "side_values", "reference_point")
 
 
@@ -67,7 +66,6 @@ class FrontSearch:
         seed: of all random numbers.
         known: (N, P) designs that the first batch includes.
         vary: makes new designs from a pool, as `variation.offspring` does.
-        is_short: whether few evaluations will follow; asked once, after the first generation. None for no, never.
     """
 
     def __init__(
@@ -78,14 +76,11 @@ class FrontSearch:
         seed: int,
         known: Array | None = None,
         vary: Callable[[Array, Indices, DesignEncoding, int, np.random.Generator], Array] = offspring,
-        is_short: Callable[[], bool] | None = None,
     ) -> None:
         self._encoding = DesignEncoding(parameters)
         self._evaluate = evaluate
         self._vary = vary
-        self._ask_whether_short = is_short
-        self._first_batch = FIRST_BATCH if is_short is None else SHORT_FIRST_BATCH
-        self._is_short = 0
+        self._random_left = 0
         self._reference_point = np.asarray(reference_point, dtype=np.float64)
         self._seed = seed
         self._known = np.empty((0, len(self._encoding))) if known is None else known
@@ -140,24 +135,24 @@ class FrontSearch:
         """Return the (N, P) designs to evaluate next; the same ones until `tell` is called."""
         rng = np.random.default_rng(derived_seed(self._seed, self._generation))
         if self._generation == 0:
-            return np.vstack([self._known, self._encoding.random(self._first_batch, rng)])
+            return np.vstack([self._known, self._encoding.random(FIRST_BATCH, rng)])
         if not self._is_side_generation:
-            n_random = self._random_in_generation
-            if n_random and not self._is_short:
-                return self._encoding.random(n_random, rng)
-            children = self._offspring(self._matrix, self._values, max(SMALLEST_BATCH, self._capacity) - n_random, rng)
+            n, n_random = max(SMALLEST_BATCH, self._capacity), self._late_random
+            children = self._offspring(self._matrix, self._values, n - n_random, rng)
             return np.vstack([children, self._encoding.random(n_random, rng)]) if n_random else children
         if not len(self._side_matrix):
             return self._encoding.random(FIRST_BATCH, rng)
         return self._offspring(self._side_matrix, self._side_values, SMALLEST_BATCH, rng)
 
     def tell(self, matrix: Array, values: Array) -> None:
-        """Select from the designs that `ask` returned, given their (N, M) values."""
+        """Select from the designs that `ask` returned, or the first of them, given their (N, M) values."""
         is_side_generation = self._is_side_generation
+        if self._generation == 0:
+            self._random_left = len(self._known) + FIRST_BATCH - len(matrix)
+        elif not is_side_generation:
+            self._random_left -= self._late_random
         self._generation += 1
         self._evaluations += len(matrix)
-        if self._generation == 1 and self._ask_whether_short is not None:
-            self._is_short = int(self._ask_whether_short())
         if is_side_generation:
             self._side_evaluations += len(matrix)
             self._side_age += len(matrix)
@@ -167,9 +162,9 @@ class FrontSearch:
         if not self._history or self._evaluations >= RECORD_SPACING * self._history[-1][0]:
             self._history.append((self._evaluations, self.hypervolume))
 
-    def step(self) -> None:
-        """Run one generation."""
-        matrix = self.ask()
+    def step(self, most: int | None = None) -> None:
+        """Run one generation, of at most so many designs."""
+        matrix = self.ask()[:most]
         self.tell(matrix, self._evaluate(matrix))
 
     def move_reference_point(self, reference_point: Sequence[float]) -> None:
@@ -202,11 +197,9 @@ class FrontSearch:
         return min(max(smallest, self._evaluations // EVALUATIONS_PER_MEMBER), largest)
 
     @property
-    def _random_in_generation(self) -> int:
-        """Number of random designs in a generation after the first: what that lacked, at once or bit by bit."""
-        left = FIRST_BATCH - self._first_batch
-        each = round(SHORT_SHARE * SMALLEST_BATCH) if self._is_short else left
-        return min(max(0, left - each * (self._generation - 1)), each)
+    def _late_random(self) -> int:
+        """Number of random designs in a generation of children."""
+        return min(self._random_left, round(LATE_SHARE * SMALLEST_BATCH))
 
     @property
     def _is_side_generation(self) -> bool:

@@ -23,7 +23,7 @@ from armwright.runs.simulated_run import Simulator
 from armwright.runs.survival import evaluate_survival
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify, verify_front
-from armwright.search.front_search import SHORT, FrontSearch
+from armwright.search.front_search import FrontSearch
 from armwright.search.screening import Screen, pays
 from armwright.search.variation import offspring
 from armwright.study.progress import RunResult
@@ -33,6 +33,8 @@ from armwright.study.search_budget import SearchProgress
 from armwright.study.time_plan import ChunkSize, ResultCosts, TimePlan, files_seconds
 
 SAVE_SECONDS = 5.0
+SHORT = 1_200  # evaluations on tasks with a cycle: searches of fewer find more after a smaller first generation
+SHORT_FIRST_BATCH = 200  # random designs of that
 N_MEASURED = (1, 4, 16, 64)  # designs that the cost of results is measured on: more, while that is quick
 NOTABLE_SHARE, LONG_SHARE = 0.02, 0.1  # of the budget
 
@@ -62,15 +64,8 @@ class DirectSearch:
         self.screen = Screen(problem, lambda: self.survey.point) if pays(problem) else None
         vary = offspring if self.screen is None else self.screen.offspring
         parameters = problem.space.parameters
-        self.search = FrontSearch(
-            parameters,
-            self._evaluate,
-            self.survey.point,
-            config.seed,
-            matrix,
-            vary,
-            is_short=None if self.screen is None else self._is_short,
-        )
+        self.search = FrontSearch(parameters, self._evaluate, self.survey.point, config.seed, matrix, vary)
+        self.n_known = len(matrix)
         self.seconds = 0.0  # of earlier sessions
         self.resumed = 0  # evaluations of earlier sessions
         self.ended_after = 0.0  # largest time budget that has ended the search [s]
@@ -144,10 +139,10 @@ class DirectSearch:
         """True if no evaluations are left in the budget."""
         return self.search.evaluations >= (self.plan.budget.evaluations or math.inf)
 
-    def _is_short(self) -> bool:
-        """Return whether the budget leaves few evaluations, judged by the rate of the first ones."""
-        rate = self.search.evaluations / max(self.plan.search_seconds, 1e-9)
-        affordable = self.search.evaluations + rate * max(0.0, self.plan.search_left)
+    def _is_short(self, done: int) -> bool:
+        """Return whether the budget leaves few evaluations, by the rate of those that are done."""
+        rate = done / max(self.plan.search_seconds, 1e-9)
+        affordable = done + rate * max(0.0, self.plan.search_left)
         return min(affordable, self.plan.budget.evaluations or math.inf) < SHORT
 
     def _state(self) -> dict[str, Any]:
@@ -209,14 +204,18 @@ class DirectSearch:
     def _evaluate(self, matrix: Array) -> Array:
         """Return the (N, M) objective values of designs, penalties for infeasible ones.
 
-        If the time is up, the last designs are left out.
+        If the time is up, the last designs are left out, and the last of the first generation if the search is short.
         """
         parts: list[Array] = []
         done = 0
+        cut = self.n_known + SHORT_FIRST_BATCH if self.screen is not None and not self.search.evaluations else 0
         while done < len(matrix) and (not done or self.plan.search_left > 0.0):
+            if done == cut > 0 and self._is_short(done):
+                break
             if done:
                 self._report(done)
-            chunk, started = matrix[done : done + self.chunk_size.value], self.plan.elapsed
+            end = done + self.chunk_size.value
+            chunk, started = matrix[done : min(end, cut) if done < cut else end], self.plan.elapsed
             outcomes = self.problem.evaluate_matrix(chunk)
             self.chunk_size.adapt(len(chunk), self.plan.elapsed - started)
             parts.append(outcomes.penalised)

@@ -7,12 +7,15 @@ length for each input, plus a noise variance on the diagonal:
     k(x, x') = a (1 + √5 r + 5/3 r²) exp(-√5 r),   r² = Σ (x_i - x'_i)² / l_i²
 """
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg.lapack import dtrtri  # pyright: ignore[reportAttributeAccessIssue, reportUnknownVariableType]
 from scipy.optimize import minimize  # pyright: ignore[reportUnknownVariableType]
+from threadpoolctl import ThreadpoolController
 
 from armwright.arrays import Array
 
@@ -61,10 +64,11 @@ class GaussianProcess:
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Return the (K,) means and standard deviations of observations at (K, F) inputs, noise included."""
-        cross = _covariance(inputs, self.inputs, self.hyperparameters)
-        explained = ((cross @ self._root.T) ** 2).sum(axis=1)
-        variance = self.hyperparameters.amplitude + self.hyperparameters.noise - explained
-        return cross @ self._weights, np.sqrt(np.maximum(variance, JITTER))
+        with _on_one_thread():
+            cross = _covariance(inputs, self.inputs, self.hyperparameters)
+            explained = ((cross @ self._root.T) ** 2).sum(axis=1)
+            variance = self.hyperparameters.amplitude + self.hyperparameters.noise - explained
+            return cross @ self._weights, np.sqrt(np.maximum(variance, JITTER))
 
     @cached_property
     def log_marginal_likelihood(self) -> float:
@@ -106,18 +110,19 @@ def fit(inputs: Array, observations: Array) -> Hyperparameters:
     bounds = np.column_stack([mean - PRIOR_WIDTH * spread, mean + PRIOR_WIDTH * spread])
     bounds[1, 0] = np.log(NOISE_FLOOR)
     noisy = mean + np.concatenate([[-0.5, 2.0], np.full(inputs.shape[1], 0.5)])
-    found: list[Any] = [
-        minimize(
-            loss,
-            start,
-            (inputs, observations, mean, spread),
-            "L-BFGS-B",
-            jac=True,
-            bounds=bounds,
-            options={"maxiter": ITERATIONS},
-        )
-        for start in (mean, noisy)
-    ]
+    with _on_one_thread():
+        found: list[Any] = [
+            minimize(
+                loss,
+                start,
+                (inputs, observations, mean, spread),
+                "L-BFGS-B",
+                jac=True,
+                bounds=bounds,
+                options={"maxiter": ITERATIONS},
+            )
+            for start in (mean, noisy)
+        ]
     return _hyperparameters(min(found, key=lambda result: result.fun).x)
 
 
@@ -162,7 +167,7 @@ def _priors(n: int) -> tuple[Array, Array]:
 def _inverse_root(covariance: Array, noise: float) -> Array:
     """Return the inverse of the Cholesky factor of an (N, N) covariance with noise."""
     factor = np.linalg.cholesky(covariance + (noise + JITTER) * np.eye(len(covariance)))
-    return np.asarray(np.linalg.inv(factor), dtype=np.float64)
+    return np.asarray(dtrtri(factor, lower=1)[0], dtype=np.float64)
 
 
 def _distances(first: Array, second: Array) -> Array:
@@ -175,3 +180,13 @@ def _covariance(first: Array, second: Array, found: Hyperparameters) -> Array:
     """Return the (N, K) covariances of the response at two sets of inputs."""
     root = np.sqrt(5.0) * _distances(first / found.lengths, second / found.lengths)
     return found.amplitude * (1.0 + root + root**2 / 3.0) * np.exp(-root)
+
+
+@cache
+def _blas() -> Any:
+    return ThreadpoolController().select(user_api="blas")
+
+
+def _on_one_thread() -> AbstractContextManager[Any]:
+    """Keep BLAS to one thread: matrices are so small that several take more than twice as long."""
+    return _blas().limit(limits=1)
