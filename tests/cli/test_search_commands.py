@@ -66,6 +66,36 @@ def test_robust_and_refine_every(in_folder: Path) -> None:
     assert "tolerance: 0.001 stored, 0.0 requested" in line
 
 
+@pytest.mark.slow
+def test_run_without_a_successful_evaluation_ends_with_an_error(in_folder: Path) -> None:
+    """Values that are not finite do not stop a run early: other designs may have finite ones."""
+    (in_folder / "mine.py").write_text(
+        "import armwright as aw\n\n\n"
+        '@aw.evaluator("reach [m]", "height [m]")\n'
+        "def never(arm, task):\n"
+        '    return float("nan"), 1.0\n\n\n'
+        '@aw.evaluator("reach [m]", "height [m]")\n'
+        "def sometimes(arm, task):\n"
+        '    return (float("nan") if arm.base[0] > 0.0 else 1.0), 1.0\n'
+    )
+    for name, code in (("never", 1), ("sometimes", 0)):
+        for form in ((), ("--json",)):
+            done = armwright(
+                "optimize",
+                "target-1",
+                *SHORT,
+                "--sampler",
+                "tpe",
+                "--evaluator",
+                f"mine.py:{name}",
+                "--out",
+                name,
+                *form,
+            )
+            assert done.returncode == code, done.stdout + done.stderr
+            assert ("No evaluation succeeded" in done.stdout) == (name == "never" and not form)
+
+
 @pytest.mark.parametrize(
     ("code", "args", "words"),
     [

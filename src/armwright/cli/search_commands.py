@@ -270,12 +270,14 @@ def optimize(
         return
     if json_:
         print_json({"folder": folder, **run.summary})
-        return
-    if finished_before:
-        console.print(f"{folder}/ is finished; nothing was computed again. A larger --n-total extends it.")
-    elif run.resumed:
-        console.print(f"resumed at trial {run.resumed} of {len(run.trials)}")
-    show_result(console, run, drawn)
+    else:
+        if finished_before:
+            console.print(f"{folder}/ is finished; nothing was computed again. A larger --n-total extends it.")
+        elif run.resumed:
+            console.print(f"resumed at trial {run.resumed} of {len(run.trials)}")
+        show_result(console, run, drawn)
+    if all(trial.failure is not None for trial in run.trials):
+        raise typer.Exit(1)
 
 
 def refine(
