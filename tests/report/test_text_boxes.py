@@ -56,7 +56,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[Bbox, list[tuple[s
     def recorded(self: Text, renderer: Any, *others: Any, **named: Any) -> None:
         draw(self, renderer, *others, **named)
         if self.get_visible() and self.get_text().strip() and self.get_rotation() % 90.0 == 0.0:
-            boxes.append((self.get_text(), self.get_window_extent(renderer)))
+            boxes.append((self.get_text(), Text.get_window_extent(self, renderer)))  # without a label's line
 
     def saved(figure: Figure, png: Path) -> str:
         figure.savefig(png, dpi="figure")

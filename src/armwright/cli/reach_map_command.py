@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from armwright.robot.urdf_reader import UrdfArm
     from armwright.tasks.task import Task
 
-FOLDER = "reach-maps"  # in a run folder
 GRID, CONDITIONS = "Grid and directions", "Conditions"
 
 
 @dataclass(frozen=True)
 class _Subject:
-    """An arm to map: its name, its task if any, and where its files go, without their endings."""
+    """An arm to map: its name, its task if any, where its files go, without their endings, and the run of a design."""
 
     name: str
     arm: "Arm | UrdfArm"
     task: "Task | None"
     files: Path
+    run: Path | None = None
 
 
 def reach_map(
@@ -93,6 +93,8 @@ def reach_map(
 ) -> None:
     """Map in which directions an arm can hold its tool at each point of a grid."""
     from armwright.kinematics.reach_map import reach_map
+    from armwright.report.page import write_report
+    from armwright.report.page_reach_maps import fingerprint
     from armwright.report.reach_figure import write_reach_figure
 
     if not 0.0 < share <= 1.0:
@@ -117,11 +119,12 @@ def reach_map(
         obstacles=subject.task.obstacles if obstacles and subject.task is not None else (),
     )
     if out is not None:
-        subject = replace(subject, files=out.with_suffix(""))
+        subject = replace(subject, files=out.with_suffix(""), run=None)
     subject.files.parent.mkdir(parents=True, exist_ok=True)
     file, figure = (subject.files.with_name(subject.files.name + ending) for ending in (".npz", ".png"))
-    found.save(file)
     conditions = _describe_conditions(payload, clearance, obstacles)
+    texts = {"about": _describe_directions(found, axis, cone), "conditions": conditions}
+    found.save(file, arm=fingerprint(subject.arm), **texts)
     write_reach_figure(found, _surroundings(subject, conditions), share, figure)
     record = {
         "name": subject.name,
@@ -134,7 +137,7 @@ def reach_map(
         "conditions": conditions,
         "within_limits": _volumes(found, share, usable=False),
         "usable": _volumes(found, share, usable=True) if conditions else None,
-        "files": [file, figure],
+        "files": [file, figure, *([] if subject.run is None else [write_report(subject.run)])],
     }
     if json_:
         print_json(record)
@@ -146,7 +149,7 @@ def _subject(source: str, design: int | None, tip: str | None, task: str | None)
     """Return the arm of a run or of a URDF."""
     from armwright.robot.robot_descriptions import find_urdf
     from armwright.robot.urdf_reader import read_urdf
-    from armwright.runs.folder import read_run
+    from armwright.runs.folder import REACH_MAPS, read_run
     from armwright.runs.selection import pick
     from armwright.tasks.catalogue import load_task
 
@@ -164,7 +167,9 @@ def _subject(source: str, design: int | None, tip: str | None, task: str | None)
         raise SettingsError(f"--design {design}: {source} has the designs 0 to {len(history) - 1}")
     member = pick(history)[0] if design is None else history.member(design)
     name = f"design {member.number} of {source}"
-    return _Subject(name, member.arm, history.problem.task, Path(source) / FOLDER / f"{member.number:04d}")
+    return _Subject(
+        name, member.arm, history.problem.task, Path(source) / REACH_MAPS / f"{member.number:04d}", Path(source)
+    )
 
 
 def _surroundings(subject: _Subject, conditions: str) -> Any:
@@ -187,6 +192,11 @@ def _numbers(option: str, text: str, n: int) -> "Array":
         example = "0,0,-1" if n == 3 else "-0.5,-0.5,0,0.5,0.5,0.8"
         raise SettingsError(f'{option} "{text}": expected {n} numbers with commas, such as {example}')
     return np.array(values)
+
+
+def _describe_directions(found: "ReachMap", axis: str, cone: float) -> str:
+    number = f"{len(found.directions)} directions" if len(found.directions) > 1 else "one direction"
+    return f"{number} of the whole sphere" if cone >= 180.0 else f"{number} within {cone:g}° of ({axis})"
 
 
 def _describe_conditions(payload: float | None, clearance: float | None, obstacles: bool) -> str:

@@ -98,8 +98,8 @@ class ReachMap:
         """Return the (n,) coordinates of the points along x, y or z (0, 1 or 2) [m]."""
         return np.moveaxis(self.points.reshape(*self.shape, 3), axis, 0)[:, 0, 0, axis]
 
-    def save(self, file: str | Path) -> None:
-        """Write the map as NumPy arrays (npz): points, shape, spacing, directions, and those of both coverages."""
+    def save(self, file: str | Path, **texts: str) -> None:
+        """Write the map as NumPy arrays (npz): points, shape, spacing, directions, both coverages, and these texts."""
         arrays: dict[str, Any] = {
             f"{prefix}{name}": values
             for prefix, coverage in (("", self.bare), ("usable_", self.usable))
@@ -118,6 +118,7 @@ class ReachMap:
                 spacing=np.array(self.spacing),
                 directions=self.directions,
                 **arrays,
+                **{name: np.array(text) for name, text in texts.items()},
             )
 
 

@@ -22,6 +22,7 @@ from armwright.pareto import hypervolume
 from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import TORQUE, TORQUE_SCALE
 from armwright.report.page_cycles import cycle_motions, cycle_of_design
+from armwright.report.page_reach_maps import ReachMapFiles
 from armwright.report.page_recommendations import explained, recommended_designs, why_nothing
 from armwright.report.repeat_command import repeat_command
 from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
@@ -55,6 +56,7 @@ class RunContent:
         self.folder = folder
         self.config: RunConfig = read_config(folder)
         self._reader = TrialsReader(folder, self.config)
+        self._reach_maps = ReachMapFiles(folder)
         self._chunks: list[tuple[int, Arrays]] = []  # chunks of designs, by the number of the first
         self._n = 0
         self._cycle_of: dict[int, dict[str, Any]] = {}  # of designs that are or were on the front
@@ -110,6 +112,7 @@ class RunContent:
         front = [member.number for member in self.history.front]
         search = None if self.summary is None or self.study is not None else self.summary["search"]
         spent = None if search is None else search["evaluations"]
+        reach_maps = self._reach_maps.read(self.history)
         head = {
             **_about(self.config, self.folder, self.history, spent),
             "n": self._n,
@@ -123,6 +126,7 @@ class RunContent:
             "looks": {trial.source: look(trial.source)._asdict() for trial in self.history},
             "existing": EXISTING._asdict(),
             "existing_arms": _existing_arms(self.folder, self.history),
+            "reach_maps": {number: shown.head for number, shown in reach_maps.items()},
             "result": _result(self.history, self.summary),
             "recommended": self._recommended,
             "nothing": why_nothing(self.history, self.summary),
@@ -130,7 +134,8 @@ class RunContent:
             "calls": [asdict(call) for call in self.calls[calls_from:]],
             "files": {number: design_files(self.history, number) for number in front} if with_files else {},
         }
-        return pack(head, {**arrays, "curve": self.history.hypervolumes})
+        levels = {f"reach_{number}": shown.levels for number, shown in reach_maps.items()}
+        return pack(head, {**arrays, **levels, "curve": self.history.hypervolumes})
 
     def _cycles(self) -> dict[int, dict[str, Any]]:
         """Return how the designs of the front move through the cycle of the task; empty without one."""

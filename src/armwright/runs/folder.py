@@ -38,6 +38,7 @@ CONFIG = "config.yaml"
 KEPT = ". What was written before is safe; free room or give another --out DIR, and run the same command again"
 PROPOSALS = "proposals"
 SEARCH = "search.npz"
+REACH_MAPS = "reach-maps"
 BEFORE_TRIALS = {
     LOCK, CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
 }  # fmt: skip

@@ -3,7 +3,7 @@
 import { during } from "./cycle.js";
 import { describeMiss, postures, why } from "./design.js";
 import { PRISMATIC, chain, columnBody, length, motorBody, rail } from "./kinematics.js";
-import { arrow, ball, boxEdges, empty, floorParts, rod, segments } from "./shapes.js";
+import { arrow, ball, boxEdges, empty, floorParts, octahedra, rod, segments } from "./shapes.js";
 import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, number, onTheme, shown } from "./format.js";
@@ -26,6 +26,7 @@ let frame = null; // { centre, radius } of the visible scene
 let moving = null; // { from, to, began } in joint space
 let playing = false;
 let began = null; // time [ms] at which the played cycle began; null while not moving along one
+let cloud = null; // { places, colours, radius } of points around the arm; null for none
 let turned = false; // whether the user has rotated the view
 
 export function openArm(shownContent) {
@@ -91,6 +92,19 @@ export function snapshot(design) {
   return picture;
 }
 
+// Draws small bodies at points around the arm, or removes them.
+export function drawCloud(points) {
+  if (!scene || (cloud === null && points === null)) return;
+  cloud = points;
+  empty(groups.cloud);
+  if (cloud !== null && cloud.places.length) groups.cloud.add(octahedra(cloud.places, cloud.radius, cloud.colours));
+  frame = null;
+  drawArm();
+}
+
+// Returns the number of drawn bodies around the arm; for tests.
+export const drawnPoints = () => groups.cloud.children.reduce((n, mesh) => n + mesh.geometry.attributes.position.array.length / 72, 0);
+
 // Returns the positions of the drawn joints; for tests.
 export function drawnJoints() {
   return groups.arm.children.filter((mesh) => mesh.userData.joint !== undefined)
@@ -129,7 +143,7 @@ function begin() {
   const sun = new THREE.DirectionalLight(0xffffff, 1.6);
   sun.position.set(3, -5, 8);
   scene.add(sun);
-  for (const name of ["floor", "obstacles", "lines", "workspace", "targets", "goals", "ghost", "compared", "arm"]) {
+  for (const name of ["floor", "obstacles", "lines", "workspace", "targets", "goals", "ghost", "compared", "cloud", "arm"]) {
     groups[name] = new THREE.Group();
     scene.add(groups[name]);
   }
@@ -191,7 +205,7 @@ function render() {
 
 // Returns the points of the selected design that must be visible: targets, and the arm in all postures.
 function extent() {
-  const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high])];
+  const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high]), ...(cloud?.places ?? [])];
   for (const i of new Set([state.design, state.compared ?? state.design])) {
     const arm = content.arm(i), column = columnBody(arm);
     content.targets.forEach((_, t) => points.push(...chain(arm, content.q(i, t)).joints));

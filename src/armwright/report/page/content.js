@@ -48,6 +48,7 @@ export class Content {
     if (head.designs_from !== this.n) throw new Error("designs are missing in between");
     this.head = head;
     this.curve = arrays.curve.data;
+    this.reach = Object.fromEntries(Object.entries(head.reach_maps).map(([i, map]) => [i, { ...map, levels: arrays[`reach_${i}`].data }]));
     Object.assign(this.proposals, head.proposals);
     Object.assign(this.failures, head.failures);
     this.calls = [...this.calls.slice(0, head.calls_from), ...head.calls];

@@ -1,6 +1,6 @@
 // Opens the page with its embedded content or with that of its server.
 
-import { drawArm, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, openArm } from "./arm.js";
+import { drawArm, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawnPoints, openArm } from "./arm.js";
 import { Content, embedded } from "./content.js";
 import { drawCurve, openCurve } from "./curve.js";
 import { during } from "./cycle.js";
@@ -10,6 +10,7 @@ import { fileFetcher, openLive } from "./live.js";
 import { drawLoads, openLoads } from "./loads.js";
 import { growPareto, openPareto } from "./pareto.js";
 import { drawPick, forget, openPick, ranked } from "./pick.js";
+import { drawReach, openReach } from "./reach.js";
 import { arrange, drawRecommended, openRecommended } from "./recommended.js";
 import { fromAddress, keepAddress, set, state } from "./state.js";
 import { drawSurrogate } from "./surrogate.js";
@@ -43,6 +44,7 @@ function open() {
   openArm(content);
   openRecommended(content);
   openLoads(content);
+  openReach(content);
   drawConfiguration();
   addEventListener("hashchange", () => set(fromAddress(content)));
   $("loading").hidden = true;
@@ -58,6 +60,7 @@ function grow() {
   drawSurrogate(content);
   drawTranscript();
   drawConfiguration();
+  drawReach();
 }
 
 function take(buffer) {
@@ -95,5 +98,5 @@ async function start() {
 }
 
 // For the console and for tests.
-window.armwright = { content, state, set, postures, during, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawArm };
+window.armwright = { content, state, set, postures, during, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawnPoints, drawArm };
 start();

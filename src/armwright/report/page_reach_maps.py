@@ -1,0 +1,108 @@
+"""Reach maps of a run's designs, as the page shows them."""
+
+import hashlib
+import math
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.robot.arm import Arm
+from armwright.robot.urdf_reader import UrdfArm
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.folder import REACH_MAPS
+from armwright.runs.history import History
+
+MOST_POINTS = 100_000  # of a map; the page would become slow
+UNREADABLE = (OSError, EOFError, KeyError, MemoryError, RuntimeError, TypeError, ValueError, BadZipFile, zlib.error)
+NOT_REACHED, IN_NO_DIRECTION, IN_ALL = 0, 1, 255  # levels of points; between the last two, the share of directions
+
+
+@dataclass(frozen=True)
+class PageReachMap:
+    """A reach map for the page.
+
+    Attributes:
+        arm: The fingerprint of the arm; the numbers of designs may have changed since.
+        head: Its grid and conditions.
+        levels: (2, N) of the points within the joint limits, and of those that satisfy the conditions, too.
+    """
+
+    arm: str
+    head: dict[str, Any]
+    levels: NDArray[np.uint8]
+
+
+class ReachMapFiles:
+    """The reach maps in a run folder; `read` opens only files that changed."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder / REACH_MAPS
+        self._known: dict[Path, tuple[tuple[int, int], PageReachMap | None]] = {}
+
+    def read(self, history: History) -> dict[int, PageReachMap]:
+        """Return the maps by the numbers of their designs; without unusable files, and maps of other designs."""
+        found: dict[int, PageReachMap] = {}
+        for file in sorted(self._folder.glob("*.npz")):
+            if not (file.stem.isdecimal() and int(file.stem) < len(history)):
+                continue
+            shown, number = self._latest(file), int(file.stem)
+            if shown is not None and shown.arm == fingerprint(history.member(number).arm):
+                found[number] = shown
+        return found
+
+    def _latest(self, file: Path) -> PageReachMap | None:
+        try:
+            status = file.stat()
+        except OSError:
+            return None
+        version = (status.st_mtime_ns, status.st_size)
+        known, shown = self._known.get(file, (None, None))
+        if version != known:
+            shown = _read(file)
+            self._known[file] = (version, shown)
+        return shown
+
+
+def fingerprint(arm: Arm | UrdfArm) -> str:
+    """Return a text that differs between arms."""
+    return hashlib.sha256(to_urdf(arm.arm if isinstance(arm, UrdfArm) else arm).encode()).hexdigest()
+
+
+def _read(file: Path) -> PageReachMap | None:
+    """Return a map; None for a file that is damaged or too large to show."""
+    try:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
+            points, spacing = np.asarray(arrays["points"], dtype=np.float64), float(arrays["spacing"])
+            shape = [int(n) for n in arrays["shape"]]
+            is_grid = len(shape) == 3 and min(shape) > 0 and points.shape == (math.prod(shape), 3)
+            if not is_grid or len(points) > MOST_POINTS or not bool(np.isfinite([*points[0], spacing]).all()):
+                return None
+            levels = np.stack(
+                [_levels(arrays[f"{use}covered"], arrays[f"{use}share"], len(points)) for use in ("", "usable_")]
+            )
+            arm = str(arrays["arm"])
+            head: dict[str, Any] = {
+                "shape": shape,
+                "low": points[0].tolist(),
+                "spacing": spacing,
+                "directions": len(arrays["directions"]),
+                "about": str(arrays["about"]),
+                "conditions": str(arrays["conditions"]),
+            }
+    except UNREADABLE:
+        return None
+    return PageReachMap(arm, head, levels)
+
+
+def _levels(covered: NDArray[Any], share: Array, n: int) -> NDArray[np.uint8]:
+    """Return (N,) levels, such that a share above 0 is never shown as 0."""
+    if covered.shape != (n,) or share.shape != (n,):
+        raise ValueError("arrays of different lengths")
+    of_share = np.clip(np.ceil(IN_NO_DIRECTION + (IN_ALL - IN_NO_DIRECTION) * share), IN_NO_DIRECTION, IN_ALL)
+    return np.where(covered.astype(bool), of_share, NOT_REACHED).astype(np.uint8)
