@@ -5,6 +5,7 @@ import { $, colour, element, number, onTheme } from "./format.js";
 import { choose, chosen, listenToChoice, placeEdit } from "./editor-targets.js";
 import { arrow, ball, boxEdges, empty, floorParts, letters, segments } from "./shapes.js";
 import { solidParts } from "./solids.js";
+import { Stage, frameOf } from "./stage.js";
 
 const VIEW = [0.55, -1, 0.55]; // initial direction of the camera
 const BALL = 0.025, ARROW = 0.14, LETTER = 0.09; // as shares of the frame's radius
@@ -13,24 +14,21 @@ const GRID = 0.001; // [m] to which dragged targets are rounded
 const MOST_NAMED = 60; // targets with their names
 const [TARGET, NOW, OBSTACLE, BASE] = ["#CC79A7", "#E69F00", "#6E7F91", "#0072B2"];
 
-let scene = null, camera = null, controls = null, renderer = null;
+let stage = null, groups = {}; // null without 3D graphics
 let drawn = null; // the scene of the server that is shown
-let frame = null; // { low, high, centre, radius }
 let dragged = null; // { index, up, normal, place, from, mesh, moved }
-let turned = false; // whether the user has rotated the view
-const groups = {};
 
 export function openScene() {
   try {
     begin();
   } catch {
-    scene = null;
+    stage = null;
     $("scene").replaceChildren(element("p", { class: "note" }, "This browser shows no 3D graphics (WebGL). The tables below do the same."));
     $("reset").disabled = true;
     return;
   }
   $("reset").addEventListener("click", () => {
-    [frame, turned] = [null, false];
+    Object.assign(stage, { frame: null, turned: false });
     drawScene();
   });
   listenToChoice(paintChoice);
@@ -39,58 +37,28 @@ export function openScene() {
 
 // Returns where the targets are drawn, on the canvas [px]; for tests.
 export function targetPlaces() {
-  const { left, top, width, height } = renderer.domElement.getBoundingClientRect();
+  const { left, top, width, height } = stage.canvas.getBoundingClientRect();
   return groups.targets.children.map((mesh) => {
-    const place = mesh.position.clone().project(camera);
+    const place = mesh.position.clone().project(stage.camera);
     return [left + ((place.x + 1) / 2) * width, top + ((1 - place.y) / 2) * height];
   });
 }
 
 function begin() {
-  renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
-  scene = new THREE.Scene();
-  camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1e5);
-  camera.up.set(0, 0, 1);
-  scene.add(new THREE.HemisphereLight(0xffffff, 0x8890a0, 2.2));
-  const sun = new THREE.DirectionalLight(0xffffff, 1.6);
-  sun.position.set(3, -5, 8);
-  scene.add(sun);
-  for (const name of ["floor", "bases", "obstacles", "lines", "targets", "ways", "names"]) {
-    groups[name] = new THREE.Group();
-    scene.add(groups[name]);
-  }
-  const canvas = renderer.domElement;
-  $("scene").append(canvas);
+  stage = new Stage($("scene"), ["floor", "bases", "obstacles", "lines", "targets", "ways", "names"], VIEW);
+  ({ groups } = stage);
+  const { canvas } = stage;
   // Before the controls, which would turn the view.
   canvas.addEventListener("pointerdown", grab, { capture: true });
   canvas.addEventListener("pointermove", drag);
   canvas.addEventListener("pointerup", drop);
   canvas.addEventListener("pointercancel", drop);
-  controls = new THREE.OrbitControls(camera, canvas);
-  canvas.style.touchAction = "pan-y";
-  controls.addEventListener("change", render);
-  controls.addEventListener("start", () => { turned = true; });
-  new ResizeObserver(fit).observe($("scene"));
-  fit();
-}
-
-function fit() {
-  const box = $("scene");
-  if (!box.clientWidth) return;
-  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-  renderer.setSize(box.clientWidth, box.clientHeight);
-  camera.aspect = box.clientWidth / box.clientHeight;
-  camera.updateProjectionMatrix();
-  if (frame !== null) look();
-}
-
-function render() {
-  renderer.render(scene, camera);
+  stage.open();
 }
 
 // Draws what the server reads in the files; while a file is not valid, the last scene stays.
 export function drawScene() {
-  if (!scene || dragged !== null) return;
+  if (!stage || dragged !== null) return;
   drawn = opened.assessed?.scene ?? drawn;
   if (drawn === null) {
     $("scene-note").textContent = "The scene appears as soon as the task file is valid.";
@@ -98,7 +66,7 @@ export function drawScene() {
   }
   reframe();
   $("scene-note").textContent = opened.assessed.scene === null ? "The task file is not valid; this is how it was before." : describe();
-  const { radius } = frame;
+  const { frame } = stage, { radius } = frame;
   const solid = (paint) => new THREE.MeshLambertMaterial({ color: paint });
   const thin = (paint) => new THREE.LineBasicMaterial({ color: paint });
   for (const group of Object.values(groups)) empty(group);
@@ -125,45 +93,31 @@ export function drawScene() {
 
 function describe() {
   const bases = drawn.bases ? "; the blue box holds the allowed bases" : "";
-  return `Grid of ${number(floorParts(frame).cell)} m; z is up${bases}. Drag a target along the ground, with Shift up and down; drag elsewhere to rotate.`;
+  return `Grid of ${number(floorParts(stage.frame).cell)} m; z is up${bases}. Drag a target along the ground, with Shift up and down; drag elsewhere to rotate.`;
 }
 
 function paintChoice() {
-  if (!scene || frame === null) return;
+  if (!stage || stage.frame === null) return;
   groups.targets.children.forEach((mesh, t) => {
     mesh.material.color.set(t === chosen() ? NOW : TARGET);
-    mesh.scale.setScalar((t === chosen() ? 1.5 : 1) * BALL * frame.radius);
+    mesh.scale.setScalar((t === chosen() ? 1.5 : 1) * BALL * stage.frame.radius);
   });
-  render();
+  stage.render();
 }
 
 function reframe() {
-  const points = [...drawn.targets, ...(drawn.bases ?? []), ...drawn.workspace.flatMap(({ low, high }) => [low, high])];
-  const low = [0, 1, 2].map((k) => points.reduce((least, p) => Math.min(least, p[k]), Infinity));
-  const high = [0, 1, 2].map((k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity));
-  const radius = Math.max(1e-2, Math.hypot(...high.map((v, k) => v - low[k])) / 2);
-  const isFar = frame === null || radius > 1.2 * frame.radius || radius < 0.5 * frame.radius
-    || low.some((v, k) => v < frame.low[k] - 0.4 * frame.radius) || high.some((v, k) => v > frame.high[k] + 0.4 * frame.radius);
+  const { frame } = stage;
+  const wanted = frameOf([...drawn.targets, ...(drawn.bases ?? []), ...drawn.workspace.flatMap(({ low, high }) => [low, high])], 1e-2);
+  const isFar = frame === null || wanted.radius > 1.2 * frame.radius || wanted.radius < 0.5 * frame.radius
+    || wanted.low.some((v, k) => v < frame.low[k] - 0.4 * frame.radius) || wanted.high.some((v, k) => v > frame.high[k] + 0.4 * frame.radius);
   if (!isFar) return;
-  frame = { low, high, radius, centre: low.map((v, k) => (v + high[k]) / 2) };
-  look();
-}
-
-function look() {
-  const far = (1.1 * frame.radius) / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, camera.aspect);
-  const way = turned ? camera.position.clone().sub(controls.target) : new THREE.Vector3(...VIEW);
-  controls.target.set(...frame.centre);
-  camera.position.copy(controls.target).addScaledVector(way.normalize(), far);
-  camera.near = far / 100;
-  camera.far = 10 * far;
-  camera.updateProjectionMatrix();
-  controls.update();
-  render();
+  stage.frame = wanted;
+  stage.look();
 }
 
 // Returns the line of sight through a point of the canvas: { from, way }.
 function sight(event) {
-  const box = renderer.domElement.getBoundingClientRect();
+  const { canvas, camera } = stage, box = canvas.getBoundingClientRect();
   const x = ((event.clientX - box.left) / box.width) * 2 - 1, y = 1 - ((event.clientY - box.top) / box.height) * 2;
   return { from: camera.position, way: new THREE.Vector3(x, y, 0.5).unproject(camera).sub(camera.position).normalize() };
 }
@@ -185,7 +139,7 @@ function hit({ from, way }) {
 }
 
 function grab(event) {
-  if (event.button !== 0 || frame === null) return;
+  if (event.button !== 0 || stage.frame === null) return;
   const line = sight(event), index = hit(line);
   if (index < 0) return;
   event.stopImmediatePropagation();
@@ -194,7 +148,7 @@ function grab(event) {
   choose(index);
   if (up) normal.copy(line.way).setZ(0).normalize();
   dragged = { index, up, normal, place, from: meet(line, normal, place), mesh, moved: false };
-  renderer.domElement.setPointerCapture(event.pointerId);
+  stage.canvas.setPointerCapture(event.pointerId);
 }
 
 function drag(event) {
@@ -207,7 +161,7 @@ function drag(event) {
   dragged.moved = true;
   const [x, y, z] = mesh.position.toArray().map((v) => number(v, 6));
   $("scene-note").textContent = `Target ${drawn.names[dragged.index]} at (${x}, ${y}, ${z}) m`;
-  render();
+  stage.render();
 }
 
 function drop() {

@@ -5,6 +5,7 @@ import { describeMiss, postures, why } from "./design.js";
 import { PRISMATIC, chain, columnBody, length, motorBody, rail } from "./kinematics.js";
 import { arrow, ball, boxEdges, empty, floorParts, octahedra, rod, segments } from "./shapes.js";
 import { solidParts } from "./solids.js";
+import { Stage, frameOf } from "./stage.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, number, onTheme, shown } from "./format.js";
 
@@ -16,18 +17,16 @@ const FILLS = 0.8; // an arm smaller than this share of the frame's radius gets 
 const ARROW = 0.16; // length of arrows, as a share of the frame's radius
 const SLACK = 0.2; // share of the frame's radius by which an arm may leave it before it grows
 
+const GROUPS = ["floor", "obstacles", "lines", "workspace", "targets", "goals", "ghost", "compared", "cloud", "arm"];
 const [HIT, NOW] = ["#009E73", "#E69F00"]; // colours of targets
 
 let content = null;
-let scene = null, camera = null, controls = null, renderer = null;
-const groups = {}; // parts that are redrawn separately
+let stage = null, groups = {}; // null without 3D graphics
 let materials = {};
-let frame = null; // { centre, radius } of the visible scene
 let moving = null; // { from, to, began } in joint space
 let playing = false;
 let began = null; // time [ms] at which the played cycle began; null while not moving along one
 let cloud = null; // { places, colours, radius } of points around the arm; null for none
-let turned = false; // whether the user has rotated the view
 
 export function openArm(shownContent) {
   content = shownContent;
@@ -36,7 +35,7 @@ export function openArm(shownContent) {
   $("next").addEventListener("click", () => step(1));
   $("play").addEventListener("click", () => play(!playing));
   $("ghost").addEventListener("change", drawArm);
-  $("reset").addEventListener("click", () => { frame = null; turned = false; drawArm(); });
+  $("reset").addEventListener("click", () => { if (stage) Object.assign(stage, { frame: null, turned: false }); drawArm(); });
   $("compare").addEventListener("click", () => set({ compared: state.compared === null ? state.design : null }));
   addEventListener("keydown", (event) => {
     if (event.target.closest("input, select, textarea, table, .plot") || event.altKey || event.ctrlKey || event.metaKey) return;
@@ -49,7 +48,7 @@ export function openArm(shownContent) {
   try {
     begin();
   } catch {
-    scene = null;
+    stage = null;
     const note = document.createElement("p");
     note.className = "note";
     note.textContent = "This browser shows no 3D graphics (WebGL). Everything else on this page works without.";
@@ -70,35 +69,35 @@ export function openArm(shownContent) {
 
 // Returns a picture of a design as a data address; null without 3D graphics.
 export function snapshot(design) {
-  if (!scene) return null;
-  const kept = { ...state }, keptFrame = frame, way = camera.position.clone(), [width, height] = PICTURE;
+  if (!stage) return null;
+  const { renderer, camera, controls } = stage, kept = { ...state }, keptFrame = stage.frame, way = camera.position.clone(), [width, height] = PICTURE;
   Object.assign(state, { design, compared: null, target: 0 });
-  frame = null;
+  stage.frame = null;
   renderer.setPixelRatio(1);
   renderer.setSize(width, height, false);
   [camera.aspect, camera.zoom] = [width / height, CLOSER];
   drawArm();
-  const picture = renderer.domElement.toDataURL();
+  const picture = stage.canvas.toDataURL();
   camera.zoom = 1;
   Object.assign(state, kept);
-  frame = null;
-  fit();
+  stage.frame = null;
+  stage.fit();
   drawArm();
-  if (keptFrame !== null && turned) {
+  if (keptFrame !== null && stage.turned) {
     camera.position.copy(way);
     controls.update();
-    render();
+    stage.render();
   }
   return picture;
 }
 
 // Draws small bodies at points around the arm, or removes them.
 export function drawCloud(points) {
-  if (!scene || (cloud === null && points === null)) return;
+  if (!stage || (cloud === null && points === null)) return;
   cloud = points;
   empty(groups.cloud);
   if (cloud !== null && cloud.places.length) groups.cloud.add(octahedra(cloud.places, cloud.radius, cloud.colours));
-  frame = null;
+  stage.frame = null;
   drawArm();
 }
 
@@ -135,27 +134,11 @@ export function drawnObstacles() {
 }
 
 function begin() {
-  renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
-  scene = new THREE.Scene();
-  camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1e5);
-  camera.up.set(0, 0, 1);
-  scene.add(new THREE.HemisphereLight(0xffffff, 0x8890a0, 2.2));
-  const sun = new THREE.DirectionalLight(0xffffff, 1.6);
-  sun.position.set(3, -5, 8);
-  scene.add(sun);
-  for (const name of ["floor", "obstacles", "lines", "workspace", "targets", "goals", "ghost", "compared", "cloud", "arm"]) {
-    groups[name] = new THREE.Group();
-    scene.add(groups[name]);
-  }
-  $("arm").append(renderer.domElement);
-  controls = new THREE.OrbitControls(camera, renderer.domElement);
-  renderer.domElement.style.touchAction = "pan-y"; // vertical swipes scroll the page
-  controls.addEventListener("change", render);
-  controls.addEventListener("start", () => { turned = true; });
-  new ResizeObserver(fit).observe($("arm"));
+  stage = new Stage($("arm"), GROUPS, VIEW);
+  ({ groups } = stage);
+  stage.open();
   paint();
-  onTheme(() => { paint(); frame = null; drawArm(); });
-  fit();
+  onTheme(() => { paint(); stage.frame = null; drawArm(); });
 }
 
 function paint() {
@@ -188,21 +171,6 @@ function legend() {
   }));
 }
 
-function fit() {
-  const box = $("arm");
-  if (!renderer || !box.clientWidth) return;
-  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-  renderer.setSize(box.clientWidth, box.clientHeight);
-  camera.aspect = box.clientWidth / box.clientHeight;
-  camera.updateProjectionMatrix();
-  if (frame === null) render();
-  else look();
-}
-
-function render() {
-  if (renderer) renderer.render(scene, camera);
-}
-
 // Returns the points of the selected design that must be visible: targets, and the arm in all postures.
 function extent() {
   const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high]), ...(cloud?.places ?? [])];
@@ -211,44 +179,29 @@ function extent() {
     content.targets.forEach((_, t) => points.push(...chain(arm, content.q(i, t)).joints));
     if (column) points.push([arm.base[0], arm.base[1], column.centre[2] - column.half[2]]);
   }
-  const low = [0, 1, 2].map((k) => points.reduce((least, p) => Math.min(least, p[k]), Infinity));
-  const high = [0, 1, 2].map((k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity));
-  return { low, high };
+  return points;
 }
 
 // Fits the frame to the design; an existing frame stays unless the arm leaves it.
 function reframe() {
-  const { low, high } = extent(), radius = Math.max(1e-3, Math.hypot(...high.map((v, k) => v - low[k])) / 2);
+  const { frame } = stage, wanted = frameOf(extent(), 1e-3);
   if (frame !== null) {
     const slack = SLACK * frame.radius;
-    const holds = low.every((v, k) => v >= frame.low[k] - slack) && high.every((v, k) => v <= frame.high[k] + slack);
-    if (holds && radius > FILLS * frame.radius) return;
+    const holds = wanted.low.every((v, k) => v >= frame.low[k] - slack) && wanted.high.every((v, k) => v <= frame.high[k] + slack);
+    if (holds && wanted.radius > FILLS * frame.radius) return;
   }
-  const centre = low.map((v, k) => (v + high[k]) / 2);
-  frame = { centre, low, high, radius };
+  stage.frame = wanted;
   drawFloor();
   drawObstacles();
   drawLines();
   drawWorkspace();
   drawTargets();
-  look();
-}
-
-function look() {
-  const far = (1.02 * frame.radius) / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, camera.aspect);
-  const way = turned ? camera.position.clone().sub(controls.target) : new THREE.Vector3(...VIEW);
-  controls.target.set(...frame.centre);
-  camera.position.copy(controls.target).addScaledVector(way.normalize(), far);
-  camera.near = far / 100;
-  camera.far = 10 * far;
-  camera.updateProjectionMatrix();
-  controls.update();
-  render();
+  stage.look();
 }
 
 function drawFloor() {
   empty(groups.floor);
-  const { parts, cell, isSeen } = floorParts(frame);
+  const { parts, cell, isSeen } = floorParts(stage.frame);
   groups.floor.add(...parts);
   const where = isSeen ? "the axes are at the world's origin" : "the axes are at the grid's corner, not at the world's origin";
   $("arm-note").textContent = `Grid of ${number(cell)} m; ${where}; z is up. Drag to rotate; use the wheel or two fingers to zoom, and the arrow keys to step through the targets.`;
@@ -256,7 +209,7 @@ function drawFloor() {
 
 function drawObstacles() {
   empty(groups.obstacles);
-  for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, frame, materials.obstacle));
+  for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, stage.frame, materials.obstacle));
 }
 
 // Draws the lines of the cycle.
@@ -282,18 +235,18 @@ function drawTargets() {
 
 // Draws the required tool direction: an arrow along z, and for a full orientation also along x and y.
 function drawGoal(target, t) {
-  const { n_angular, rotation } = content.head.target_arrays, size = ARROW * frame.radius;
+  const { n_angular, rotation } = content.head.target_arrays, size = ARROW * stage.frame.radius;
   if (!n_angular[t]) return;
   for (const k of n_angular[t] === 3 ? [0, 1, 2] : [2]) {
     const way = rotation[t].map((row) => row[k]), long = k === 2 ? size : 0.6 * size;
-    groups.goals.add(...arrow(target, way, long, 0.006 * frame.radius, n_angular[t] === 3 ? materials.joints[k] : materials.missed));
+    groups.goals.add(...arrow(target, way, long, 0.006 * stage.frame.radius, n_angular[t] === 3 ? materials.joints[k] : materials.missed));
   }
 }
 
-const ballSize = () => 0.028 * frame.radius;
+const ballSize = () => 0.028 * stage.frame.radius;
 
 // Links have their own thickness, limited so that they stay visible and hide nothing.
-const thick = (arm, j) => Math.min(Math.max(arm.radius[j], 0.008 * frame.radius), 0.035 * frame.radius);
+const thick = (arm, j) => Math.min(Math.max(arm.radius[j], 0.008 * stage.frame.radius), 0.035 * stage.frame.radius);
 
 function drawPosture(group, arm, q, paints) {
   empty(group);
@@ -309,14 +262,14 @@ function drawPosture(group, arm, q, paints) {
     group.add(joint);
     const body = motorBody(arm, posed, j);
     if (body) {
-      const [mesh, ...edges] = solidParts(body, frame, paints.motors[arm.axis[j]]);
+      const [mesh, ...edges] = solidParts(body, stage.frame, paints.motors[arm.axis[j]]);
       mesh.userData.motor = true;
       group.add(mesh, ...edges);
     }
   }
   const column = columnBody(arm);
   if (column) {
-    const [mesh, ...edges] = solidParts(column, frame, paints.column);
+    const [mesh, ...edges] = solidParts(column, stage.frame, paints.column);
     mesh.userData.column = true;
     group.add(mesh, ...edges);
   }
@@ -332,7 +285,7 @@ function drawPosture(group, arm, q, paints) {
 
 export function drawArm() {
   moving = null;
-  if (!scene || state.design === null) return;
+  if (!stage || state.design === null) return;
   reframe();
   const arm = content.arm(state.design), posed = postures(state.design);
   const tip = drawPosture(groups.arm, arm, content.q(state.design, state.target), materials);
@@ -352,7 +305,7 @@ export function drawArm() {
     const pale = { link: materials.compared, joints: [0, 1, 2].map(() => materials.compared), base: materials.compared, motors: [0, 1, 2].map(() => materials.comparedMotor), column: materials.comparedMotor };
     drawPosture(groups.compared, content.arm(state.compared), content.q(state.compared, state.target), pale);
   }
-  render();
+  stage.render();
 }
 
 function paintTargets(posed = postures(state.design)) {
@@ -372,7 +325,7 @@ function gap(tip) {
 
 // Animates the joints from the drawn posture to that of the selected target.
 function move() {
-  if (!scene || state.design === null) return;
+  if (!stage || state.design === null) return;
   const to = Array.from(content.q(state.design, state.target));
   const from = moving?.now ?? moving?.to ?? lastPosture ?? to;
   lastPosture = to;
@@ -397,7 +350,7 @@ function tick(now) {
     return;
   }
   gap(drawPosture(groups.arm, content.arm(state.design), moving.now, materials));
-  render();
+  stage.render();
   requestAnimationFrame(tick);
 }
 
@@ -440,7 +393,7 @@ function drive(now) {
   empty(groups.ghost);
   drawPosture(groups.arm, content.arm(state.design), at.q, materials);
   paintTargets();
-  render();
+  stage.render();
   requestAnimationFrame(drive);
 }
 
