@@ -128,7 +128,7 @@ def show_task(
         is_brief: Leave out the targets and the steps of the cycle.
     """
     reference = task.reference_point
-    print_named(console, task.name, f": {task.description}")
+    print_named(console, task.name, f": {task.description}" if task.description else "")
     if not is_brief:
         points = " ".join(format_point(target) for target in task.targets)
         console.print(f"  {len(task.targets)} targets [m]: {points}")
