@@ -6,6 +6,7 @@ import pytest
 
 import armwright as aw
 from armwright.exceptions import SettingsError
+from armwright.problem.objectives import QUANTITIES
 from armwright.runs.simulated_run import simulate_arm
 
 TASK, SPACE = aw.load_task("desk-sorting"), aw.load_space("desk-sorting")
@@ -13,7 +14,9 @@ TASK, SPACE = aw.load_task("desk-sorting"), aw.load_space("desk-sorting")
 
 def test_cycle_model_is_what_a_simulation_of_the_run_drives() -> None:
     problem = aw.Problem(TASK, SPACE)
-    designs = SPACE.sample(3, 0)
+    sampled = SPACE.sample(100, 0)
+    durations = QUANTITIES["cycle_time"](problem.physics(sampled))
+    designs = [sampled[row] for row in np.argsort(durations)[:3]]  # weak motors may take days
     evaluation = problem.physics(designs)
     for row, design in enumerate(designs):
         arm = problem.arm(design)
