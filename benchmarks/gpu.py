@@ -1,4 +1,4 @@
-"""The same kernels and the same search on a GPU as on the CPU beside it: rates, how far results differ, and the fronts.
+"""Compare kernels and search on a GPU with those on the CPU beside it: rates, differences of results, and fronts.
 
 rates         designs per second of `Problem.evaluate_matrix`, the best of three, after a first call
 differences   the share of designs of which an objective differs by more than 1 % between the devices. The iteration
@@ -70,7 +70,7 @@ def main() -> None:
 
 
 def rates(name: str, batch: int) -> None:
-    """One batch's line."""
+    """Print the line of one batch."""
     problems = [problem_on(name, device) for device in DEVICES]
     space = problems[0].space
     few = space.matrix(space.sample(min(batch, 10_000), seed=0))
@@ -90,7 +90,7 @@ def rates(name: str, batch: int) -> None:
 
 
 def postures(precision: Precision) -> None:
-    """The line of the inverse kinematics alone: random arms at the points of target-1."""
+    """Print the line of the inverse kinematics alone: random arms at the points of target-1."""
     problem = problem_on("target-1", "cpu")
     arms = problem.arms(problem.space.matrix(problem.space.sample(N_ARMS, seed=0)), precision)
     points = problem.task.target_positions
@@ -112,13 +112,13 @@ def postures(precision: Precision) -> None:
 
 
 def moved_by_a_bit(matrix: Array, space: DesignSpace) -> Array:
-    """The designs with their continuous parameters moved by a bit of single precision, towards 0."""
+    """Return the designs with their continuous parameters moved by a bit of single precision, towards 0."""
     is_float = np.array([isinstance(parameter, FloatParameter) for parameter in space.parameters])
     return np.where(is_float, matrix * (1.0 - 2.0**-23), matrix)
 
 
 def best_of_three(work: Callable[[], object]) -> float:
-    """Seconds."""
+    """Return the least of three durations [s]."""
     times: list[float] = []
     for _ in range(3):
         began = time.perf_counter()
@@ -128,7 +128,7 @@ def best_of_three(work: Callable[[], object]) -> float:
 
 
 def differing(first: Array, second: Array) -> float:
-    """Share of designs of which an objective differs by more than `DIFFERENT`."""
+    """Return the share of designs of which an objective differs by more than `DIFFERENT`."""
     scale = np.maximum(np.abs(first), np.abs(second))
     same = (first == second) | (scale == 0.0)
     with np.errstate(invalid="ignore"):
@@ -138,7 +138,7 @@ def differing(first: Array, second: Array) -> float:
 
 
 def fronts(name: str, evaluations: int, seeds: int) -> None:
-    """One search's lines."""
+    """Print the lines of the searches of one task, with 500 random designs at the start."""
     reference = reference_point_of(problem_on(name, "cpu"))
     for seed in range(seeds):
         found: list[tuple[float, float]] = []
@@ -157,7 +157,7 @@ def fronts(name: str, evaluations: int, seeds: int) -> None:
 
 
 def problem_on(name: str, device: Device) -> Problem:
-    """The built-in task in its own space."""
+    """Return the problem of a built-in task in its own space."""
     return Problem(load_task(name), default_space(name), device=device)
 
 

@@ -29,7 +29,7 @@ def new_search(problem: Problem, reference_point: tuple[float, ...], seed: int, 
 
 
 def searched(problem: Problem, reference_point: tuple[float, ...], seed: int, evaluations: int) -> FrontSearch:
-    """A search after so many evaluations, screened and started as by `armwright design`."""
+    """Return a search after so many evaluations, screened and started as by `armwright design`."""
     screen = Screen(problem, lambda: reference_point) if pays(problem) else None
     search = new_search(problem, reference_point, seed, screen)
     if screen is not None and evaluations < SHORT:

@@ -54,7 +54,7 @@ LONG = re.compile(r"armwright experiment (paper|recorded|rules|n-step|samplers|s
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
 
 FOLLOWED = [page for page in PAGES if commands(page) or any(block.language == "python" for block in blocks(page))]
-# Pages of minutes whose sections need nothing of each other: each is followed by itself.
+# Slow pages with independent sections; each section is tested separately.
 BY_SECTION = ("docs/examples.md",)
 MAX_WAIT = 900.0  # [s] for a command; only one that waits forever takes this long
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.problem.problem import Problem
-from armwright.report.page_reach_maps import ReachMapFiles
+from armwright.report.page_reach_maps import IN_ALL, IN_NO_DIRECTION, ReachMapFiles, _levels
 from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace
 from armwright.study.study import optimize
@@ -25,7 +25,7 @@ SMALL = ("--spacing", "0.2", "--directions", "12")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run with a reach map of design 3, and one with conditions of design 5."""
+    """Return a run with a reach map of design 3, and one with conditions of design 5."""
     out = tmp_path_factory.mktemp("reach") / "run"
     optimize(Problem(TASK, SPACE), proposer="none", n_init=10, n_total=10, out=out, verify=False)
     for design, options in ((3, ()), (5, ("--payload", "0.1", "--clearance", "0"))):
@@ -44,10 +44,10 @@ def grid(arrays: dict[str, Any], name: str) -> np.ndarray:
     return arrays[name].reshape(arrays["shape"])
 
 
-def shares(said: Any) -> np.ndarray:
-    """The shares that the page states [%], of points in the order of its grid; -1: none, -2: not reached."""
-    words = {"not reached": -2.0, "reached, in none of the directions": -1.0}
-    return np.array([words[text] if text in words else float(text.split(" ")[0]) for text in said])
+def shares(texts: list[str]) -> np.ndarray:
+    """Return the shares that the page states [%]; -1: reached in none of the directions, -2: not reached."""
+    known = {"not reached": -2.0, "reached, but in none of the directions": -1.0}
+    return np.array([known[text] if text in known else float(text.split(" ")[0]) for text in texts])
 
 
 @pytest.mark.slow
@@ -100,6 +100,10 @@ def test_3d_view_shows_the_points_up_to_the_slice(folder: Path, browser: Browser
         for index in (0, 2, int(arrays["shape"][2]) - 1):
             tab.page.locator("#reach-at").fill(str(index))
             assert tab.ask("armwright.drawnPoints()") == grid(arrays, "covered")[:, :, : index + 1].sum()
+        picture = tab.ask("armwright.snapshot(2)")
+        tab.page.locator("#reach-space").uncheck()
+        assert tab.ask("armwright.snapshot(2)") == picture  # the points are not on pictures of designs
+        tab.page.locator("#reach-space").check()
         tab.ask("armwright.set({ design: 2 })")  # without a map
         assert tab.ask("armwright.drawnPoints()") == 0
         assert not tab.faults
@@ -134,3 +138,12 @@ def test_maps_of_other_arms_and_damaged_files_are_left_out(folder: Path, tmp_pat
         assert sorted(files.read(history)) == [5]
     (maps / "0003.npz").write_bytes(whole)
     assert sorted(files.read(history)) == [3, 5]
+
+
+def test_only_full_coverage_is_shown_as_full() -> None:
+    n = 1000
+    share = np.arange(n + 1) / n
+    levels = _levels(np.ones(n + 1, dtype=bool), share, n + 1)
+    assert np.flatnonzero(levels == IN_ALL).tolist() == [n]
+    assert np.flatnonzero(levels == IN_NO_DIRECTION).tolist() == [0]
+    assert np.all(np.diff(levels.astype(int)) >= 0)

@@ -121,6 +121,19 @@ def test_random_designs_that_the_first_generation_lacks_come_later():
     assert np.quantile(units, [0.1, 0.5, 0.9]) == pytest.approx([0.1, 0.5, 0.9], abs=0.03)  # over the whole range
 
 
+def test_only_random_designs_that_were_not_evaluated_come_later():
+    """Neither known designs that were cut off nor generations that were cut short change their number."""
+    search = made(known=DesignEncoding(MIXED).random(300, np.random.default_rng(1)))
+    search.step(100)  # a part of the known designs
+    assert search.state()["random_left"] == FIRST_BATCH
+    search = made()
+    search.step(200)
+    search.step(SMALLEST_BATCH - 40)  # of 50 random designs, the last of the generation, 40 are left out
+    assert search.state()["random_left"] == FIRST_BATCH - 200 - 10
+    search.step()
+    assert search.state()["random_left"] == FIRST_BATCH - 200 - 10 - 50
+
+
 def test_search_with_a_cut_first_generation_continues_after_a_restore():
     def cut():
         search = made()

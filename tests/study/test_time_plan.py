@@ -135,7 +135,7 @@ def test_run_ends_on_time(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("of_a_design", "is_short"), [(0.1, True), (0.001, False)])
-def test_search_of_a_cycle_is_short_where_time_is(
+def test_cycle_search_is_short_if_time_is_short(
     clock: Clock, slow_evaluation: Callable[[float], None], tmp_path: Path, of_a_design: float, is_short: bool
 ) -> None:
     class StopError(Exception):

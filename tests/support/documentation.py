@@ -48,7 +48,7 @@ def blocks(page: str) -> list[Block]:
 
 
 def sections(page: str) -> dict[str, list[Block]]:
-    """The blocks below each heading of the second level, in their order."""
+    """Return the blocks below each heading of the second level, in their order."""
     found: dict[str, list[Block]] = {}
     tokens = MarkdownIt().parse((ROOT / page).read_text(encoding="utf-8"))
     headings = [(t.map[0], tokens[i + 1].content) for i, t in enumerate(tokens) if t.tag == "h2" and t.map]

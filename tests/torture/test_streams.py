@@ -24,7 +24,7 @@ def test_closed_output_pipe_ends_the_command(tmp_path: Path, whole: Path) -> Non
         process.stdout.close()
         said = process.stderr.read()
     assert process.returncode == 1
-    assert said == "armwright: output pipe closed; the same command resumes a run that was under way\n"
+    assert said == "armwright: output pipe closed; rerun the same command to resume an unfinished run\n"
     is_beginning(folder, whole)
     assert study(folder).returncode == 0
     is_same_run(folder, whole)

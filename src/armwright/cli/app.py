@@ -90,7 +90,7 @@ def main() -> NoReturn:
 
 def _describe(error: OSError) -> str:
     if isinstance(error, BrokenPipeError):
-        return "output pipe closed; the same command resumes a run that was under way"
+        return "output pipe closed; rerun the same command to resume an unfinished run"
     return f"{error.strerror or error}: {error.filename or 'the output'}"
 
 

@@ -94,8 +94,9 @@ def reach_map(
     """Map in which directions an arm can hold its tool at each point of a grid."""
     from armwright.kinematics.reach_map import reach_map
     from armwright.report.page import write_report
-    from armwright.report.page_reach_maps import fingerprint
+    from armwright.report.page_reach_maps import MOST_POINTS, fingerprint
     from armwright.report.reach_figure import write_reach_figure
+    from armwright.runs.results import read_summary
 
     if not 0.0 < share <= 1.0:
         raise SettingsError(f"--share {share}: expected more than 0 and at most 1")
@@ -123,9 +124,12 @@ def reach_map(
     subject.files.parent.mkdir(parents=True, exist_ok=True)
     file, figure = (subject.files.with_name(subject.files.name + ending) for ending in (".npz", ".png"))
     conditions = _describe_conditions(payload, clearance, obstacles)
-    texts = {"about": _describe_directions(found, axis, cone), "conditions": conditions}
+    texts = {"directions_text": _describe_directions(found, axis, cone), "conditions": conditions}
     found.save(file, arm=fingerprint(subject.arm), **texts)
     write_reach_figure(found, _surroundings(subject, conditions), share, figure)
+    files = [file, figure]
+    if subject.run is not None and len(found.points) <= MOST_POINTS and read_summary(subject.run) is not None:
+        files.append(write_report(subject.run))
     record = {
         "name": subject.name,
         "points": len(found.points),
@@ -137,12 +141,14 @@ def reach_map(
         "conditions": conditions,
         "within_limits": _volumes(found, share, usable=False),
         "usable": _volumes(found, share, usable=True) if conditions else None,
-        "files": [file, figure, *([] if subject.run is None else [write_report(subject.run)])],
+        "files": files,
     }
     if json_:
         print_json(record)
-    else:
-        _show(record)
+        return
+    _show(record)
+    if subject.run is not None and len(found.points) > MOST_POINTS:
+        open_console().print(f"the report shows maps of up to {MOST_POINTS:,} points")
 
 
 def _subject(source: str, design: int | None, tip: str | None, task: str | None) -> _Subject:

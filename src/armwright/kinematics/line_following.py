@@ -12,7 +12,10 @@ from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.devices import Device, load_path
 from armwright.tasks.motions import LineSamples, Poses
 
-CHUNK: dict[Device, int] = {"cpu": 2**12, "cuda": 2**20}  # samples; a thread's share, and a GPU's at a time
+CHUNK: dict[Device, int] = {
+    "cpu": 2**12,
+    "cuda": 2**20,
+}  # samples per chunk: per thread on the CPU, per launch on a GPU
 
 IndexArray = NDArray[np.intp]
 

@@ -13,7 +13,10 @@ from armwright.kinematics.cycle_path import CyclePaths
 from armwright.kinematics.devices import Device, load_dynamics
 from armwright.kinematics.motion_path import MotionPath
 
-CHUNK: dict[Device, int] = {"cpu": 2**12, "cuda": 2**20}  # samples; a thread's share, and a GPU's at a time
+CHUNK: dict[Device, int] = {
+    "cpu": 2**12,
+    "cuda": 2**20,
+}  # samples per chunk: per thread on the CPU, per launch on a GPU
 
 
 @dataclass(frozen=True)

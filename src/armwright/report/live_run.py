@@ -17,11 +17,11 @@ from armwright.runs.control import (
     read_status,
 )
 from armwright.runs.datasheet.design_sheet import design_sheet
-from armwright.runs.folder import CONFIG, REACH_MAPS, is_held, read_config
+from armwright.runs.folder import CONFIG, is_held, read_config
 from armwright.runs.results import SUMMARY
 from armwright.runs.trials_file import TRIALS
 
-WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL, REACH_MAPS)
+WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL)
 RECENT = 20  # trials whose mean duration predicts the remaining time
 RUNNING = ("evaluating", "asking", "paused")
 

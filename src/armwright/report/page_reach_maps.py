@@ -18,8 +18,19 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import REACH_MAPS
 from armwright.runs.history import History
 
-MOST_POINTS = 100_000  # of a map; the page would become slow
-UNREADABLE = (OSError, EOFError, KeyError, MemoryError, RuntimeError, TypeError, ValueError, BadZipFile, zlib.error)
+MOST_POINTS = 20_000  # of a map; more would slow the page down
+UNREADABLE = (
+    ArithmeticError,
+    OSError,
+    EOFError,
+    KeyError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    BadZipFile,
+    zlib.error,
+)
 NOT_REACHED, IN_NO_DIRECTION, IN_ALL = 0, 1, 255  # levels of points; between the last two, the share of directions
 
 
@@ -30,7 +41,7 @@ class PageReachMap:
     Attributes:
         arm: The fingerprint of the arm; the numbers of designs may have changed since.
         head: Its grid and conditions.
-        levels: (2, N) of the points within the joint limits, and of those that satisfy the conditions, too.
+        levels: (2, N) levels: within the joint limits, and also under the conditions.
     """
 
     arm: str
@@ -46,7 +57,7 @@ class ReachMapFiles:
         self._known: dict[Path, tuple[tuple[int, int], PageReachMap | None]] = {}
 
     def read(self, history: History) -> dict[int, PageReachMap]:
-        """Return the maps by the numbers of their designs; without unusable files, and maps of other designs."""
+        """Return the maps by design number. Unreadable files and maps of other arms are skipped."""
         found: dict[int, PageReachMap] = {}
         for file in sorted(self._folder.glob("*.npz")):
             if not (file.stem.isdecimal() and int(file.stem) < len(history)):
@@ -70,7 +81,7 @@ class ReachMapFiles:
 
 
 def fingerprint(arm: Arm | UrdfArm) -> str:
-    """Return a text that differs between arms."""
+    """Return a hash that identifies an arm."""
     return hashlib.sha256(to_urdf(arm.arm if isinstance(arm, UrdfArm) else arm).encode()).hexdigest()
 
 
@@ -81,7 +92,11 @@ def _read(file: Path) -> PageReachMap | None:
             points, spacing = np.asarray(arrays["points"], dtype=np.float64), float(arrays["spacing"])
             shape = [int(n) for n in arrays["shape"]]
             is_grid = len(shape) == 3 and min(shape) > 0 and points.shape == (math.prod(shape), 3)
-            if not is_grid or len(points) > MOST_POINTS or not bool(np.isfinite([*points[0], spacing]).all()):
+            if (
+                not is_grid
+                or len(points) > MOST_POINTS
+                or not (spacing > 0.0 and np.isfinite([*points[0], spacing]).all())
+            ):
                 return None
             levels = np.stack(
                 [_levels(arrays[f"{use}covered"], arrays[f"{use}share"], len(points)) for use in ("", "usable_")]
@@ -91,8 +106,7 @@ def _read(file: Path) -> PageReachMap | None:
                 "shape": shape,
                 "low": points[0].tolist(),
                 "spacing": spacing,
-                "directions": len(arrays["directions"]),
-                "about": str(arrays["about"]),
+                "directions": str(arrays["directions_text"]),
                 "conditions": str(arrays["conditions"]),
             }
     except UNREADABLE:
@@ -101,8 +115,9 @@ def _read(file: Path) -> PageReachMap | None:
 
 
 def _levels(covered: NDArray[Any], share: Array, n: int) -> NDArray[np.uint8]:
-    """Return (N,) levels, such that a share above 0 is never shown as 0."""
-    if covered.shape != (n,) or share.shape != (n,):
-        raise ValueError("arrays of different lengths")
-    of_share = np.clip(np.ceil(IN_NO_DIRECTION + (IN_ALL - IN_NO_DIRECTION) * share), IN_NO_DIRECTION, IN_ALL)
-    return np.where(covered.astype(bool), of_share, NOT_REACHED).astype(np.uint8)
+    """Return (N,) levels; IN_ALL stands for all directions, IN_NO_DIRECTION for none, and nothing else does."""
+    if covered.shape != (n,) or share.shape != (n,) or not np.all((share >= 0.0) & (share <= 1.0)):
+        raise ValueError("expected a share from 0 to 1 for each point")
+    between = np.clip(np.ceil(IN_NO_DIRECTION + (IN_ALL - IN_NO_DIRECTION) * share), IN_NO_DIRECTION, IN_ALL - 1)
+    levels = np.where(share == 1.0, IN_ALL, between)
+    return np.where(covered.astype(bool), levels, NOT_REACHED).astype(np.uint8)

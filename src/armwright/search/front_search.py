@@ -14,8 +14,8 @@ A pool hardly ever recovers a structure it has lost. A part of the evaluations t
 at random, evolves on its own and joins the main pool after a while. Then the next one starts. While nothing is found
 that counts, such as a feasible design, side pools start earlier and live shorter: the main pool may be stuck.
 
-Random designs would take most of a short search. Its first generation may be cut: the random designs that it lacks come
-along with children. Longer searches would lose structures that way, because evolved designs displace newcomers.
+Random designs would take most of a short search. Its first generation may be cut: the remaining random designs are
+added to later generations. Longer searches would lose structures that way, because evolved designs displace newcomers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,7 +36,7 @@ CAPACITIES = (100, 1000)  # designs in the pool: first and final
 EVALUATIONS_PER_MEMBER = 200  # the pool grows by one design per so many evaluations
 SMALLEST_BATCH = 100  # designs per generation; later as many as the pool holds
 FIRST_BATCH = 500  # random designs at the start
-LATE_SHARE = 0.5  # of each generation: random designs that the first one lacks
+LATE_SHARE = 0.5  # of the smallest generation: random designs that the first one lacks
 PER_NUMBER = 20  # designs of each number of joints that stay in the pool, though all may be infeasible
 LEADING = 12  # structures whose best designs stay in the pool
 SIDE_FROM = 25_000  # evaluations
@@ -137,8 +137,8 @@ class FrontSearch:
         if self._generation == 0:
             return np.vstack([self._known, self._encoding.random(FIRST_BATCH, rng)])
         if not self._is_side_generation:
-            n, n_random = max(SMALLEST_BATCH, self._capacity), self._late_random
-            children = self._offspring(self._matrix, self._values, n - n_random, rng)
+            children = self._offspring(self._matrix, self._values, self._n_children, rng)
+            n_random = self._late_random
             return np.vstack([children, self._encoding.random(n_random, rng)]) if n_random else children
         if not len(self._side_matrix):
             return self._encoding.random(FIRST_BATCH, rng)
@@ -148,9 +148,9 @@ class FrontSearch:
         """Select from the designs that `ask` returned, or the first of them, given their (N, M) values."""
         is_side_generation = self._is_side_generation
         if self._generation == 0:
-            self._random_left = len(self._known) + FIRST_BATCH - len(matrix)
+            self._random_left = FIRST_BATCH - max(0, len(matrix) - len(self._known))
         elif not is_side_generation:
-            self._random_left -= self._late_random
+            self._random_left -= max(0, len(matrix) - self._n_children)
         self._generation += 1
         self._evaluations += len(matrix)
         if is_side_generation:
@@ -162,9 +162,9 @@ class FrontSearch:
         if not self._history or self._evaluations >= RECORD_SPACING * self._history[-1][0]:
             self._history.append((self._evaluations, self.hypervolume))
 
-    def step(self, most: int | None = None) -> None:
-        """Run one generation, of at most so many designs."""
-        matrix = self.ask()[:most]
+    def step(self, limit: int | None = None) -> None:
+        """Run one generation, limited to its first designs if a limit is given."""
+        matrix = self.ask()[:limit]
         self.tell(matrix, self._evaluate(matrix))
 
     def move_reference_point(self, reference_point: Sequence[float]) -> None:
@@ -200,6 +200,10 @@ class FrontSearch:
     def _late_random(self) -> int:
         """Number of random designs in a generation of children."""
         return min(self._random_left, round(LATE_SHARE * SMALLEST_BATCH))
+
+    @property
+    def _n_children(self) -> int:
+        return max(SMALLEST_BATCH, self._capacity) - self._late_random
 
     @property
     def _is_side_generation(self) -> bool:

@@ -34,7 +34,7 @@ from armwright.study.time_plan import ChunkSize, ResultCosts, TimePlan, files_se
 
 SAVE_SECONDS = 5.0
 SHORT = 1_200  # evaluations on tasks with a cycle: searches of fewer find more after a smaller first generation
-SHORT_FIRST_BATCH = 200  # random designs of that
+SHORT_FIRST_BATCH = 200  # random designs in that first generation
 N_MEASURED = (1, 4, 16, 64)  # designs that the cost of results is measured on: more, while that is quick
 NOTABLE_SHARE, LONG_SHARE = 0.02, 0.1  # of the budget
 
@@ -143,7 +143,7 @@ class DirectSearch:
         """Return whether the budget leaves few evaluations, by the rate of those that are done."""
         rate = done / max(self.plan.search_seconds, 1e-9)
         affordable = done + rate * max(0.0, self.plan.search_left)
-        return min(affordable, self.plan.budget.evaluations or math.inf) < SHORT
+        return min(affordable, self.plan.budget.evaluations or math.inf) - self.n_known < SHORT
 
     def _state(self) -> dict[str, Any]:
         """Return what a later session needs."""
@@ -204,7 +204,7 @@ class DirectSearch:
     def _evaluate(self, matrix: Array) -> Array:
         """Return the (N, M) objective values of designs, penalties for infeasible ones.
 
-        If the time is up, the last designs are left out, and the last of the first generation if the search is short.
+        The rest of a generation is skipped when the time is up. In a short search, so is the rest of the first one.
         """
         parts: list[Array] = []
         done = 0

@@ -67,7 +67,7 @@ def load_task(name_or_path: str | Path) -> Task:
         raise TaskError(f"there is no file {path}; `armwright init {path}` writes a template")
     raise TaskError(
         f'unknown task "{name_or_path}".{did_you_mean(str(name_or_path), known)} '
-        f"`armwright tasks` lists the {len(known)} built-in ones; random-N, YAML files and run folders also work"
+        f"`armwright tasks` lists the {len(known)} built-in ones; random-N and YAML files also work"
     )
 
 

@@ -26,7 +26,7 @@ let materials = {};
 let moving = null; // { from, to, began } in joint space
 let playing = false;
 let began = null; // time [ms] at which the played cycle began; null while not moving along one
-let cloud = null; // { places, colours, radius } of points around the arm; null for none
+let cloud = null; // { points, colours, radius, corners } of points around the arm; null for none
 
 export function openArm(shownContent) {
   content = shownContent;
@@ -53,7 +53,7 @@ export function openArm(shownContent) {
     note.className = "note";
     note.textContent = "This browser shows no 3D graphics (WebGL). Everything else on this page works without.";
     $("arm").replaceChildren(note);
-    for (const id of ["ghost", "reset", "play"]) $(id).disabled = true;
+    for (const id of ["ghost", "reset", "play", "reach-space"]) $(id).disabled = true;
   }
   listen((changed) => {
     const isDriven = began !== null;
@@ -70,7 +70,10 @@ export function openArm(shownContent) {
 // Returns a picture of a design as a data address; null without 3D graphics.
 export function snapshot(design) {
   if (!stage) return null;
-  const { renderer, camera, controls } = stage, kept = { ...state }, keptFrame = stage.frame, way = camera.position.clone(), [width, height] = PICTURE;
+  const { renderer, camera, controls } = stage, kept = { ...state }, keptFrame = stage.frame, keptCloud = cloud;
+  const way = camera.position.clone(), [width, height] = PICTURE;
+  cloud = null;
+  groups.cloud.visible = false;
   Object.assign(state, { design, compared: null, target: 0 });
   stage.frame = null;
   renderer.setPixelRatio(1);
@@ -80,6 +83,8 @@ export function snapshot(design) {
   const picture = stage.canvas.toDataURL();
   camera.zoom = 1;
   Object.assign(state, kept);
+  cloud = keptCloud;
+  groups.cloud.visible = true;
   stage.frame = null;
   stage.fit();
   drawArm();
@@ -91,17 +96,17 @@ export function snapshot(design) {
   return picture;
 }
 
-// Draws small bodies at points around the arm, or removes them.
-export function drawCloud(points) {
-  if (!stage || (cloud === null && points === null)) return;
-  cloud = points;
+// Draws points around the arm, or removes them; the view stays while their corners do.
+export function drawCloud(shownCloud) {
+  if (!stage || (cloud === null && shownCloud === null)) return;
+  if (String(cloud?.corners) !== String(shownCloud?.corners)) stage.frame = null;
+  cloud = shownCloud;
   empty(groups.cloud);
-  if (cloud !== null && cloud.places.length) groups.cloud.add(octahedra(cloud.places, cloud.radius, cloud.colours));
-  stage.frame = null;
+  if (cloud !== null && cloud.points.length) groups.cloud.add(octahedra(cloud.points, cloud.radius, cloud.colours));
   drawArm();
 }
 
-// Returns the number of drawn bodies around the arm; for tests.
+// Returns the number of drawn points around the arm; for tests.
 export const drawnPoints = () => groups.cloud.children.reduce((n, mesh) => n + mesh.geometry.attributes.position.array.length / 72, 0);
 
 // Returns the positions of the drawn joints; for tests.
@@ -173,7 +178,7 @@ function legend() {
 
 // Returns the points of the selected design that must be visible: targets, and the arm in all postures.
 function extent() {
-  const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high]), ...(cloud?.places ?? [])];
+  const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high]), ...(cloud?.corners ?? [])];
   for (const i of new Set([state.design, state.compared ?? state.design])) {
     const arm = content.arm(i), column = columnBody(arm);
     content.targets.forEach((_, t) => points.push(...chain(arm, content.q(i, t)).joints));

@@ -1,6 +1,6 @@
 // Opens the page with its embedded content or with that of its server.
 
-import { drawArm, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawnPoints, openArm } from "./arm.js";
+import { drawArm, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawnPoints, openArm, snapshot } from "./arm.js";
 import { Content, embedded } from "./content.js";
 import { drawCurve, openCurve } from "./curve.js";
 import { during } from "./cycle.js";
@@ -98,5 +98,5 @@ async function start() {
 }
 
 // For the console and for tests.
-window.armwright = { content, state, set, postures, during, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawnPoints, drawArm };
+window.armwright = { content, state, set, postures, during, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawnPoints, drawArm, snapshot };
 start();

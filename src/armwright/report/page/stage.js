@@ -1,6 +1,6 @@
 // A 3D view: its light, its camera, which fits a frame and can be turned, and the groups of its parts.
 
-const MARGIN = 1.05; // of the camera's distance, at which the sphere around the frame just fits
+const MARGIN = 1.05; // distance of the camera, as a multiple of that at which the sphere around the frame just fits
 
 export class Stage {
   // names: of the groups; view: the initial direction of the camera. Throws without WebGL.
@@ -25,7 +25,7 @@ export class Stage {
     }
   }
 
-  // Shows the view in its box, which the user can turn. Listeners of the canvas from before come first.
+  // Adds the canvas to its box, with orbit controls. Listeners added to the canvas earlier run first.
   open() {
     this.box.append(this.canvas);
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
@@ -47,7 +47,7 @@ export class Stage {
     else this.look();
   }
 
-  // Lets the camera see the whole frame from where it is, or from the initial direction.
+  // Moves the camera so that the whole frame is visible, keeping its direction if the user rotated it.
   look() {
     const far = (MARGIN * this.frame.radius) / Math.sin((this.camera.fov * Math.PI) / 360) / Math.min(1, this.camera.aspect);
     const way = this.turned ? this.camera.position.clone().sub(this.controls.target) : new THREE.Vector3(...this.view);

@@ -188,5 +188,5 @@ def _blas() -> Any:
 
 
 def _on_one_thread() -> AbstractContextManager[Any]:
-    """Keep BLAS to one thread: matrices are so small that several take more than twice as long."""
+    """Keep BLAS to one thread: with matrices this small, several threads take over twice as long."""
     return _blas().limit(limits=1)
