@@ -110,6 +110,7 @@ class ReachMap:
                 ("q", coverage.q.astype(np.float32)),
             )
         }
+        arrays |= {name: np.array(text) for name, text in texts.items()}
         with naming_write_errors(Path(file)), Path(file).open("wb") as stream:
             np.savez_compressed(
                 stream,
@@ -118,7 +119,6 @@ class ReachMap:
                 spacing=np.array(self.spacing),
                 directions=self.directions,
                 **arrays,
-                **{name: np.array(text) for name, text in texts.items()},
             )
 
 
