@@ -45,14 +45,17 @@ def main() -> None:
         runs = {
             "210 designs, 9 targets": (aw.Problem(aw.load_task("target-2")), 200),
             "10,000 designs, 20 targets": (aw.Problem(twenty), 9_990),
-            "210 designs with a cycle": (cycle, 200),
+            "front of `design`, with a cycle": (cycle, 0),
             "10,000 designs with a cycle": (cycle, 9_990),
         }
         print("| run | size | made in | opens in | a selection is done, shown after |\n|---|---|---|---|---|")
         for number, (name, (problem, n_total)) in enumerate(runs.items()):
             folder = Path(place, str(number))
             sampler, proposer = ("random", "none") if n_total > 200 else ("tpe", "rules")
-            aw.optimize(problem, proposer=proposer, sampler=sampler, n_total=n_total, out=folder, verify=False)
+            if n_total:
+                aw.optimize(problem, proposer=proposer, sampler=sampler, n_total=n_total, out=folder, verify=False)
+            else:
+                aw.find_front(problem, evaluations=2000, out=folder)
             began = time.perf_counter()
             page = aw.write_report(folder)
             made = time.perf_counter() - began
