@@ -1,13 +1,15 @@
 """No text of a figure or of the page lies on another or is cut off."""
 
 from collections.abc import Iterator
-from itertools import combinations
+from dataclasses import dataclass
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.text import Text
+from matplotlib.path import Path as Path2D
+from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 from playwright.sync_api import Browser
 
@@ -46,24 +48,39 @@ def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     return folder
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """A figure's box, its horizontal and vertical texts with theirs, and the lines of its labels [px]."""
+
+    figure: Bbox
+    texts: list[tuple[str, Bbox]]
+    lines: list[tuple[str, Path2D]]
+
+
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[Bbox, list[tuple[str, Bbox]]]]:
-    """For each figure that is drawn from now on: its box, and its horizontal and vertical texts with theirs [px]."""
-    found: dict[str, tuple[Bbox, list[tuple[str, Bbox]]]] = {}
+def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, Drawn]:
+    """Return each figure that is drawn from now on."""
+    found: dict[str, Drawn] = {}
     boxes: list[tuple[str, Bbox]] = []
+    lines: list[tuple[str, Path2D]] = []
     draw = Text.draw
 
     def recorded(self: Text, renderer: Any, *others: Any, **named: Any) -> None:
         draw(self, renderer, *others, **named)
         if self.get_visible() and self.get_text().strip() and self.get_rotation() % 90.0 == 0.0:
-            boxes.append((self.get_text(), Text.get_window_extent(self, renderer)))  # without a label's line
+            boxes.append((self.get_text(), Text.get_window_extent(self, renderer)))
+        if isinstance(self, Annotation) and self.arrow_patch is not None:
+            lines.append(
+                (self.get_text(), self.arrow_patch.get_transform().transform_path(self.arrow_patch.get_path()))
+            )
 
     def saved(figure: Figure, png: Path) -> str:
         figure.savefig(png, dpi="figure")
         figure.set_layout_engine(None)  # it is settled now, so each text is drawn once
         boxes.clear()
+        lines.clear()
         figure.savefig(png, dpi="figure")
-        found[png.name] = figure.bbox.frozen(), list(boxes)
+        found[png.name] = Drawn(figure.bbox.frozen(), list(boxes), list(lines))
         return png.name
 
     monkeypatch.setattr(Text, "draw", recorded)
@@ -71,16 +88,20 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[Bbox, list[tuple[s
     return found
 
 
-def test_texts_of_figures_are_whole_and_apart(run: Path, drawn: dict[str, tuple[Bbox, list[tuple[str, Bbox]]]]) -> None:
+def test_texts_of_figures_are_whole_and_apart(run: Path, drawn: dict[str, Drawn]) -> None:
     write_figures(run)
     assert len(drawn) >= 3
-    for name, (figure, texts) in drawn.items():
+    for name, one in drawn.items():
+        figure, texts = one.figure, one.texts
         assert len(texts) > 5
         for text, box in texts:
             is_inside = box.x0 > -1 and box.y0 > -1 and box.x1 < figure.x1 + 1 and box.y1 < figure.y1 + 1
             assert is_inside, f"{name}: {text!r} is cut off"
         for (text, box), (other, its) in combinations(texts, 2):
             assert overlap(box, its) < TOUCHING, f"{name}: {text!r} lies on {other!r}"
+        for (text, path), (other, box) in product(one.lines, texts):
+            is_crossed = text != other and path.intersects_bbox(box.padded(-TOUCHING), filled=False)
+            assert not is_crossed, f"{name}: the line of {text!r} crosses {other!r}"
 
 
 @pytest.fixture

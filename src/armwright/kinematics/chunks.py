@@ -8,6 +8,9 @@ from functools import cache
 from armwright.exceptions import FailureError
 from armwright.kinematics.devices import Device, cores
 
+# Samples of paths per chunk: per thread on the CPU, per launch on a GPU.
+SAMPLES: dict[Device, int] = {"cpu": 2**12, "cuda": 2**20}
+
 
 def in_chunks(solve: Callable[[slice], None], n: int, size: int, device: Device) -> None:
     """Solve n arms in chunks of `size`."""

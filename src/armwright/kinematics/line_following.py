@@ -8,14 +8,9 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import ArmArrays
-from armwright.kinematics.chunks import in_chunks
+from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.devices import Device, load_path
 from armwright.tasks.motions import LineSamples, Poses
-
-CHUNK: dict[Device, int] = {
-    "cpu": 2**12,
-    "cuda": 2**20,
-}  # samples per chunk: per thread on the CPU, per launch on a GPU
 
 IndexArray = NDArray[np.intp]
 
@@ -68,7 +63,7 @@ def follow_lines(arms: ArmArrays, samples: LineSamples, entry: Array, device: De
         for values, result in zip(vars(paths).values(), results, strict=True):
             values[chunk] = result.numpy()
 
-    in_chunks(solve, n, max(1, CHUNK[device] // (s * k)), device)
+    in_chunks(solve, n, max(1, SAMPLES[device] // (s * k)), device)
     return paths
 
 
@@ -85,7 +80,7 @@ def tool_errors(arms: ArmArrays, poses: Poses, q: Array, device: Device = "cpu")
         wp.launch(kernels.tool_errors, (len(part), len(poses)), inputs=inputs, device=device)
         errors[chunk] = found.numpy()
 
-    in_chunks(solve, len(arms), max(1, CHUNK[device] // len(poses)), device)
+    in_chunks(solve, len(arms), max(1, SAMPLES[device] // len(poses)), device)
     return errors
 
 

@@ -8,15 +8,10 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import ArmArrays
-from armwright.kinematics.chunks import in_chunks
+from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.cycle_path import CyclePaths
 from armwright.kinematics.devices import Device, load_dynamics
 from armwright.kinematics.motion_path import MotionPath
-
-CHUNK: dict[Device, int] = {
-    "cpu": 2**12,
-    "cuda": 2**20,
-}  # samples per chunk: per thread on the CPU, per launch on a GPU
 
 
 @dataclass(frozen=True)
@@ -108,5 +103,5 @@ def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, p
         wp.launch(kernels.torque_terms, q[chunk].shape[:2], inputs=inputs, device=device)
         terms[:, chunk] = found.numpy()
 
-    in_chunks(solve, len(arms), max(1, CHUNK[device] // q.shape[1]), device)
+    in_chunks(solve, len(arms), max(1, SAMPLES[device] // q.shape[1]), device)
     return terms

@@ -15,7 +15,7 @@ at random, evolves on its own and joins the main pool after a while. Then the ne
 that counts, such as a feasible design, side pools start earlier and live shorter: the main pool may be stuck.
 
 Random designs would take most of a short search. Its first generation may be cut: the remaining random designs are
-added to later generations. Longer searches would lose structures that way, because evolved designs displace newcomers.
+added to later generations. Longer searches end lower that way, probably because evolved designs displace newcomers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
