@@ -71,6 +71,21 @@ def inverse_dynamics_torques(
     return gravity + drag
 
 
+def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, device: Device = "cpu") -> Array:
+    """Return (N, S, D, D) joint-space inertia matrices of N arms in S postures, without rotors [kg m²], or [kg], [kg m].
+
+    Args:
+        arms: N arms.
+        q: (N, S, D) joint values [rad] or [m].
+        carried: (S,) share of the payload that is carried.
+        payload: Its mass [kg].
+        device: The device to compute on.
+    """
+    rest = np.zeros_like(q)
+    units = (np.broadcast_to(unit, q.shape) for unit in np.eye(arms.dof))
+    return np.stack([_terms(arms, q, unit, rest, carried, payload, device)[2] for unit in units], axis=-1)
+
+
 def _values(path: MotionPath, order: int) -> Array:
     """Return (n, R, D) joint values at the samples, or their derivatives."""
     if order == 0:

@@ -19,7 +19,7 @@ from armwright.kinematics.ik import UPDATES, Postures, solve_postures
 from armwright.kinematics.jacobian import jacobian_of
 from armwright.kinematics.restarts import nearer_postures, random_starts
 from armwright.kinematics.supply import SupplyCurrents, supply_currents
-from armwright.kinematics.torque_terms import TorqueTerms, torque_terms
+from armwright.kinematics.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.problem.dexterous_volume import dexterous_volumes
 from armwright.robot.arm import Arm
 from armwright.spaces.tool_mount import carrying_tool
@@ -165,6 +165,28 @@ class Evaluation(Scene):
         """Joint frames in the kept postures, in float64."""
         return forward_kinematics(self.arms, self.q)
 
+    @cached_property
+    def jacobian(self) -> Array:
+        """(N, T, 3, J) derivative of the tip position by the joints in the kept posture [m/rad] or [m/m]."""
+        return jacobian_of(self.arms, self.frames)
+
+    @property
+    def motor_jacobian(self) -> Array:
+        """(N, T, 3, J) the same by the motion of the actuators [m/rad]."""
+        return self.jacobian * self.arms.travel[:, None, None]
+
+    @cached_property
+    def motor_inertia(self) -> Array:
+        """(N, T, J, J) inertia matrix of the kept posture at the actuators, known rotors included [kg m²]."""
+        heaviest = float(self.payload.max())
+        carried = self.payload / heaviest if heaviest > 0.0 else self.payload
+        inertia = inertia_matrices(self.arms, self.q, carried, heaviest, self.device)
+        if self.arms.actuation is not None:
+            rotors = np.nan_to_num(self.arms.actuation.rotor_inertia)
+            inertia = inertia + (rotors[:, :, None] * np.eye(self.arms.dof))[:, None]
+        travel = self.arms.travel[:, None]
+        return inertia * travel[..., None] * travel[..., None, :]
+
     @property
     def manipulability(self) -> Array:
         """(N, T) sqrt(det J Jᵀ) of the position Jacobian J in the kept posture (Yoshikawa 1985) [m³]."""
@@ -179,7 +201,7 @@ class Evaluation(Scene):
     @cached_property
     def _singular_values(self) -> Array:
         """(N, T, 3) of J, from the largest on."""
-        jacobian = jacobian_of(self.arms, self.frames)
+        jacobian = self.jacobian
         return np.sqrt(np.maximum(np.linalg.eigvalsh(jacobian @ jacobian.swapaxes(-1, -2))[..., ::-1], 0.0))
 
     @cached_property

@@ -15,9 +15,10 @@ from armwright.problem.objectives import CLEARANCE_QUANTITIES, JOINTS, QUANTITIE
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
 from armwright.search.surrogate.custom_inputs import CustomInputs
+from armwright.search.surrogate.dynamic_quantities import DYNAMIC_QUANTITIES
 from armwright.spaces.parameters import CategoricalParameter, Design
 
-PHYSICS, PARAMETERS = "physics", "parameters"  # sets of inputs
+PHYSICS, DYNAMICS, PARAMETERS = "physics", "dynamics", "parameters"  # sets of inputs
 PROBES = 400  # random designs that scale the inputs
 HEAVY_TAIL = 8.0  # the largest value over the median, from which a quantity counts by its logarithm
 LOG_FLOOR = 3e-2  # of the median, added before a logarithm
@@ -86,7 +87,7 @@ class Description:
     """What is known of N designs without evaluating them.
 
     Attributes:
-        inputs: (N, F) scaled inputs of each set: `physics` and `parameters`.
+        inputs: (N, F) scaled inputs of each set: `physics`, `dynamics` and `parameters`.
         violations: (N, C) of the constraints, which the built-in physics alone decides.
     """
 
@@ -119,47 +120,58 @@ class CheapFeatures:
 
     def describe(self, matrix: Array) -> Description:
         """Return the description of designs (N, P)."""
-        physics, violations = self._physics(matrix)
-        inputs = {PHYSICS: self._scalings[0](physics), PARAMETERS: self._scalings[1](self._parameters(matrix))}
-        return Description(inputs, violations)
+        columns, violations = self._columns(matrix)
+        return Description({name: self._scalings[name](table) for name, table in columns.items()}, violations)
 
     def quantities(self, matrix: Array) -> Mapping[Objective, Array]:
         """Return (N,) each quantity of the built-in physics of designs (N, P), not scaled."""
-        physics, _ = self._physics(matrix)
-        return dict(zip(self._quantities, physics.T, strict=False))  # further columns follow the quantities
+        values, _ = self._values(matrix)
+        return dict(zip((*self._quantities, *DYNAMIC_QUANTITIES), values.T, strict=True))
 
     @cached_property
     def names(self) -> Mapping[str, tuple[str, ...]]:
         """Names of the columns of each set of inputs."""
         parameters = self._problem.space.parameters
-        physics: list[str] = [quantity.name for quantity in self._quantities]
-        physics += [parameters[column].name for column in self._base]
-        physics += [f"{letter} joints" for letter in self._problem.space.joint_types]
-        physics += self._custom.names
-        if self._function is not None:
-            n = self._physics(self._probes[:1])[0].shape[1] - len(physics)
-            physics += [f"feature {i + 1}" for i in range(n)]
-        real: list[str] = [parameters[column].name for column in self._encoding.real]
+        real = [parameters[column].name for column in self._encoding.real]
         categorical = [p for p in parameters if isinstance(p, CategoricalParameter)]
-        choices = [f"{p.name} {choice}" for p in categorical for choice in p.choices]
-        kept: list[list[int]] = [scaling.kept.tolist() for scaling in self._scalings]
-        return {
-            PHYSICS: tuple(physics[column] for column in kept[0]),
-            PARAMETERS: tuple([*real, *choices][column] for column in kept[1]),
+        base = [parameters[column].name for column in self._base]
+        counts = [f"{letter} joints" for letter in self._problem.space.joint_types]
+        features = [f"feature {i + 1}" for i in range(self._features(self._probes[:1]).shape[1])]
+        names = {
+            PHYSICS: [*(q.name for q in self._quantities), *base, *counts, *self._custom.names, *features],
+            DYNAMICS: [*(q.name for q in DYNAMIC_QUANTITIES), *self._custom.names, *features],
+            PARAMETERS: [*real, *(f"{p.name} {choice}" for p in categorical for choice in p.choices)],
         }
+        return {name: tuple(every[i] for i in self._scalings[name].kept) for name, every in names.items()}
 
-    def _physics(self, matrix: Array) -> tuple[Array, Array]:
-        """Return the unscaled inputs of designs that come from their arms and custom parameters, and violations."""
+    def _columns(self, matrix: Array) -> tuple[dict[str, Array], Array]:
+        """Return the unscaled inputs of designs in each set, and their violations (N, C)."""
+        values, violations = self._values(matrix)
+        others = [self._custom(matrix), self._features(matrix)]
+        n = len(self._quantities)
+        columns = {
+            PHYSICS: np.column_stack([values[:, :n], matrix[:, self._base], self._joint_counts(matrix), *others]),
+            DYNAMICS: np.column_stack([values[:, n:], *others]),
+            PARAMETERS: self._parameters(matrix),
+        }
+        return columns, violations
+
+    def _values(self, matrix: Array) -> tuple[Array, Array]:
+        """Return all quantities of designs, the dynamic ones last, and their violations (N, C)."""
         tables: list[Array] = []
         violations = np.empty((len(matrix), len(self._problem.constraints)))
         for rows in self._problem.chunks(len(matrix)):
             evaluation = self._problem.physics(matrix[rows])
-            tables.append(np.column_stack([quantity(evaluation) for quantity in self._quantities]))
+            quantities = (*self._quantities, *DYNAMIC_QUANTITIES)
+            tables.append(np.column_stack([quantity(evaluation) for quantity in quantities]))
             violations[rows] = self._worst_violations(matrix[rows], evaluation)
-        columns = [np.concatenate(tables), matrix[:, self._base], self._joint_counts(matrix), self._custom(matrix)]
-        if self._function is not None:
-            columns.append(_features(self._function, self._problem.space.designs(matrix)))
-        return np.column_stack(columns), violations
+        return np.concatenate(tables), violations
+
+    def _features(self, matrix: Array) -> Array:
+        """Return (N, F) the custom features of designs."""
+        if self._function is None:
+            return np.empty((len(matrix), 0))
+        return _checked_features(self._function, self._problem.space.designs(matrix))
 
     def _worst_violations(self, matrix: Array, evaluation: Evaluation) -> Array:
         """Return the (N, C) violations of designs in the worst case of the task."""
@@ -201,8 +213,8 @@ class CheapFeatures:
         return self._problem.space.normalised(self._encoding.random(PROBES, np.random.default_rng(0)))
 
     @cached_property
-    def _scalings(self) -> tuple[Scaling, Scaling]:
-        return Scaling.of(self._physics(self._probes)[0]), Scaling.of(self._parameters(self._probes))
+    def _scalings(self) -> Mapping[str, Scaling]:
+        return {name: Scaling.of(table) for name, table in self._columns(self._probes)[0].items()}
 
     @cached_property
     def _quantities(self) -> tuple[Objective, ...]:
@@ -214,8 +226,8 @@ class CheapFeatures:
         return tuple(q for q in QUANTITIES.values() if q.name not in left_out and _is_defined(q, evaluation))
 
 
-def _features(function: FeatureFunction, designs: Sequence[Design]) -> Array:
-    """Return (N, F) the custom features of designs."""
+def _checked_features(function: FeatureFunction, designs: Sequence[Design]) -> Array:
+    """Return (N, F) the custom features of designs, or raise SettingsError."""
     rows = [np.atleast_1d(np.asarray(function(design), dtype=np.float64)) for design in designs]
     for row, design in zip(rows, designs, strict=True):
         if row.shape != rows[0].shape or row.ndim != 1 or not np.all(np.isfinite(row)):
