@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.forward import forward_kinematics
+from armwright.kinematics.torque_terms import inertia_matrices
 from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
 from armwright.robot.link_geometry import inertia_tensor
 from armwright.robot.mjcf import to_mjcf
@@ -99,6 +100,23 @@ def test_torques_agree_with_pinocchio() -> None:
             # Files have ten digits, and small torques are what is left of large forces.
             assert mine[moving] == pytest.approx(theirs, rel=1e-9, abs=1e-9 * max(1.0, np.abs(theirs).max()))
             assert not mine[~moving].any()
+
+
+def test_inertia_matrices_agree_with_pinocchio() -> None:
+    arms = any_arms(60, 11)
+    arrays, q, _, _ = motions(arms, 3, 12)
+    payload = np.array([0.0, 0.5, 2.0])
+    ours = inertia_matrices(arrays, q, payload / 2.0, 2.0)
+    for row, arm in enumerate(arms):
+        moving = np.array([joint.kind != "fixed" for joint in arm.joints])
+        for k, kg in enumerate(payload):
+            model = pinocchio.buildModelFromXML(to_urdf(loaded(arm, kg)))
+            own = slice(len(arm.joints))
+            upper = np.triu(pinocchio.crba(model, model.createData(), q[row, k, own][moving]))
+            theirs = upper + np.triu(upper, 1).T
+            mine = ours[row, k, own, own]
+            assert mine[np.ix_(moving, moving)] == pytest.approx(theirs, rel=1e-9, abs=1e-9 * np.abs(theirs).max())
+            assert not mine[~moving].any() and not mine[:, ~moving].any()
 
 
 def test_torques_agree_with_mujoco() -> None:

@@ -47,6 +47,11 @@ class Hyperparameters:
     noise: float
     lengths: Array
 
+    @property
+    def logs(self) -> Array:
+        """(2 + F,) logarithms of all."""
+        return np.log(np.concatenate([[self.amplitude, self.noise], self.lengths]))
+
 
 @dataclass(frozen=True)
 class GaussianProcess:
@@ -82,12 +87,11 @@ class GaussianProcess:
         precision = (self._root**2).sum(axis=0)
         return self.observations - self._weights / precision, np.sqrt(1.0 / precision)
 
-    @cached_property
-    def log_density_left_out(self) -> float:
-        """Sum of the logarithms of the densities of the observations, each predicted from all others."""
-        mean, deviation = self.left_out
-        error = (self.observations - mean) / deviation
-        return float(-0.5 * (error**2 + 2.0 * np.log(deviation) + np.log(2.0 * np.pi)).sum())
+    @property
+    def log_posterior(self) -> float:
+        """Logarithm of marginal likelihood times prior of the hyperparameters; the prior is relative to its mode."""
+        off = _from_prior(self.hyperparameters.logs, *_priors(self.inputs.shape[1]))
+        return self.log_marginal_likelihood - 0.5 * float(off @ off)
 
     @cached_property
     def _root(self) -> Array:
@@ -149,12 +153,17 @@ def loss(logs: Array, inputs: Array, observations: Array, mean: Array, spread: A
     by_length = 2.0 * (slope.sum(axis=1) @ inputs**2 - (inputs * (slope @ inputs)).sum(axis=0)) / found.lengths**2
     gradient = np.concatenate([[(outer * covariance).sum(), found.noise * np.trace(outer)], by_length])
     likelihood = -0.5 * observations @ weights + np.log(np.diag(inverse_root)).sum() - 0.5 * n * np.log(2.0 * np.pi)
-    off = (logs - mean) / spread
+    off = _from_prior(logs, mean, spread)
     return float(0.5 * off @ off - likelihood), off / spread - gradient
 
 
 def _hyperparameters(logs: Array) -> Hyperparameters:
     return Hyperparameters(float(np.exp(logs[0])), float(np.exp(logs[1])), np.exp(logs[2:]))
+
+
+def _from_prior(logs: Array, mean: Array, spread: Array) -> Array:
+    """Return how many standard deviations of their priors hyperparameters are off."""
+    return (logs - mean) / spread
 
 
 def _priors(n: int) -> tuple[Array, Array]:

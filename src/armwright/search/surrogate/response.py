@@ -60,17 +60,17 @@ class ResponseModel:
         inputs: name of its set of inputs.
         transform: of its values.
         hyperparameters: of its process.
-        log_density: of the values left out one by one, their average.
+        log_posterior: of its hyperparameters and the values.
     """
 
     inputs: str
     transform: Transform
     hyperparameters: Hyperparameters
-    log_density: float
+    log_posterior: float
 
 
 def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:
-    """Return the model that predicts values best, each left out in turn.
+    """Return the model under which values are most probable.
 
     The transform is chosen with the first set of inputs, then the set.
 
@@ -82,13 +82,13 @@ def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:
     transforms = [Transform.of(values, is_log=False)]
     if values.min() >= 0.0 and np.median(values) > 0.0:
         transforms.append(Transform.of(values, is_log=True))
-    best = max((_fitted(first, inputs, values, t) for t in transforms), key=lambda model: model.log_density)
+    best = max((_fitted(first, inputs, values, t) for t in transforms), key=lambda model: model.log_posterior)
     models = [best, *(_fitted(name, inputs, values, best.transform) for name in others)]
-    return max(models, key=lambda model: model.log_density)
+    return max(models, key=lambda model: model.log_posterior)
 
 
 def _fitted(name: str, inputs: Mapping[str, Array], values: Array, transform: Transform) -> ResponseModel:
     observations = transform(values)
     process = GaussianProcess(inputs[name], observations, fit(inputs[name], observations))
-    density = (process.log_density_left_out + transform.log_slopes(values)) / len(values)
-    return ResponseModel(name, transform, process.hyperparameters, density)
+    log_posterior = process.log_posterior + transform.log_slopes(values)
+    return ResponseModel(name, transform, process.hyperparameters, log_posterior)
