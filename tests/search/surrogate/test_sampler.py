@@ -53,6 +53,15 @@ def observed(problem: Problem, n: int, pending: int = 0) -> Observations:
     return Observations(matrix[:n], values, np.zeros(n, dtype=bool), matrix[n:])
 
 
+def test_gain_is_bounded_by_what_is_stated_else_by_the_worst_values() -> None:
+    seen = observed(problem(), 8)
+    seen.failed[2] = True
+    worst = np.delete(seen.values, 2, axis=0).max(axis=0)
+    assert Surrogate(problem()).reference_point(seen) == pytest.approx(worst)
+    stated = Surrogate(problem(reference_point=(0.4, 1.3)))
+    assert stated.reference_point(seen) == pytest.approx([0.4, 1.3])
+
+
 @pytest.mark.slow
 def test_resumed_run_equals_uninterrupted_one(tmp_path: Path) -> None:
     def run(n_total: int, out: Path | None = None) -> aw.StudyResult:

@@ -68,12 +68,12 @@ class GaussianProcess:
     hyperparameters: Hyperparameters
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
-        """Return the (K,) means and standard deviations of observations at (K, F) inputs, noise included."""
+        """Return the (K,) means and standard deviations of the response at (K, F) inputs, without noise."""
         with _on_one_thread():
             cross = _covariance(inputs, self.inputs, self.hyperparameters)
             explained = ((cross @ self._root.T) ** 2).sum(axis=1)
-            variance = self.hyperparameters.amplitude + self.hyperparameters.noise - explained
-            return cross @ self._weights, np.sqrt(np.maximum(variance, JITTER))
+            variance = np.maximum(self.hyperparameters.amplitude - explained, JITTER)
+            return cross @ self._weights, np.sqrt(variance)
 
     @cached_property
     def log_marginal_likelihood(self) -> float:

@@ -14,7 +14,6 @@ from armwright.pareto import feasible_mask, total_violation
 from armwright.problem.objective import Objective
 from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import stated_bounds, with_bounds
-from armwright.runs.history import found_reference_point
 from armwright.search.surrogate.acquisition import Forecast, expected_gain
 from armwright.search.surrogate.candidates import Candidates
 from armwright.search.surrogate.cheap_features import PHYSICS, CheapFeatures, Description, FeatureFunction
@@ -22,7 +21,6 @@ from armwright.search.surrogate.gaussian_process import GaussianProcess, fit
 from armwright.search.surrogate.response import ResponseModel, choose_model
 from armwright.seeding import derived_seed
 
-FIRST = 10  # trials from which the reference point is found, as a study's random ones
 REFRESH = 20  # trials after which new designs are screened
 MUTANTS = 600  # variations of the present front
 GROWTH = 10  # models are chosen anew when the trials have grown by one tenth
@@ -122,16 +120,18 @@ class Surrogate:
 
         return self._remembered("models", (used.matrix.tobytes(), values.tobytes()), chosen)
 
-    def reference_point(self, observations: Observations, violations: Array) -> Array:
-        """Return the (M,) bound of the hypervolume, as a study with 10 random trials finds it."""
+    def reference_point(self, observations: Observations) -> Array:
+        """Return the (M,) bound of the hypervolume that is to grow: as stated, else the worst values so far.
+
+        The point that a study finds from its random trials only measures. It often excludes an end of the front.
+        """
         stated = self.problem.reference_point
         n_objectives = observations.values.shape[1]
         if stated is not None and len(stated) == n_objectives:
             return np.array(stated)
-        first = np.flatnonzero(~observations.failed)[:FIRST]
-        found = found_reference_point(observations.values[first], violations[first])
+        worst = observations.values[~observations.failed].max(axis=0)
         same = n_objectives == len(self.problem.objectives)
-        return np.array(with_bounds(found, stated_bounds(self.problem)) if same else found)
+        return np.array(with_bounds(worst.tolist(), stated_bounds(self.problem))) if same else worst
 
     def _screened(self, observations: Observations) -> tuple[Array, Description]:
         """Return the candidates of the present twenty trials, and their description."""
@@ -173,7 +173,7 @@ class Screen:
         kept = ~observations.failed
         self.feasible = kept & feasible_mask(known.violations)
         self._models = surrogate.models(observations)
-        self._reference_point = self._transformed(surrogate.reference_point(observations, known.violations)[None])[0]
+        self._reference_point = self._transformed(surrogate.reference_point(observations)[None])[0]
         self._success = _success_process(known, observations.failed)
         values = self._transformed(observations.values[kept])
         inputs = known[np.flatnonzero(kept)].inputs
@@ -233,7 +233,7 @@ class Screen:
         if self._success is None:
             return np.ones(len(known.violations))
         mean, deviation = self._success.predict(known.inputs[PHYSICS])
-        return np.maximum(ndtr(mean / deviation), 1e-3)
+        return np.maximum(ndtr(mean / np.hypot(deviation, np.sqrt(self._success.hyperparameters.noise))), 1e-3)
 
     def _transformed(self, values: Array) -> Array:
         """Return the (N, M) objectives as their models see them."""
