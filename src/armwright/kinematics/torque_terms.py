@@ -72,7 +72,7 @@ def inverse_dynamics_torques(
 
 
 def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, device: Device = "cpu") -> Array:
-    """Return (N, S, D, D) joint-space inertia matrices of N arms in S postures, without rotors [kg m²], or [kg], [kg m].
+    """Return (N, S, D, D) joint-space inertia matrices of N arms in S postures, without rotors, in SI units.
 
     Args:
         arms: N arms.

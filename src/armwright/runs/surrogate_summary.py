@@ -27,7 +27,7 @@ class LearnedObjective:
         explained: Share of the variance of the transformed values that predictions explain, each design left out in
             turn; None if the objective is constant.
         relative_error: Median of |prediction - value| / |value| of designs left out; None if half of the values are 0.
-        inputs: The set of inputs that predicts best: `physics` or `parameters`.
+        inputs: The set of inputs that predicts best: `physics`, `dynamics` or `parameters`.
         effects: The inputs with the largest effects; none if little is explained.
         correction: How the objective follows from a quantity of the built-in physics; empty if evidence is weak.
         predicted: Values of the designs of the summary, each predicted from the others.

@@ -33,9 +33,12 @@ def turns(postures: Array) -> Array:
 
 
 def test_sliding_joints_count_in_the_turns_of_their_motors() -> None:
-    links = (aw.Link((0.0, 0.0, 0.3), 0.5, (0.0, 0.0, 0.15), 0.02), aw.Link((0.3, 0.0, 0.0), 0.4, (0.15, 0.0, 0.0), 0.02))
+    lower, upper = (
+        aw.Link((0.0, 0.0, 0.3), 0.5, (0.0, 0.0, 0.15), 0.02),
+        aw.Link((0.3, 0.0, 0.0), 0.4, (0.15, 0.0, 0.0), 0.02),
+    )
     slide = aw.Joint("prismatic", "z", -0.2, 0.2, travel=0.01)
-    arm = aw.Arm((0.0, 0.0, 0.0), (slide, aw.Joint("revolute", "z", -2.0, 2.0)), links)
+    arm = aw.Arm((0.0, 0.0, 0.0), (slide, aw.Joint("revolute", "z", -2.0, 2.0)), (lower, upper))
     evaluation, found = quantities(arm)
     steps = turns(evaluation.q[0]) / [0.01, 1.0]
     assert found["joint_travel"] == pytest.approx(np.linalg.norm(steps, axis=1).sum())

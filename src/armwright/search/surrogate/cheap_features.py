@@ -137,12 +137,13 @@ class CheapFeatures:
         base = [parameters[column].name for column in self._base]
         counts = [f"{letter} joints" for letter in self._problem.space.joint_types]
         features = [f"feature {i + 1}" for i in range(self._features(self._probes[:1]).shape[1])]
-        names = {
+        names: dict[str, list[str]] = {
             PHYSICS: [*(q.name for q in self._quantities), *base, *counts, *self._custom.names, *features],
             DYNAMICS: [*(q.name for q in DYNAMIC_QUANTITIES), *self._custom.names, *features],
             PARAMETERS: [*real, *(f"{p.name} {choice}" for p in categorical for choice in p.choices)],
         }
-        return {name: tuple(every[i] for i in self._scalings[name].kept) for name, every in names.items()}
+        kept: dict[str, list[int]] = {name: scaling.kept.tolist() for name, scaling in self._scalings.items()}
+        return {name: tuple(every[column] for column in kept[name]) for name, every in names.items()}
 
     def _columns(self, matrix: Array) -> tuple[dict[str, Array], Array]:
         """Return the unscaled inputs of designs in each set, and their violations (N, C)."""

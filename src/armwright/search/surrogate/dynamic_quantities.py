@@ -12,7 +12,7 @@ from armwright.problem.objective import Objective
 
 
 def _largest_inertia(evaluation: Evaluation) -> Array:
-    return np.linalg.eigvalsh(evaluation.motor_inertia)[..., -1]
+    return np.linalg.eigvalsh(evaluation.motor_inertia)[..., -1].astype(np.float64)
 
 
 def _steps(evaluation: Evaluation) -> Array:
@@ -71,7 +71,7 @@ DYNAMIC_QUANTITIES = (
     Objective(
         name="sag_at_1_Nm_per_rad",
         unit="m",
-        description="how far gravity moves the tip if every motor yields like a spring of 1 N m/rad, in the first order",
+        description="how far gravity moves the tip if every motor yields 1 rad under 1 N m, to the first order",
         each=_sag,
     ),
     Objective(

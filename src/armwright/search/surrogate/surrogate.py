@@ -211,22 +211,26 @@ class Screen:
 
         Designs that violate constraints gain nothing.
         """
-        gain = expected_gain(self.forecast(known), self._front, self._reference_point)
-        return np.where(feasible_mask(known.violations), gain * self._probability(known), 0.0)
+        return self._gain(self.forecast(known), known)
 
     def score(self, matrix: Array, known: Description) -> Array:
         """Return (N,) scores of designs: their gain; below 0 for those that gain nothing, in order of preference.
 
         Deb's rules order these: the least violation first, then the smallest predicted distance from the reference box.
         """
-        gain = self.gain(known)
-        excess = np.maximum(self.forecast(known).mean - self._reference_point, 0.0)
+        forecast = self.forecast(known)
+        gain = self._gain(forecast, known)
+        excess = np.maximum(forecast.mean - self._reference_point, 0.0)
         distance = excess.sum(axis=1) / self._probability(known)
         violation = total_violation(known.violations)
         behind = -np.where(violation > 0.0, 2.0 + violation, distance / (1.0 + distance)) - 1e-12
         score = np.where(gain > 0.0, gain, behind)
         tried = np.array([row.tobytes() in self._tried for row in matrix], dtype=bool)
         return np.where(tried, -np.inf, score)
+
+    def _gain(self, forecast: Forecast, known: Description) -> Array:
+        gain = expected_gain(forecast, self._front, self._reference_point)
+        return np.where(feasible_mask(known.violations), gain * self._probability(known), 0.0)
 
     def _probability(self, known: Description) -> Array:
         """Return (N,) the probabilities that evaluations succeed."""
