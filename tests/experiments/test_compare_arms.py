@@ -14,6 +14,7 @@ from playwright.sync_api import Browser
 
 import armwright as aw
 from armwright.exceptions import ArmError, FailureError, MissingExtraError, RunFolderError, SettingsError, TaskError
+from armwright.experiments.base_placement import placed
 from armwright.experiments.compare_arms import (
     EXISTING_ARMS,
     ArmComparison,
@@ -29,6 +30,8 @@ from armwright.report.page import write_report
 from armwright.report.style import RC
 from armwright.robot.robot_descriptions import find_urdf
 from armwright.robot.urdf_reader import read_urdf
+from armwright.runs.datasheet.design_sheet import design_sheet
+from armwright.runs.datasheet.urdf_sheet import Job, urdf_sheet
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
@@ -81,28 +84,28 @@ def test_exported_design_compared_as_existing_arm_keeps_its_values(run: Path, hi
     for member, arm in zip(members, comparison.arms, strict=True):
         assert arm.values == pytest.approx(member.values, rel=1e-3, abs=1e-4)
         assert arm.mass == pytest.approx(member.arm.mass)
-        assert arm.reach == pytest.approx(member.arm.reach)
+        assert arm.reach == pytest.approx(design_sheet(run, member.number).reach, rel=1e-3)
         assert arm.joints == 3
         assert (arm.measures["position_error"], arm.measures["torque"]) == arm.values
     assert len({arm.name for arm in comparison.arms}) == 4  # all files are called arm.urdf
-    assert comparison.positions == 0
+    assert comparison.places == 0
 
 
 def test_measures_match_formulas_at_the_found_base(compared: ArmComparison) -> None:
     """Recompute the objectives from postures, the masses of the URDF and the payloads of the task."""
-    for arm, placed in zip(compared.arms, compared.placed, strict=True):
-        evaluation = compared.problem.physics_of_arms(stack_arms([placed]))
+    for arm, there in zip(compared.arms, compared.placed, strict=True):
+        evaluation = compared.problem.physics_of_arms(stack_arms([there]))
         torque, error = evaluation.joint_torques[0], evaluation.position_error[0]
-        efforts = [joint.effort for joint in placed.joints]
+        efforts = [joint.effort for joint in there.joints]
         assert arm.values == (arm.measures["position_error"], arm.measures["torque"])
         assert arm.measures["position_error"] == pytest.approx(error.sum())
         assert arm.measures["torque"] == pytest.approx(40 * np.linalg.norm(torque, axis=1).sum())
         assert arm.measures["worst_error"] == pytest.approx(error.max())
         assert arm.measures["unreached_targets"] == (error >= 1e-3).sum()
         assert arm.measures["peak_torque"] == pytest.approx(np.abs(torque).max())
-        assert arm.measures["torque_utilisation"] == pytest.approx((np.abs(torque) / efforts).max())
+        assert arm.measures["torque_utilisation"] == pytest.approx((1.5 * np.abs(torque) / efforts).max())
         without = replace(compared.problem, task=TASK.model_copy(update={"payload": 0.0}))
-        lighter = without.physics_of_arms(stack_arms([placed])).joint_torques[0]
+        lighter = without.physics_of_arms(stack_arms([there])).joint_torques[0]
         assert not np.allclose(lighter[:2], torque[:2])
         assert np.array_equal(lighter[2], torque[2])
     assert [arm.name for arm in compared.arms] == ["ur5_robot", "panda"]
@@ -119,7 +122,7 @@ def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compa
         assert z == 0.0
         arm_at_origin = read_urdf(file).arm
         first = compared.placed[list(compared.arms).index(arm)].base
-        assert np.subtract(first, arm.base) == pytest.approx(arm_at_origin.base)
+        assert np.subtract(first, arm.base) == pytest.approx(arm_at_origin.base)  # on the first axis of both arms
         others = rng.uniform((-0.5, -1.0, 0.0), (0.5, 1.0, 0.0), (1000, 3))
         moved = [replace(arm_at_origin, base=tuple(np.add(arm_at_origin.base, place).tolist())) for place in others]
         evaluation = compared.problem.physics_of_arms(stack_arms(moved))
@@ -139,6 +142,42 @@ def test_base_search_prefers_positions_that_meet_the_constraints() -> None:
     assert placed.violated == ("manipulability >= 0.05 (it has 0.00373)",)
     assert moved.violated == ()
     assert moved.measures["unreached_targets"] == 0
+
+
+def test_base_is_turned_where_the_first_joint_does_not_reach() -> None:
+    """The first joint of the SO-101 turns by 110° to either side, so it sees nothing behind its base."""
+    behind = Task(name="behind", targets=((-0.2, 0.05, 0.1), (-0.2, -0.05, 0.1), (-0.25, 0.0, 0.15)))
+    space = SPACE.model_copy(update={"origin_x": (0.0, 0.0), "origin_y": (0.0, 0.0)})
+    so101 = robot("so101")
+    (unturned,) = compare_arms(behind, [so101], space=space, base=(0.0, 0.0, 0.0)).arms
+    (turned,) = compare_arms(behind, [so101], space=space).arms
+    (again,) = compare_arms(behind, [so101], space=space, base=(*turned.base, turned.yaw)).arms
+    assert unturned.measures["unreached_targets"] == 3
+    assert turned.measures["unreached_targets"] == 0
+    assert abs(turned.yaw) > 1.0
+    assert again == turned
+    before = behind.model_copy(update={"targets": tuple((-x, y, z) for x, y, z in behind.target_positions.tolist())})
+    (needless,) = compare_arms(before, [so101], space=space).arms
+    assert needless.measures["unreached_targets"] == 0
+    assert needless.yaw == 0.0  # a turn would save less than 1 % of the torque
+
+
+def test_designs_and_arms_have_the_values_of_their_data_sheets(run: Path, compared: ArmComparison) -> None:
+    for design in compared.designs:
+        sheet = design_sheet(run, int(design.name[1:].split()[0]))
+        assert (sheet.reach, sheet.payload_at_full_reach) == (design.reach, design.payload_at_full_reach)
+        assert (sheet.mass, sheet.price, sheet.cycle_time) == (design.mass, design.price, design.measures["cycle_time"])
+        assert sheet.position_error == design.measures["worst_error"]
+        assert tuple(value for value, _ in sheet.objectives.values()) == design.values
+    for arm, file in zip(compared.arms, (UR5, PANDA), strict=True):
+        placement = placed(compared.problem, read_urdf(file), seed=0)
+        sheet = urdf_sheet(placement.described, job=Job(compared.problem, placement.description))
+        assert (sheet.reach, sheet.payload_at_full_reach) == (arm.reach, arm.payload_at_full_reach)
+        assert (sheet.mass, sheet.price, sheet.violated) == (arm.mass, arm.price, arm.violated)
+        assert sheet.position_error == arm.measures["worst_error"]
+        assert tuple(value for value, _ in sheet.objectives.values()) == arm.values
+        used = max(joint.peak_utilisation for joint in sheet.joints)  # type: ignore[type-var]
+        assert used == pytest.approx(arm.measures["torque_utilisation"])
 
 
 def test_dominance_counts_match_pairwise_comparison(history: History) -> None:
@@ -343,7 +382,7 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
     for word in (
         "ur5_robot",
         "panda",
-        "1,500 positions",
+        "1,500 places",
         "of the front, dominated by",
         "panda 15,000.00 USD",
         "do not include housings",
@@ -355,9 +394,12 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
     )
     assert told["arms"][0]["base"] == [0.0, 0.1, 0.0]
     assert told["designs"][0]["values"] == list(read_run(run)[1].front[0].values)
+    turned = armwright("compare-arms", "task.yaml", UR5, "--base", "0,0.1,0,90", "--json").stdout
+    assert json.loads(turned)["arms"][0]["yaw"] == pytest.approx(np.pi / 2)
     (run / EXISTING_ARMS).unlink()
     for args, words in (
         (("task.yaml", UR5, "--base", "0,0"), '--base "0,0": expected three numbers with commas'),
+        (("task.yaml", UR5, "--base", "0,0,0,nan"), '--base "0,0,0,nan": expected three numbers with commas'),
         (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),
         (("task.yaml", UR5, "--price", "ur5"), '--price "ur5": expected ARM=USD'),
         (("task.yaml", UR5, "--price", "ur5_rob=1e4"), 'unknown arm "ur5_rob". Did you mean "ur5_robot"?'),

@@ -107,7 +107,7 @@ def test_html_shows_what_the_space_file_says_as_text(sheet: DataSheet) -> None:
 def test_html_states_each_key_figure(sheet: DataSheet) -> None:
     page = to_html(sheet)
     assert "horizontal reach" in page
-    assert "not stated (a URDF states no price)" in page
+    assert "not stated (a URDF states no price; try --price)" in page
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import pinocchio
 import pytest
 
 import armwright as aw
+from armwright.kinematics.arm_arrays import stack_arms
 from armwright.problem.failure import Failure
 from armwright.problem.objectives import (
     BACKLASH_ERROR,
@@ -27,13 +28,14 @@ from armwright.report.datasheet import sheet_record
 from armwright.report.datasheet_pdf import verdict_of
 from armwright.robot.actuators import named_actuator
 from armwright.robot.mjcf import to_mjcf
+from armwright.robot.mounting import Mounting, mounted
 from armwright.robot.urdf_reader import read_urdf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.datasheet.design_sheet import Verdict, design_sheet, sheet_of
 from armwright.runs.datasheet.parts import price_source
 from armwright.runs.datasheet.sensitivities import variations, varied
 from armwright.runs.datasheet.sheet import DataSheet
-from armwright.runs.datasheet.urdf_sheet import read_actuators, urdf_sheet
+from armwright.runs.datasheet.urdf_sheet import Job, driven, read_actuators, urdf_sheet
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
@@ -237,13 +239,50 @@ def test_sheet_of_a_urdf_is_that_of_the_design_that_it_was_written_from(
     described = read_urdf(file, tip="tip")
     motors = [joint.actuator.name for joint in arm.joints if joint.actuator is not None]
     named = read_actuators(",".join(f"{n}={name}" for n, name in enumerate(motors, start=1)), described.joints)
-    existing = urdf_sheet(described, named)
+    existing = urdf_sheet(driven(described, named), named)
     assert existing.reach == pytest.approx(sheet.reach, rel=1e-3)
     assert existing.payload_at_full_reach == pytest.approx(sheet.payload_at_full_reach, rel=1e-2)
     ours, theirs = sheet.over_reach[-1].backlash_error, existing.over_reach[-1].backlash_error
     assert theirs == pytest.approx(ours, rel=1e-2)
     assert existing.price is None
-    assert existing.missing["price"] == "a URDF states no price"
+    assert existing.missing["price"] == "a URDF states no price; try --price"
+
+
+def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
+    """Limits and used ranges, in a place where the base is turned, against Pinocchio's reading of the file."""
+    described = read_urdf(robot("panda"))
+    task = Task(name="feeder", targets=((0.4, -0.2, 0.3), (0.4, 0.2, 0.3), (0.1, 0.4, 0.5)))
+    problem = aw.Problem(task, DesignSpace.model_validate(SPACE))
+    there = mounted(described, Mounting((0.0, 0.0, 0.0), 0.4))
+    sheet = urdf_sheet(there, job=Job(problem, "here"))
+    model = pinocchio.buildModelFromUrdf(str(robot("panda")))
+    places = [model.joints[model.getJointId(joint.name)].idx_q for joint in sheet.joints]
+    assert [joint.lower for joint in sheet.joints] == pytest.approx(model.lowerPositionLimit[places], abs=1e-12)
+    assert [joint.upper for joint in sheet.joints] == pytest.approx(model.upperPositionLimit[places], abs=1e-12)
+    q = there.values_in_urdf(problem.physics_of_arms(stack_arms([there.arm])).q[0])
+    assert [joint.used for joint in sheet.joints] == [
+        pytest.approx(ends) for ends in zip(q.min(axis=0), q.max(axis=0), strict=True)
+    ]
+    for joint in sheet.joints:
+        assert joint.used is not None
+        assert joint.unused == pytest.approx((joint.used[0] - joint.lower, joint.upper - joint.used[1]), abs=1e-12)
+    assert sheet.assumptions["place"] == "here"
+    assert sheet.missing.keys() >= {"payload", "cycle_time", "deflection"}
+    assert sheet.position_error is not None
+
+
+def test_command_places_an_existing_arm_on_a_task(tmp_path: Path) -> None:
+    found = {}
+    for name, options in {"searched": (), "given": ("--base", "-0.2,0,0,30"), "bare": None}.items():
+        task = () if options is None else ("--task", "target-1", *options)
+        done = armwright("datasheet", robot("panda"), *task, "--price", 15000, "--out", tmp_path / name, "--json")
+        found[name] = json.loads(done.stdout)
+    assert "the best of 1,500 places" in found["searched"]["assumptions"]["place"]
+    assert found["given"]["assumptions"]["place"] == "base at (-0.2, 0, 0) m, turned by 30°"
+    assert found["bare"]["position_error"] is None
+    assert {one["price"] for one in found.values()} == {15000.0}
+    assert found["searched"]["name"] == "panda on target-1"
+    assert list(found["searched"]["objectives"]) == ["position_error", "torque"]
 
 
 def test_efforts_of_a_urdf_are_used_without_actuators() -> None:
@@ -283,6 +322,9 @@ def test_command_writes_html_pdf_and_json(run: Path, tmp_path: Path) -> None:
         (("--actuators", "elbow=XM430-W350"), 'unknown joint "elbow". Did you mean "elbow_joint"?'),
         (("--actuators", "1=XM430-W35"), 'unknown actuator "XM430-W35". Did you mean "XM430-W350"?'),
         (("--actuators", "1=XM430-W350,1=XM430-W350"), "expected one actuator"),
+        (("--base", "0,0,0"), "--base 0,0,0: expected a task, too; try --task TASK"),
+        (("--space", "desk"), "--space desk: expected a task, too; try --task TASK"),
+        (("--task", "target-11"), 'Did you mean "target-1"?'),
         (("--design", "2"), "--design 2: expected a run folder, got"),
     ],
 )

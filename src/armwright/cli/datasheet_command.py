@@ -1,13 +1,19 @@
 """The command that writes data sheets of designs and of existing arms: datasheet."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.options import Json
+from armwright.cli.activity import activity
+from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base
+from armwright.cli.options import TASK, Json, SpaceFile
 from armwright.cli.streams import print_json
 from armwright.exceptions import SettingsError
+
+if TYPE_CHECKING:
+    from armwright.robot.urdf_reader import UrdfArm
+    from armwright.runs.datasheet.sheet import DataSheet
 
 
 def datasheet(
@@ -30,10 +36,16 @@ def datasheet(
             show_default="the efforts of the URDF",
         ),
     ] = None,
-    tip: Annotated[str | None, typer.Option(help="Link of the URDF at the tip.", show_default="the last one")] = None,
-    base_link: Annotated[
-        str | None, typer.Option(help="Link of the URDF at the base.", show_default="the root")
+    task: Annotated[
+        str | None,
+        typer.Option(help="The task of an arm that exists.", show_default="none", rich_help_panel=TASK),
     ] = None,
+    space: SpaceFile = None,
+    base: BasePose = None,
+    price: Annotated[float | None, typer.Option(help="Price of an arm that exists [USD].")] = None,
+    tip: Tip = None,
+    base_link: BaseLink = None,
+    seed: Annotated[int, typer.Option(help="Seed of the base search.")] = 0,
     out: Annotated[
         Path | None,
         typer.Option(help="Output folder.", show_default="designs/NNNN of the run, or NAME-datasheet"),
@@ -45,21 +57,26 @@ def datasheet(
     from armwright.robot.robot_descriptions import find_urdf
     from armwright.robot.urdf_reader import read_urdf
     from armwright.runs.datasheet.design_sheet import design_sheet
-    from armwright.runs.datasheet.urdf_sheet import read_actuators, urdf_sheet
     from armwright.runs.design_folders import DESIGNS, design_name
 
     if Path(source).is_dir():
-        for option, value in (("--actuators", actuators), ("--tip", tip), ("--base-link", base_link)):
+        of_urdf = {"--actuators": actuators, "--task": task, "--space": space, "--base": base, "--price": price,
+                   "--tip": tip, "--base-link": base_link}  # fmt: skip
+        for option, value in of_urdf.items():
             if value is not None:
                 raise SettingsError(f"{option} {value}: expected a URDF, got the run {source}, which has its own arms")
-        sheet = design_sheet(Path(source), design)
+        with activity("writing the data sheet"):
+            sheet = design_sheet(Path(source), design)
         folder = Path(source) / DESIGNS / design_name(sheet.design or 0)
     else:
         if design is not None:
             raise SettingsError(f"--design {design}: expected a run folder, got {source}")
-        described = read_urdf(find_urdf(source), tip, base_link)
-        named = {} if actuators is None else read_actuators(actuators, described.joints)
-        sheet = urdf_sheet(described, named)
+        for option, value in (("--space", space), ("--base", base)):
+            if value is not None and task is None:
+                raise SettingsError(f"{option} {value}: expected a task, too; try --task TASK")
+        with activity("placing the arm" if task and base is None else "writing the data sheet"):
+            described = read_urdf(find_urdf(source), tip, base_link)
+            sheet = _sheet_of_urdf(described, actuators, task, space, base, price, seed)
         folder = Path(f"{Path(source).stem}-datasheet")
     files = write_datasheet(sheet, folder if out is None else out)
     if json_:
@@ -67,3 +84,26 @@ def datasheet(
         return
     for file in files:
         print(file)
+
+
+def _sheet_of_urdf(
+    described: "UrdfArm",
+    actuators: str | None,
+    task: str | None,
+    space: Path | None,
+    base: str | None,
+    price: float | None,
+    seed: int,
+) -> "DataSheet":
+    """Return the data sheet of an arm, in its place on a task if one is named."""
+    from armwright.cli.options import load_problem
+    from armwright.experiments.base_placement import placed
+    from armwright.runs.datasheet.urdf_sheet import Job, driven, read_actuators, urdf_sheet
+
+    named = {} if actuators is None else read_actuators(actuators, described.joints)
+    described = driven(described, named)
+    if task is None:
+        return urdf_sheet(described, named, price=price)
+    problem = load_problem(task, space)
+    placement = placed(problem, described, seed, parse_base(base))
+    return urdf_sheet(placement.described, named, Job(problem, placement.description), price)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from armwright.cli.activity import activity
+from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base
 from armwright.cli.options import (
     Csv,
     Figures,
@@ -166,16 +167,9 @@ def compare_arms(
         Path | None,
         typer.Option(help="A run of the task to compare with; its figures then show the arms."),
     ] = None,
-    base: Annotated[
-        str | None, typer.Option(help="Position x,y,z of the base links [m].", show_default="searched")
-    ] = None,
-    tip: Annotated[
-        str | None,
-        typer.Option(help="Link of the URDFs that reaches the targets.", show_default="the last one"),
-    ] = None,
-    base_link: Annotated[
-        str | None, typer.Option(help="Link of the URDFs at the base.", show_default="the root")
-    ] = None,
+    base: BasePose = None,
+    tip: Tip = None,
+    base_link: BaseLink = None,
     space: SpaceFile = None,
     figures: Figures = True,
     seed: Annotated[int, typer.Option(help="Seed of the base search.")] = 0,
@@ -198,7 +192,7 @@ def compare_arms(
             arms,
             run,
             space=None if space is None else load_space(space),
-            base=None if base is None else _parse_point(base),
+            base=parse_base(base),
             tip=tip,
             base_link=base_link,
             seed=seed,
@@ -228,15 +222,6 @@ def _parse_price(text: str) -> tuple[str, float]:
     except ValueError:
         pass
     raise SettingsError(f'--price "{text}": expected ARM=USD, such as ur5e=28000')
-
-
-def _parse_point(text: str) -> tuple[float, float, float]:
-    """Parse `0.1,0,0.3` into a point [m]."""
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise SettingsError(f'--base "{text}": expected three numbers with commas, such as 0,0,0.5 [m]') from None
-    return x, y, z
 
 
 def runs(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.arm_options import Tip
 from armwright.cli.options import Json
 from armwright.cli.streams import open_console, print_json
 from armwright.cli.tables import Column, Table, numbers, print_table
@@ -41,7 +42,7 @@ def reach_map(
     design: Annotated[
         int | None, typer.Option(help="Number of the design of RUN.", show_default="the knee of the front")
     ] = None,
-    tip: Annotated[str | None, typer.Option(help="Link of the URDF at the tip.", show_default="the last one")] = None,
+    tip: Tip = None,
     spacing: Annotated[
         float | None,
         typer.Option(

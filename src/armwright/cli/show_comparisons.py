@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 
 from armwright.cli.notes import payload_note
-from armwright.cli.streams import format_point, list_files
+from armwright.cli.streams import list_files
 from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_arms import MEASURES, ArmComparison, ComparedArm
@@ -19,8 +19,10 @@ from armwright.extras import install_command, missing_packages
 from armwright.problem.objectives import TORQUE_SCALE
 from armwright.report.table_cells import remarks_on
 from armwright.report.tables import markdown, sections
+from armwright.robot.mounting import Mounting
 from armwright.runs.datasheet.sheet import NOT_MODELLED
 from armwright.study.cluster import Workers
+from armwright.tasks.moments import MAX_MASS
 
 
 def show_plan(
@@ -106,34 +108,36 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     objectives, space = comparison.problem.objectives, comparison.problem.space
     others = [o for o in objectives if o not in MEASURES and o.name != "mass"]
     title = "; ".join(filter(None, (f"Arms on {comparison.problem.task.name}", payload_note(comparison.problem.task))))
-    measured = [_ARM_COLUMNS[objective.name] for objective in MEASURES]
+    shown = [*comparison.arms, *comparison.designs]
+    measures = [one.name for one in MEASURES if any(arm.measures[one.name] is not None for arm in shown)]
     minimised = [objective.name for objective in objectives]
     columns = (
         Column("arm", least=12),
         *numbers("joints", rank=1),
-        *numbers("reach\nm", "mass\nkg"),
-        *(Column(measured[i], True, rank=0 if MEASURES[i].name in minimised else 3) for i in range(len(MEASURES))),
+        *numbers("reach\nm", "mass\nkg", "payload\nkg"),
+        *(Column(_ARM_COLUMNS[name], True, rank=0 if name in minimised else 3) for name in measures),
         *numbers(*(f"{o.label.lower()}\n{o.unit}" for o in others)),
     )
     rows: list[list[str]] = []
-    for arm in (*comparison.arms, *comparison.designs):
+    for arm in shown:
         values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
-        measures = [*arm.measures.values(), *(values[objective.name] for objective in others)]
-        cells = ["-" if value is None else _format_measure(value) for value in measures]
-        rows.append([arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", *cells])
+        known = [*(arm.measures[name] for name in measures), *(values[objective.name] for objective in others)]
+        cells = ["-" if value is None else _format_measure(value) for value in known]
+        rows.append([arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", _format_payload(arm), *cells])
     print_table(console, Table(columns, rows, "--json and --csv print all", title=title, gap=1))
     console.print(
         f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; torque "
-        "util. = the largest share of a joint's effort limit"
+        "util. = the largest share of a joint's effort limit, and payload = what is held at the whole reach, both with "
+        f"a safety factor of {space.safety_factor:g}"
     )
     if comparison.designs and space.is_toy:
         console.print(f"the designs have toy masses ({space.mass_note}); torques compare only with real ones (`mass:`)")
     _show_prices(console, comparison)
-    if comparison.positions:
+    if comparison.places:
         within = " x ".join(f"[{low:g}, {high:g}]" for low, high in (space.origin_x, space.origin_y, space.origin_z))
         console.print(
-            f"bases: {comparison.positions:,} positions tried for each arm in {within} m, by position error, "
-            "constraints and torque; --base x,y,z fixes it"
+            f"bases: {comparison.places:,} places tried for each arm in {within} m, by errors, constraints and torque; "
+            "--base x,y,z fixes it"
         )
     names = ", ".join(objective.name for objective in objectives)
     for arm in comparison.arms:
@@ -142,7 +146,7 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
             note = f"; violates {', '.join(arm.violated)}"
         elif comparison.run is not None:
             note = f"; {_describe_dominance(arm, comparison.front)} ({names})"
-        console.print(f"{arm.name}: base at {format_point([round(value, 4) for value in arm.base])} m{note}")
+        console.print(f"{arm.name}: {Mounting(arm.base, arm.yaw).description}{note}")
         for line in arm.notes:
             console.print(f"  {line}")
     if drawn:
@@ -159,7 +163,9 @@ def arm_rows(comparison: ArmComparison) -> Iterator[dict[str, Any]]:
             "reach": arm.reach,
             "mass": arm.mass,
             "price": "" if arm.price is None else arm.price,
+            "payload_at_full_reach": arm.payload_at_full_reach,
             **dict(zip(("base_x", "base_y", "base_z"), arm.base, strict=True)),
+            "base_yaw": arm.yaw,
             **arm.measures,
             **dict(zip(names, arm.values, strict=True)),
             "dominates": arm.dominates,
@@ -184,7 +190,15 @@ _ARM_COLUMNS = {
     "unreached_targets": "targets\nunreached",
     "peak_torque": "peak\nN m",
     "torque_utilisation": "torque\nutil.",
+    "deflection": "deflection\nm",
+    "backlash_error": "backlash\nm",
+    "cycle_time": "cycle\ns",
 }
+
+
+def _format_payload(arm: ComparedArm) -> str:
+    held = arm.payload_at_full_reach
+    return "-" if held is None else "any" if held >= MAX_MASS else _format_measure(held)
 
 
 def _format_measure(value: float) -> str:

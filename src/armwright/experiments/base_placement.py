@@ -1,28 +1,31 @@
-"""Place an existing arm on a task: search the position of its base."""
+"""Place an existing arm on a task: search the pose of its base."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError
 from armwright.kinematics.arm_arrays import stack_arms
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objective import Objective
-from armwright.problem.objectives import CLEARANCE_QUANTITIES, REACHED, TORQUE
+from armwright.problem.existing_arm import known_values
+from armwright.problem.objectives import TORQUE
 from armwright.problem.problem import POSTURES_AT_ONCE, Problem
-from armwright.robot.arm import Arm, Joint, Vector
+from armwright.robot.arm import Arm, Joint
+from armwright.robot.mounting import Mounting, mounted, needs_turning
+from armwright.robot.urdf_reader import UrdfArm
 from armwright.search.cma_es import refine
 from armwright.search.encoding import DesignEncoding
 from armwright.seeding import derived_seed
 from armwright.spaces.parameters import FloatParameter
+from armwright.spaces.tool_mount import with_tool
 
-RANDOM_POSITIONS = 300
-REFINED_POSITIONS = 4  # the best of the random ones
-EVALUATIONS = 300  # to refine one position
-N_POSITIONS = RANDOM_POSITIONS + REFINED_POSITIONS * EVALUATIONS
+RANDOM_PLACES = 300
+REFINED_PLACES = 4  # the best of the random ones
+EVALUATIONS = 300  # to refine one place
+HARDLY = 0.01  # more torque that is accepted for a base that is not turned
+N_PLACES = RANDOM_PLACES + REFINED_PLACES * EVALUATIONS
 
 
 def with_travel(arm: Arm, travel: float) -> Arm:
@@ -40,56 +43,91 @@ def with_travel(arm: Arm, travel: float) -> Arm:
     return replace(arm, joints=tuple(map(geared, arm.joints)))
 
 
-def placed_at(arm: Arm, position: Sequence[float]) -> Arm:
-    """Return the arm with its base link moved from the origin to a position [m]."""
-    x, y, z = (float(a + b) for a, b in zip(arm.base, position, strict=True))
-    return replace(arm, base=(x, y, z))
+@dataclass(frozen=True)
+class Placement:
+    """An existing arm in its place on a task.
+
+    Attributes:
+        described: The arm there, with its tool.
+        mounting: Where its base link stands.
+        tried: The number of places that were tried; 0 if the place was given.
+    """
+
+    described: UrdfArm
+    mounting: Mounting
+    tried: int = 0
+
+    @property
+    def description(self) -> str:
+        """Where it stands, and why there."""
+        why = f"; the best of {self.tried:,} places by errors, constraints and torque" if self.tried else ""
+        return f"{self.mounting.description}{why}"
 
 
-def known_values(quantity: Objective, evaluation: Evaluation, minimised: bool = False) -> Array | None:
-    """Return (N,) values of existing arms; None if their URDFs lack drives, prices, or the shape of links.
+def placed(problem: Problem, described: UrdfArm, seed: int, mounting: Mounting | None = None) -> Placement:
+    """Place an existing arm on a task as designs are: with its tool, travel of slides and safety factor.
 
     Args:
-        quantity: The quantity.
-        evaluation: Physics of the arms.
-        minimised: Return its value as an objective, which ignores errors below stated tolerances.
+        problem: The task, and the space with the ranges for the base.
+        described: The arm, its base link at the origin.
+        seed: Of the search for the base.
+        mounting: Where the base link stands; None to search.
     """
-    if quantity in CLEARANCE_QUANTITIES:
-        return None
-    try:
-        return quantity.minimised(evaluation) if minimised else quantity(evaluation)
-    except SettingsError:
-        return None
+    arm = with_tool(with_travel(described.arm, problem.space.travel), problem.task.tool)
+    equipped = replace(described, arm=replace(arm, safety_factor=problem.space.safety_factor))
+    if mounting is not None:
+        return Placement(mounted(equipped, mounting), mounting)
+    found = search_base(problem, equipped, seed)
+    return Placement(mounted(equipped, found), found, N_PLACES)
 
 
-def search_base(problem: Problem, arm: Arm, seed: int) -> Vector:
-    """Return the base position with the smallest position error, then violation, then torque [m].
+def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
+    """Return where the base link stands best: by missed targets, then violation, then torque.
 
-    It lies within the ranges of the design space for the base. Constraints on unknown quantities do not count.
+    Its position lies within the ranges of the design space. It is turned only if the first joint makes no full turn,
+    and if that pays. Constraints on unknown quantities do not count.
     """
     by_name = {parameter.name: parameter for parameter in problem.space.parameters}
     parameters = [cast("FloatParameter", by_name[f"origin_{axis}"]) for axis in "xyz"]
+    if needs_turning(described.arm):
+        parameters.append(FloatParameter("yaw", -math.pi, math.pi, "rad"))
 
-    def evaluate(positions: Array) -> Array:
+    def evaluate(rows: Array) -> Array:
         """Return losses (N, 1): from 2 if a target is missed, from 1 if a constraint is violated, else by torque."""
         batch = max(1, POSTURES_AT_ONCE[problem.device] // len(problem.task.target_positions))
-        losses = np.empty((len(positions), 1))
-        for first in range(0, len(positions), batch):
+        losses = np.empty((len(rows), 1))
+        for first in range(0, len(rows), batch):
             part = slice(first, first + batch)
-            arms = [placed_at(arm, position) for position in positions[part].tolist()]
-            evaluation = problem.physics_of_arms(stack_arms(arms))
-            excess = np.maximum(evaluation.position_error - REACHED, 0.0).sum(axis=1)
-            violation, torque = _known_violation(problem, evaluation), TORQUE(evaluation)
-            placed = np.where(violation > 0.0, 1.0 + violation / (1.0 + violation), torque / (1.0 + torque))
-            losses[part, 0] = np.where(excess > 0.0, 2.0 + excess, placed)
+            arms = [mounted(described, Mounting.of(row)).arm for row in rows[part].tolist()]
+            losses[part, 0] = _losses(problem, problem.physics_of_arms(stack_arms(arms)))
         return losses
 
-    positions = DesignEncoding(parameters).random(RANDOM_POSITIONS, np.random.default_rng(derived_seed(seed, 0)))
-    losses = evaluate(positions)
-    best = np.argsort(losses[:, 0], kind="stable")[:REFINED_POSITIONS]
-    refined = refine(parameters, evaluate, positions[best], losses[best], (1.0,), EVALUATIONS, derived_seed(seed, 1))
-    x, y, z = refined.matrix[refined.values[:, 0].argmin()].tolist()
-    return x, y, z
+    rows = DesignEncoding(parameters).random(RANDOM_PLACES, np.random.default_rng(derived_seed(seed, 0)))
+    losses = evaluate(rows)
+    best = np.argsort(losses[:, 0], kind="stable")[:REFINED_PLACES]
+    refined = refine(parameters, evaluate, rows[best], losses[best], (1.0,), EVALUATIONS, derived_seed(seed, 1))
+    chosen = refined.matrix[refined.values[:, 0].argmin()]
+    if len(chosen) > 3:
+        unturned = np.array([[*chosen[:3], 0.0]])
+        if _needs_hardly_more(float(evaluate(unturned)[0, 0]), float(refined.values.min())):
+            chosen = unturned[0]
+    return Mounting.of(chosen.tolist())
+
+
+def _needs_hardly_more(loss: float, least: float) -> bool:
+    """Return True if the torque behind a loss is at most HARDLY more than that behind the least loss."""
+    return loss <= least or (loss < 1.0 and loss / (1.0 - loss) <= (1.0 + HARDLY) * least / (1.0 - least))
+
+
+def _losses(problem: Problem, evaluation: Evaluation) -> Array:
+    """Return (N,) losses of placed arms, each below 1 if the arm does the task."""
+    targets = evaluation.target_arrays
+    missed = np.maximum(evaluation.position_error - targets.tolerance, 0.0)
+    missed += targets.metres_per_radian * np.maximum(evaluation.angle_error - targets.angle_tolerance, 0.0)
+    excess = missed.sum(axis=1)
+    violation, torque = _known_violation(problem, evaluation), TORQUE(evaluation)
+    met = np.where(violation > 0.0, 1.0 + violation / (1.0 + violation), torque / (1.0 + torque))
+    return np.where(excess > 0.0, 2.0 + excess, met)
 
 
 def _known_violation(problem: Problem, evaluation: Evaluation) -> Array:

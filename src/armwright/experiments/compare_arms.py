@@ -1,7 +1,8 @@
 """Compare existing arms on a task with the designs of a run.
 
-The base of an arm is given, or searched within the ranges of the design space: first for the smallest position error,
-then for the smallest violation of constraints, then for the smallest torque.
+The base of an arm is given, or searched within the ranges of the design space: first for the smallest errors at the
+targets, then for the smallest violation of constraints, then for the smallest torque. Reach, payload and all other
+values are those of the data sheets.
 """
 
 import json
@@ -14,12 +15,14 @@ import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 
 from armwright.exceptions import RunFolderError, SettingsError, TaskError, did_you_mean
-from armwright.experiments.base_placement import N_POSITIONS, known_values, placed_at, search_base, with_travel
+from armwright.experiments.base_placement import placed
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.pareto import front_indices, knee_index, paper_solution_indices
-from armwright.problem.evaluation import Evaluation
-from armwright.problem.objective import Objective
+from armwright.problem.existing_arm import ExistingArm
 from armwright.problem.objectives import (
+    BACKLASH_ERROR,
+    CYCLE_TIME,
+    DEFLECTION,
     PEAK_TORQUE,
     POSITION_ERROR,
     PRICE,
@@ -30,25 +33,32 @@ from armwright.problem.objectives import (
 )
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Vector
+from armwright.robot.mounting import Mounting
 from armwright.robot.robot_descriptions import find_urdf
 from armwright.robot.urdf_reader import UrdfArm, read_urdf
+from armwright.runs.datasheet.over_reach import reach_lines
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import FrontMember, History
 from armwright.spaces.design_space import DesignSpace, default_space
-from armwright.spaces.tool_mount import with_tool
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
-from armwright.text import rounded
 
 EXISTING_ARMS = "existing_arms.json"  # in a run folder: the arms of its last comparison
-MEASURES = (POSITION_ERROR, TORQUE, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, TORQUE_UTILISATION)
+MEASURES = (
+    POSITION_ERROR, TORQUE, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, TORQUE_UTILISATION, DEFLECTION,
+    BACKLASH_ERROR, CYCLE_TIME,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ComparedArm:
     """An arm evaluated on a task.
 
+    reach: the largest horizontal distance of its tip from its first joint [m].
+    mass: without payload [kg].
     base: position of its base link, or of a design's first joint [m].
+    yaw: turn of its base link about the vertical [rad].
+    payload_at_full_reach: what its actuators hold at that distance in all postures found [kg]; None if unknown.
     values: of the problem's objectives; None if unknown, such as a price.
     measures: of the quantities in `MEASURES`, by name.
     dominates, dominated_by: numbers of designs on the run's front, see `dominance_counts`; None without a run.
@@ -61,8 +71,8 @@ class ComparedArm:
 
     name: str
     joints: int
-    reach: float  # [m]
-    mass: float  # [kg]
+    reach: float
+    mass: float
     base: Vector
     values: tuple[float | None, ...]
     measures: Mapping[str, float | None]
@@ -71,6 +81,8 @@ class ComparedArm:
     violated: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     price: float | None = None
+    yaw: float = 0.0
+    payload_at_full_reach: float | None = None
 
 
 _ARMS = TypeAdapter(tuple[ComparedArm, ...])
@@ -84,7 +96,7 @@ class ArmComparison:
     designs: the most precise design of the front, its knee, and the one with the smallest last objective; empty without
         a run.
     front: size of the front.
-    positions: number of base positions tried for each arm; 0 if the base was given.
+    places: number of places tried for the base of each arm; 0 if it was given.
     """
 
     problem: Problem
@@ -92,7 +104,7 @@ class ArmComparison:
     placed: tuple[Arm, ...]
     designs: tuple[ComparedArm, ...]
     front: int
-    positions: int
+    places: int
     run: Path | None
 
 
@@ -102,7 +114,7 @@ def compare_arms(
     run: str | Path | None = None,
     *,
     space: DesignSpace | None = None,
-    base: Vector | None = None,
+    base: Sequence[float] | Mounting | None = None,
     tip: str | None = None,
     base_link: str | None = None,
     seed: int = 0,
@@ -116,7 +128,8 @@ def compare_arms(
         run: A run folder of the same task, whose problem is used. The arms are stored there for its figures and page.
         space: Design space with the ranges for the base and the travel of slides, without a run; by default the
             one of the task's name, else the paper's.
-        base: Position of all base links [m]; by default it is searched for each arm.
+        base: Position x, y, z of all base links [m], perhaps with their turn about the vertical as a fourth number
+            [rad]; by default it is searched for each arm.
         tip: Link of the URDFs that has to reach the targets, see `read_urdf`.
         base_link: Link of the URDFs that stands at the base, see `read_urdf`.
         seed: Seed of the search for the base.
@@ -125,27 +138,28 @@ def compare_arms(
     task = task if isinstance(task, Task) else load_task(task)
     if not arms:
         raise SettingsError("expected at least one arm; give URDF files, or names such as ur5e")
-    if base is not None and not np.all(np.isfinite(base)):
-        raise SettingsError(f"expected three finite numbers for the base [m], got {base}")
+    mounting = base if base is None or isinstance(base, Mounting) else Mounting.of(base)
     history = None if run is None else _history(Path(run), task, space)
     problem = Problem(task, space or default_space(task.name)) if history is None else history.problem
     described = [arm if isinstance(arm, UrdfArm) else read_urdf(find_urdf(arm), tip, base_link) for arm in arms]
     names = _names(arms, described)
     stated = _check_prices(prices or {}, names)
-    placed: list[Arm] = []
-    compared: list[ComparedArm] = []
-    for name, arm in zip(names, described, strict=True):
-        geared = with_tool(with_travel(arm.arm, problem.space.travel), problem.task.tool)
-        position = search_base(problem, geared, seed) if base is None else base
-        placed.append(placed_at(geared, position))
-        compared.append(_compared(problem, history, name, placed[-1], position, arm.notes, stated.get(name)))
+    places = [placed(problem, arm, seed, mounting) for arm in described]
+    compared = [
+        replace(
+            _compared(problem, history, name, place.described.arm, arm.notes, stated.get(name)),
+            base=place.mounting.position,
+            yaw=place.mounting.yaw,
+        )
+        for name, arm, place in zip(names, described, places, strict=True)
+    ]
     result = ArmComparison(
         problem=problem,
         arms=tuple(compared),
-        placed=tuple(placed),
+        placed=tuple(place.described.arm for place in places),
         designs=() if history is None else tuple(_chosen_designs(history)),
         front=0 if history is None else len(history.front),
-        positions=N_POSITIONS if base is None else 0,
+        places=places[0].tried,
         run=None if run is None else Path(run),
     )
     if result.run is not None:
@@ -193,7 +207,7 @@ def comparison_record(comparison: ArmComparison) -> dict[str, Any]:
         "objectives": [objective.name for objective in comparison.problem.objectives],
         "run": None if comparison.run is None else str(comparison.run),
         "front": comparison.front,
-        "positions": comparison.positions,
+        "places": comparison.places,
         "arms": [asdict(arm) for arm in comparison.arms],
         "designs": [asdict(arm) for arm in comparison.designs],
     }
@@ -241,47 +255,33 @@ def _compared(
     history: History | None,
     name: str,
     arm: Arm,
-    base: Vector,
     notes: Sequence[str] = (),
     price: float | None = None,
 ) -> ComparedArm:
-    """Evaluate a placed arm; price: as stated [USD], in place of that of its parts."""
-    evaluation = problem.physics_of_arms(stack_arms([arm]))
-
-    def value(quantity: Objective, minimised: bool = False) -> float | None:
-        return price if quantity == PRICE and price is not None else _value(quantity, evaluation, minimised)
-
-    values = tuple(value(objective, minimised=True) for objective in problem.objectives)
-    bounds = [(constraint, value(constraint.quantity)) for constraint in problem.constraints]
-    violated = tuple(
-        f"{constraint.description} (it has {rounded(measured)})"
-        for constraint, measured in bounds
-        if measured is not None and float(constraint.violation(np.array(measured))) > 0.0
-    )
+    """Evaluate an arm in its place; price: as stated [USD], in place of that of its parts."""
+    existing = ExistingArm(problem, problem.physics_of_arms(stack_arms([arm])), price)
+    values, violated = existing.objectives, existing.violated
     unknown = [o.name for o, one in zip(problem.objectives, values, strict=True) if one is None]
     notes = [*notes, *(f"{name} unknown, so the arm cannot be compared with the front" for name in unknown)]
-    notes += [f"unknown whether it meets {constraint.description}" for constraint, one in bounds if one is None]
+    notes += [f"unknown whether it meets {description}" for description in existing.undecided]
     counts = None if history is None else dominance_counts(values, violated, history)
     dominates, dominated_by = counts or (None, None)
+    farthest = reach_lines(arm, float(problem.task.payloads.max()))[-1]
     return ComparedArm(
         name=name,
-        joints=int((evaluation.arms.motion < FIXED).sum()),
-        reach=arm.reach,
+        joints=int((existing.evaluation.arms.motion < FIXED).sum()),
+        reach=farthest.distance,
         mass=arm.mass,
-        base=base,
+        base=arm.base,
         values=values,
-        measures={objective.name: _value(objective, evaluation) for objective in MEASURES},
+        measures={objective.name: existing.value(objective) for objective in MEASURES},
         dominates=dominates,
         dominated_by=dominated_by,
         violated=violated,
         notes=tuple(notes),
-        price=value(PRICE),
+        price=existing.value(PRICE),
+        payload_at_full_reach=farthest.payload,
     )
-
-
-def _value(quantity: Objective, evaluation: Evaluation, minimised: bool = False) -> float | None:
-    values = known_values(quantity, evaluation, minimised)
-    return None if values is None else float(values[0])
 
 
 def _chosen_designs(history: History) -> list[ComparedArm]:
@@ -298,5 +298,5 @@ def _chosen_designs(history: History) -> list[ComparedArm]:
 
 def _compared_design(history: History, member: FrontMember) -> ComparedArm:
     name = f"#{member.number} {member.design.joints}"
-    compared = _compared(history.problem, None, name, member.arm, member.arm.base)
+    compared = _compared(history.problem, None, name, member.arm)
     return replace(compared, values=member.values, violated=(), notes=())

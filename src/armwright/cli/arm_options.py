@@ -1,0 +1,38 @@
+"""Options of commands about existing arms."""
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armwright.exceptions import SettingsError
+
+if TYPE_CHECKING:
+    from armwright.robot.mounting import Mounting
+
+Tip = Annotated[str | None, typer.Option(help="Link of the URDF at the tip.", show_default="the last one")]
+BaseLink = Annotated[str | None, typer.Option(help="Link of the URDF at the base.", show_default="the root")]
+BasePose = Annotated[
+    str | None,
+    typer.Option(
+        "--base",
+        metavar="X,Y,Z[,YAW]",
+        help="Where base links stand [m], and how far they are turned about the vertical [°].",
+        show_default="searched",
+    ),
+]
+
+
+def parse_base(text: str | None) -> "Mounting | None":
+    """Parse `0.1,0,0.3` or `0.1,0,0.3,90` into a mounting; None for None."""
+    from armwright.robot.mounting import Mounting
+
+    if text is None:
+        return None
+    try:
+        x, y, z, *yaw = (float(part) for part in text.split(","))
+        return Mounting.of((x, y, z, *map(math.radians, yaw)))
+    except (ValueError, SettingsError):
+        raise SettingsError(
+            f'--base "{text}": expected three numbers with commas, such as 0,0,0.5 [m], or a fourth, the turn [°]'
+        ) from None
