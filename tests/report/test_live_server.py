@@ -17,8 +17,10 @@ from playwright.sync_api import Browser, expect
 
 import armwright as aw
 from armwright.llm.transcript import Transcript
+from armwright.report.live_run import LiveRun
 from armwright.runs.control import read_control
-from armwright.runs.folder import read_run
+from armwright.runs.folder import RunFolder, read_run
+from armwright.runs.results import discard_results
 from tests.support.browser import Tab
 from tests.support.chat_server import Answer, ChatServer, Request, designer, wants_design
 from tests.support.command_line import PATIENCE, refused, start
@@ -214,6 +216,20 @@ def test_killed_study_is_shown_as_not_running(tmp_path: Path, tab: Tab, live: Ex
     study.process.wait()
     expect(tab.page.locator("#doing")).to_have_text(re.compile(r"^not running, at \d+ of 20010"))
     study.end()
+
+
+def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    aw.find_front(aw.Problem(aw.load_task("target-1")), evaluations=400, out=folder)
+    run = LiveRun(folder)
+    run.look()
+    assert run.status["doing"] == "finished"
+    discard_results(folder)
+    with RunFolder(folder):
+        run.look()
+        assert run.status["doing"] == "searching"
+    run.look()
+    assert run.status["doing"] == "unknown"
 
 
 def test_control_needs_token_origin_and_json(served: tuple[Path, int, str]) -> None:

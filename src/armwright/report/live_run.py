@@ -23,7 +23,7 @@ from armwright.runs.trials_file import TRIALS
 
 WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL)
 RECENT = 20  # trials whose mean duration predicts the remaining time
-RUNNING = ("evaluating", "asking", "paused")
+RUNNING = ("evaluating", "asking", "paused", "searching")
 
 
 class LiveRun:
@@ -87,6 +87,8 @@ class LiveRun:
         study = None if content is None else content.study
         is_finished = content is not None and content.summary is not None
         doing = status.doing if status is not None else "finished" if is_finished else "unknown"
+        if doing == "unknown" and content is not None and content.study is None and is_held(self.folder):
+            doing = "searching"  # a direct search, which reports no status
         if doing in RUNNING and not is_held(self.folder):
             doing = "gone"
         recent = [trial.seconds.get("total", 0.0) for trial in trials[-RECENT:]]

@@ -118,6 +118,7 @@ function doing() {
       return status.designs < status.planned ? `evaluating ${status.designs + 1} of ${status.planned}` : "writing the results";
     case "paused": return `paused for ${since()}, at ${status.designs} of ${status.planned}`;
     case "stopped": return `stopped at ${status.designs} of ${status.planned}; repeat the command to resume`;
+    case "searching": return "searching; its designs appear when the search ends";
     case "finished": return `finished: ${plural(status.designs, "design")}`;
     default: return `not running, at ${status.designs}${status.planned ? ` of ${status.planned}` : ""}`;
   }
