@@ -102,6 +102,14 @@ def test_guide_fetches_nothing(guide: Path) -> None:
         assert not re.search(r"@import|url\((['\"]?)(https?:)?//", file.read_text(encoding="utf-8")), file
 
 
+def test_tables_headings_and_fences_are_rendered(guide: Path) -> None:
+    """A lost blank line leaves their marks in the text of a paragraph."""
+    for page in guide.rglob("*.html"):
+        for paragraph in re.findall(r"<p>(.*?)</p>", page.read_text(encoding="utf-8"), re.DOTALL):
+            text = re.sub(r"<code>.*?</code>", "", paragraph, flags=re.DOTALL)
+            assert not re.search(r"\|\s*:?-+:?\s*\||(^|\s)#{1,6}\s|```", text), f"{page}: {text[:200]}"
+
+
 def test_command_line_page_lists_every_command(guide: Path) -> None:
     text = (guide / "reference" / "cli.html").read_text(encoding="utf-8")
     for command in ("optimize", "experiment", "compare-arms"):

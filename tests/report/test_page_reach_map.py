@@ -1,6 +1,7 @@
 """Reach maps of designs on the page, in a real browser."""
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.fixture
+def tab(folder: Path, browser: Browser) -> Iterator[Tab]:
+    opened = Tab(browser, offline=True)
+    opened.open(folder / "report.html")
+    yield opened
+    assert not opened.faults
+    opened.close()
+
+
 def stored(folder: Path, design: int) -> dict[str, Any]:
     with np.load(folder / "reach-maps" / f"{design:04d}.npz") as arrays:
         return dict(arrays)
@@ -51,64 +61,52 @@ def shares(texts: list[str]) -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_slices_show_the_shares_of_the_map(folder: Path, browser: Browser) -> None:
-    tab = Tab(browser, offline=True)
-    try:
-        tab.open(folder / "report.html")
-        tab.ask("armwright.set({ design: 2 })")
-        assert tab.ask("document.getElementById('reach-box').hidden")
-        for design, prefix in ((3, ""), (5, "usable_"), (5, "")):
-            tab.ask(f"armwright.set({{ design: {design} }})")
-            arrays = stored(folder, design)
-            use = tab.page.locator("#reach-use")
-            assert tab.page.locator("#reach-use-label").is_visible() == (design == 5)
-            if design == 5:
-                use.set_checked(prefix == "usable_")
-            expected = np.where(
-                grid(arrays, f"{prefix}covered"),
-                np.where(grid(arrays, f"{prefix}share") > 0.0, 100.0 * grid(arrays, f"{prefix}share"), -1.0),
-                -2.0,
-            )
-            for axis in range(3):
-                tab.page.locator("#reach-axis").select_option(str(axis))
-                for index in {0, int(arrays["shape"][axis]) // 2, int(arrays["shape"][axis]) - 1}:
-                    tab.page.locator("#reach-at").fill(str(index))
-                    trace = tab.ask("(({ x, y, text }) => ({ x, y, text }))(document.getElementById('reach').data[0])")
-                    plane = np.moveaxis(expected, axis, 0)[index]
-                    assert shares(trace["text"]) == pytest.approx(plane.ravel(), abs=0.7)
-                    across = np.moveaxis(arrays["points"].reshape(*arrays["shape"], 3), axis, 0)[index]
-                    right, up = [k for k in range(3) if k != axis]
-                    assert trace["x"] == pytest.approx(across[..., right].ravel())
-                    assert trace["y"] == pytest.approx(across[..., up].ravel())
-                    value = tab.page.locator("#reach-value").inner_text()
-                    assert float(value.split(" ")[2]) == pytest.approx(across[0, 0, axis], abs=6e-4)
-        assert not tab.faults
-    finally:
-        tab.close()
+def test_slices_show_the_shares_of_the_map(folder: Path, tab: Tab) -> None:
+    tab.ask("armwright.set({ design: 2 })")
+    assert tab.ask("document.getElementById('reach-box').hidden")
+    for design, prefix in ((3, ""), (5, "usable_"), (5, "")):
+        tab.ask(f"armwright.set({{ design: {design} }})")
+        arrays = stored(folder, design)
+        use = tab.page.locator("#reach-use")
+        assert tab.page.locator("#reach-use-label").is_visible() == (design == 5)
+        if design == 5:
+            use.set_checked(prefix == "usable_")
+        expected = np.where(
+            grid(arrays, f"{prefix}covered"),
+            np.where(grid(arrays, f"{prefix}share") > 0.0, 100.0 * grid(arrays, f"{prefix}share"), -1.0),
+            -2.0,
+        )
+        for axis in range(3):
+            tab.page.locator("#reach-axis").select_option(str(axis))
+            for index in {0, int(arrays["shape"][axis]) // 2, int(arrays["shape"][axis]) - 1}:
+                tab.page.locator("#reach-at").fill(str(index))
+                trace = tab.ask("(({ x, y, text }) => ({ x, y, text }))(document.getElementById('reach').data[0])")
+                plane = np.moveaxis(expected, axis, 0)[index]
+                assert shares(trace["text"]) == pytest.approx(plane.ravel(), abs=0.7)
+                across = np.moveaxis(arrays["points"].reshape(*arrays["shape"], 3), axis, 0)[index]
+                right, up = [k for k in range(3) if k != axis]
+                assert trace["x"] == pytest.approx(across[..., right].ravel())
+                assert trace["y"] == pytest.approx(across[..., up].ravel())
+                value = tab.page.locator("#reach-value").inner_text()
+                assert float(value.split(" ")[2]) == pytest.approx(across[0, 0, axis], abs=6e-4)
 
 
 @pytest.mark.slow
-def test_3d_view_shows_the_points_up_to_the_slice(folder: Path, browser: Browser) -> None:
-    tab = Tab(browser, offline=True)
-    try:
-        tab.open(folder / "report.html")
-        tab.ask("armwright.set({ design: 3 })")
-        tab.page.locator("#reach-axis").select_option("2")
-        assert tab.ask("armwright.drawnPoints()") == 0
-        tab.page.locator("#reach-space").check()
-        arrays = stored(folder, 3)
-        for index in (0, 2, int(arrays["shape"][2]) - 1):
-            tab.page.locator("#reach-at").fill(str(index))
-            assert tab.ask("armwright.drawnPoints()") == grid(arrays, "covered")[:, :, : index + 1].sum()
-        picture = tab.ask("armwright.snapshot(2)")
-        tab.page.locator("#reach-space").uncheck()
-        assert tab.ask("armwright.snapshot(2)") == picture  # the points are not on pictures of designs
-        tab.page.locator("#reach-space").check()
-        tab.ask("armwright.set({ design: 2 })")  # without a map
-        assert tab.ask("armwright.drawnPoints()") == 0
-        assert not tab.faults
-    finally:
-        tab.close()
+def test_3d_view_shows_the_points_up_to_the_slice(folder: Path, tab: Tab) -> None:
+    tab.ask("armwright.set({ design: 3 })")
+    tab.page.locator("#reach-axis").select_option("2")
+    assert tab.ask("armwright.drawnPoints()") == 0
+    tab.page.locator("#reach-space").check()
+    arrays = stored(folder, 3)
+    for index in (0, 2, int(arrays["shape"][2]) - 1):
+        tab.page.locator("#reach-at").fill(str(index))
+        assert tab.ask("armwright.drawnPoints()") == grid(arrays, "covered")[:, :, : index + 1].sum()
+    picture = tab.ask("armwright.snapshot(2)")
+    tab.page.locator("#reach-space").uncheck()
+    assert tab.ask("armwright.snapshot(2)") == picture  # the points are not on pictures of designs
+    tab.page.locator("#reach-space").check()
+    tab.ask("armwright.set({ design: 2 })")  # without a map
+    assert tab.ask("armwright.drawnPoints()") == 0
 
 
 @pytest.mark.slow
