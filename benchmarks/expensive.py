@@ -4,6 +4,7 @@
     python benchmarks/expensive.py --out expensive --share 1/2  # half of it; --share 2/2 on another core
     python benchmarks/expensive.py --out expensive --methods tpe,surrogate --evaluators pd --tasks target-1 --seeds 3
     python benchmarks/expensive.py --out expensive --only-tables
+    python benchmarks/expensive.py --own-time desk-sorting      # what samplers take on a task with a cycle
 
 Set OMP_NUM_THREADS=1 for `gp` and `botorch`: their threads only get in each other's way.
 
@@ -236,6 +237,14 @@ def work(options: argparse.Namespace, file: Path) -> None:
         print(f"{cell.name}, {method}, seed {seed}: {run.seconds:.1f} s", flush=True)
 
 
+def own_times(task: str, evaluations: int) -> None:
+    """Print what samplers take beside an evaluator that takes nothing."""
+    for method in ("tpe", OURS):
+        run = execute(Cell("control", task), method, 0, evaluations)
+        seconds = (run.seconds - run.evaluation_seconds) / run.evaluations
+        print(f"{method} on {task}: {seconds:.3f} s a trial, of {run.evaluations}", flush=True)
+
+
 def table(runs: Iterable[Run], options: argparse.Namespace) -> Mapping[tuple[Cell, str, int], dict[int, float]]:
     """Print the mean hypervolumes with their 95 % intervals; return all, by cell, method, count and seed."""
     found: dict[tuple[Cell, str, int], dict[int, float]] = {}
@@ -322,7 +331,9 @@ def read_options() -> argparse.Namespace:
 
     evaluators, tasks = (list(dict.fromkeys(getattr(c, name) for c in CELLS)) for name in ("evaluator", "task"))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, required=True, help="folder of runs.jsonl")
+    result = parser.add_mutually_exclusive_group(required=True)
+    result.add_argument("--out", type=Path, help="folder of runs.jsonl")
+    result.add_argument("--own-time", metavar="TASK", help="print only what samplers take on this task")
     parser.add_argument("--tasks", type=names(tasks), default=tasks)
     parser.add_argument("--methods", type=names(METHODS), default=[name for name in METHODS if name not in SLOW])
     parser.add_argument("--evaluators", type=names(evaluators), default=evaluators)
@@ -338,6 +349,9 @@ def read_options() -> argparse.Namespace:
 
 def main() -> None:
     options = read_options()
+    if options.own_time is not None:
+        own_times(options.own_time, options.evaluations)
+        return
     options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "runs.jsonl"
     if not options.only_tables:

@@ -14,8 +14,10 @@ from typing import Self
 import psutil
 import pytest
 from playwright.sync_api import Browser, expect
+from typer.testing import CliRunner
 
 import armwright as aw
+from armwright.cli.app import app
 from armwright.llm.transcript import Transcript
 from armwright.report.live_run import LiveRun
 from armwright.runs.control import read_control
@@ -216,6 +218,20 @@ def test_killed_study_is_shown_as_not_running(tmp_path: Path, tab: Tab, live: Ex
     study.process.wait()
     expect(tab.page.locator("#doing")).to_have_text(re.compile(r"^not running, at \d+ of 20010"))
     study.end()
+
+
+def test_open_page_shows_a_new_reach_map(served: tuple[Path, int, str], tab: Tab) -> None:
+    folder, port, _ = served
+    tab.open(f"http://127.0.0.1:{port}/")
+    tab.page.wait_for_function("armwright.content.n === 10")
+    tab.ask("armwright.set({ design: 4 })")
+    box = tab.page.locator("#reach-box")
+    expect(box).to_be_hidden()
+    options = ("--design", "4", "--spacing", "0.3", "--directions", "4")
+    assert CliRunner().invoke(app, ["reach-map", str(folder), *options]).exit_code == 0
+    expect(box).to_be_visible()
+    assert tab.ask("armwright.state.design") == 4
+    assert tab.faults == []
 
 
 def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Path) -> None:

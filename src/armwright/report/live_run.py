@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import ArmwrightError
+from armwright.experiments.compare_arms import EXISTING_ARMS
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
 from armwright.report.datasheet_html import to_html
 from armwright.report.page_content import RunContent, design_files
@@ -17,11 +18,12 @@ from armwright.runs.control import (
     read_status,
 )
 from armwright.runs.datasheet.design_sheet import design_sheet
-from armwright.runs.folder import CONFIG, is_held, read_config
-from armwright.runs.results import SUMMARY
+from armwright.runs.folder import CONFIG, REACH_MAPS, is_held, read_config
+from armwright.runs.results import REPORT, SUMMARY
 from armwright.runs.trials_file import TRIALS
 
-WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL)
+BESIDE = (REACH_MAPS, EXISTING_ARMS, REPORT)  # what commands beside the run add to the page; they end with the report
+WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL, *BESIDE)
 RECENT = 20  # trials whose mean duration predicts the remaining time
 RUNNING = ("evaluating", "asking", "paused", "searching")
 
@@ -103,6 +105,7 @@ class LiveRun:
             "calls": len(calls),
             "planned": planned,
             "finished": is_finished,
+            "beside": str([_stamp(self.folder / name) for name in BESIDE]),
             "left": None if planned is None or not recent else (planned - len(trials)) * sum(recent) / len(recent),
             "paused": control.paused,
             "fault": self.fault or ("" if status is None else status.fault),

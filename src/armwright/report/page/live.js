@@ -8,6 +8,7 @@ let content = null;
 let take = null;
 let token = "";
 let status = null;
+let beside = null; // state of the reach maps and existing arms that the page shows
 let busy = false, behind = false, lost = false;
 
 // Fetches the part of the run that the page lacks.
@@ -62,7 +63,7 @@ function listenTo() {
     }
     show();
     const isNews = status.designs !== content.n || status.calls !== content.calls.length
-      || status.finished !== content.head?.result.finished;
+      || status.finished !== content.head?.result.finished || status.beside !== beside;
     if (isNews && (status.designs || content.n)) catchUp();
   });
   events.addEventListener("error", () => {
@@ -78,8 +79,10 @@ async function catchUp() {
   }
   busy = true;
   let news = null;
+  const fetched = status.beside;
   try {
     news = await fetchRun();
+    beside = fetched;
   } catch {
     setTimeout(catchUp, AGAIN);
   }
