@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 
 from armwright.arrays import Array
@@ -24,9 +25,9 @@ SIMILAR = 0.5  # share of the upper limit; if all values are above, the axis beg
 LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # widths [inch]
 
 
-def one_panel(width: float, height: float) -> tuple[Figure, Any]:
-    """Return a figure of this size [inch] and its only axes."""
-    figure = several_panels(width, height)
+def one_panel(width: float, height: float, pad: float | None = None) -> tuple[Figure, Any]:
+    """Return a figure of this size and its only axes; pad: room around them, matplotlib's by default [inch]."""
+    figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=pad, w_pad=pad))
     return figure, figure.subplots()
 
 

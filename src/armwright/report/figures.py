@@ -37,6 +37,7 @@ from armwright.runs.results import FIGURES, read_summary
 
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials; 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # drawn part of the plane, as a multiple of the reference point
+MARK_PAD = 0.08  # [inch] around a panel with marks on its edge
 
 
 def write_figures(folder: str | Path, has_time: Callable[[float], bool] = lambda _: True) -> list[Path]:
@@ -203,7 +204,7 @@ def draw_attribution(history: History) -> Figure:
 
 def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure:
     """Draw the final front by source, with the chosen designs labelled and existing arms for comparison."""
-    figure, axes = one_panel(5.2, 4.2)
+    figure, axes = one_panel(5.2, 4.2, MARK_PAD if existing else None)
     reference, limits = _reference(history), _limits(history)
     _scatter(axes, history, reference, limits, alpha=0.25)
     for member in history.front:
@@ -219,7 +220,10 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
         if np.all(np.array(m.values[:2]) <= limits[:, 1])
     ]
     arms = _draw_existing(axes, limits[:, 1], existing)
-    axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if arms else [])], loc="upper right")
+    if arms:  # where no lines lead to their marks
+        axes.legend(handles=[*_legend(history), _mark(EXISTING)], loc="best")
+    else:
+        axes.legend(handles=_legend(history), loc="upper right")
     area = hypervolume(history.masked_objectives, reference)
     n = len(history.front)
     axes.set_title(f"{history.problem.task.name}: {n} design{'s' * (n != 1)} on the front, hypervolume {area:.2f}")
