@@ -70,7 +70,8 @@ function isPrecise() {
   return near.length > content.head.front.length / 4;
 }
 
-// Returns the range of an objective's axis: to beyond the reference point, or to the designs if it is far from all.
+// Returns the range of an objective's axis: to beyond the reference point, or to the designs if it is far from all in the
+// objective of either axis.
 function range(k) {
   const reference = content.head.reference_point;
   if (reference === null) return undefined;
@@ -78,8 +79,10 @@ function range(k) {
   const within = (feasible.length ? feasible : all).filter((i) => [x, y].every((m) => content.values(i)[m] <= VIEW * reference[m]));
   const shown = within.length ? within : frontUntil(content.n);
   if (!shown.length) return [0, VIEW * reference[k]];
-  const best = Math.min(...shown.map((i) => content.values(i)[k])), worst = Math.max(...shown.map((i) => content.values(i)[k]));
-  const high = worst > 0 && reference[k] > FAR * worst ? FITTED * worst : VIEW * Math.max(reference[k], within.length ? 0 : worst);
+  const largest = (m) => Math.max(...shown.map((i) => content.values(i)[m]));
+  const best = Math.min(...shown.map((i) => content.values(i)[k])), worst = largest(k);
+  const isFar = [x, y].some((m) => largest(m) > 0 && reference[m] > FAR * largest(m));
+  const high = isFar && worst > 0 ? FITTED * worst : VIEW * Math.max(reference[k], within.length ? 0 : worst);
   return [best > SIMILAR * high && best < reference[k] ? best - (FITTED - 1) * (high - best) : 0, high];
 }
 
@@ -200,6 +203,7 @@ function draw() {
   if (reference !== null) {
     traces.push({
       x: [reference[x]], y: [reference[y]], mode: "markers", name: "reference point", hoverinfo: "name",
+      showlegend: reference[x] <= high(x) && reference[y] <= high(y),
       marker: { symbol: "cross-thin", size: 12, line: { width: 2, color: colour("ink") } },
     });
   }
