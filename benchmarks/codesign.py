@@ -10,6 +10,8 @@ The evaluator is examples/design_and_control.py. Methods:
   over gears and controller of three arms of it, from the fastest to the coolest, with a third of the simulations each;
 - random: uniform over arm, gears and controller.
 
+Nothing is proposed by rules or models.
+
 The figure is the hypervolume of the feasible designs within REFERENCE. Each finished run is one line of the file; runs
 that it holds are not repeated, so a file is for one sampler. Paired Wilcoxon tests over the seeds, corrected by Holm.
 
@@ -79,7 +81,8 @@ def run(cell: Cell) -> list[aw.FinishedTrial]:
 
 def searched(space: aw.DesignSpace, budget: int, seed: int, sampler: str) -> list[aw.FinishedTrial]:
     n_init = min(N_RANDOM, budget // 2)
-    found = aw.optimize(problem_in(space), sampler=sampler, n_init=n_init, n_total=budget - n_init, seed=seed)
+    sizes = {"n_init": n_init, "n_total": budget - n_init}
+    found = aw.optimize(problem_in(space), sampler=sampler, proposer="none", seed=seed, **sizes)
     return list(found.trials)
 
 

@@ -12,11 +12,11 @@ import armwright as aw
 from armwright.exceptions import EvaluatorError, RunConflictError, SettingsError
 from armwright.problem.objectives import LENGTH, POSITION_ERROR
 from armwright.runs.folder import read_run
+from armwright.study.refine_run import refine_run
 from tests.support.arms import paper_arms
 
 SPACE = aw.paper_space(joints=3)
 TASK = aw.load_task("target-1")
-WHOLE = TASK.model_copy(update={"reference_point": None})  # which is for other objectives than ours
 ARM = paper_arms(1, 3, 0)[0]
 
 
@@ -34,13 +34,13 @@ def raising(fault: BaseException) -> aw.Evaluator:
 
 
 def test_evaluator_defines_the_objectives() -> None:
-    problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
+    problem = aw.Problem(TASK, SPACE, evaluator=measured)
     assert [(o.name, o.unit, o.label, o.description) for o in problem.objectives] == [
         ("reach", "m", "Reach", "Return the reach of the arm."),
         ("joints_used", "", "Joints used", "Return the reach of the arm."),
     ]
     designs = SPACE.sample(4, 0)
-    ours = aw.Problem(WHOLE, SPACE, objectives=(LENGTH,))
+    ours = aw.Problem(TASK.model_copy(update={"reference_point": None}), SPACE, objectives=(LENGTH,))
     assert problem.evaluate(designs).values[:, 0] == pytest.approx(ours.evaluate(designs).values[:, 0], abs=1e-9)
     assert problem.evaluate([designs[1]])[0] == problem.evaluate(designs)[1]
 
@@ -95,10 +95,28 @@ def test_working_folder_is_restored_after_an_evaluation(in_folder: Path) -> None
         os.chdir("/")
         return measured.measure(arm, task)  # type: ignore[return-value]
 
-    problem = aw.Problem(WHOLE, SPACE, evaluator=elsewhere)
+    problem = aw.Problem(TASK, SPACE, evaluator=elsewhere)
     aw.optimize(problem, proposer="none", n_init=2, n_total=2, out="run")
     assert (in_folder / "run" / "summary.json").is_file()
     assert Path.cwd() == in_folder
+
+
+def test_what_a_task_states_of_its_objectives_does_not_apply_to_an_evaluator(tmp_path: Path) -> None:
+    task = TASK.model_copy(update={"objectives": ("position_error", "torque"), "resolution": (("torque", 0.1),)})
+    problem = aw.Problem(task, SPACE, evaluator=aw.evaluator("energy [J]")(lambda arm, task: arm.length))
+    assert TASK.reference_point is not None
+    assert problem.reference_point is None
+    assert [objective.name for objective in problem.objectives] == ["energy"]
+    run = aw.optimize(problem, proposer="none", sampler="random", n_init=2, n_total=1, out=tmp_path / "run")
+    assert read_run(tmp_path / "run")[1].problem.reference_point is None
+    assert len(run.config.reference_point or ()) == 1
+
+
+def test_refinement_of_a_measured_run_is_refused(tmp_path: Path) -> None:
+    problem = aw.Problem(TASK, SPACE, evaluator=measured)
+    aw.optimize(problem, proposer="none", sampler="random", n_init=2, n_total=1, out=tmp_path / "run")
+    with pytest.raises(SettingsError, match=r"was measured by the evaluator .*measured, which a refinement would call"):
+        refine_run(tmp_path / "run")
 
 
 def test_evaluator_of_one_objective_may_return_a_number() -> None:
@@ -106,7 +124,7 @@ def test_evaluator_of_one_objective_may_return_a_number() -> None:
 
 
 def test_failed_evaluation_has_infinite_objectives_and_its_violations() -> None:
-    task = WHOLE.model_copy(update={"constraints": ("length <= 0.5",)})
+    task = TASK.model_copy(update={"constraints": ("length <= 0.5",)})
     designs = SPACE.sample(4, 0)
 
     @aw.evaluator("energy [J]")
@@ -133,11 +151,11 @@ def test_failed_evaluation_has_infinite_objectives_and_its_violations() -> None:
         (lambda: aw.evaluator("torque")(len), "is built in"),
         (lambda: aw.Problem(TASK, SPACE, tolerance=0.001, evaluator=measured), "a tolerance or an evaluator, got both"),
         (
-            lambda: aw.optimize(aw.Problem(WHOLE, SPACE, evaluator=measured), refine_every=5),
+            lambda: aw.optimize(aw.Problem(TASK, SPACE, evaluator=measured), refine_every=5),
             "--refine-every does not go with an evaluator",
         ),
         (
-            lambda: aw.optimize(aw.Problem(WHOLE, SPACE, evaluator=measured), evaluation_timeout=0.0),
+            lambda: aw.optimize(aw.Problem(TASK, SPACE, evaluator=measured), evaluation_timeout=0.0),
             "evaluation_timeout: expected seconds > 0, got 0.0",
         ),
         (lambda: aw.optimize(aw.Problem(TASK, SPACE), evaluation_timeout=1.0), "without --evaluator leave it out"),
@@ -149,7 +167,7 @@ def test_evaluator_settings_are_validated(make: Callable[[], object], words: str
 
 
 def test_front_search_refuses_custom_evaluators(tmp_path: Path) -> None:
-    problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
+    problem = aw.Problem(TASK, SPACE, evaluator=measured)
     with pytest.raises(SettingsError, match="only in `armwright optimize`"):
         aw.find_front(problem, evaluations=100, out=tmp_path / "front")
 
@@ -208,7 +226,7 @@ def test_unloadable_evaluator_is_one_line(file: Path, place: str, words: str) ->
 @pytest.mark.slow
 def test_run_is_resumed_with_its_own_evaluator(file: Path) -> None:
     """A changed evaluator file is noted; the run folder names the file but never loads it."""
-    task = WHOLE
+    task = TASK
 
     def run(n_total: int, evaluator: aw.Evaluator | None) -> aw.StudyResult:
         problem = aw.Problem(task, SPACE, evaluator=evaluator)

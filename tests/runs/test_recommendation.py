@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -114,6 +115,20 @@ def test_designs_without_a_cycle_are_perturbed_if_they_have_constraints() -> Non
             assert one["status"] == "not simulated"
             names = [found["name"] for found in one["survival"]["perturbations"]]
             assert names == [MOVED, SUPPLY, HEAVIER, SHIFTED]  # mass and torques of the motors are stated
+
+
+def test_designs_that_an_evaluator_measured_are_neither_simulated_nor_perturbed() -> None:
+    @aw.evaluator("span [m]")
+    def measure(arm: aw.Arm, task: aw.Task) -> float:
+        return arm.length
+
+    desk = Desk()
+    problem = replace(desk.problem, evaluator=measure, objectives=measure.objectives)
+    run = aw.optimize(problem, proposer="none", sampler="random", n_init=1, n_total=1, initial_designs=[desk.design])
+    assert len(run.summary["recommended"]) == 2
+    for one in run.summary["recommended"]:
+        assert one["status"] == "not simulated: a custom evaluator measured it"
+        assert one["survival"] is None
 
 
 class Verdicts:

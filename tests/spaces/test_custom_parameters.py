@@ -164,6 +164,8 @@ def test_search_encodes_logarithmic_columns() -> None:
     assert units.min() >= 0.0
     assert units.max() <= 1.0
     assert encoding.from_units(units)[:, :-1] == pytest.approx(matrix[:, encoding.real][:, :-1])
+    several = units.reshape(4, 50, -1)  # as a refinement of several designs holds them
+    assert encoding.from_units(several).reshape(200, -1) == pytest.approx(encoding.from_units(units))
     kp = [p.name for p in space.parameters if isinstance(p, FloatParameter)].index("kp")
     assert units[:, kp] == pytest.approx(np.log(matrix[:, encoding.real[kp]]) / np.log(200.0))
     children = offspring(matrix, np.zeros(200, dtype=np.int64), encoding, 500, np.random.default_rng(0))

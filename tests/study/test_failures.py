@@ -2,6 +2,7 @@
 
 import json
 import math
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from armwright.llm.feedback import Feedback
 from armwright.pareto import hypervolume
 from armwright.runs.optuna_export import export_study
 from armwright.search.samplers import SAMPLERS
+from armwright.study import evaluation_process
 from armwright.study.progress import Progress
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
@@ -184,6 +186,24 @@ def test_reference_point_waits_for_the_first_success(tmp_path: Path) -> None:
     first = int(np.flatnonzero(~found.history.failed)[0])
     assert found.config.reference_point == pytest.approx([1.1 * found.history.values[first, 0]])
     assert points[-1] == pytest.approx(found.summary["hypervolume"]["final"])
+
+
+@pytest.mark.slow
+def test_idle_process_of_an_evaluator_ends_and_is_replaced() -> None:
+    """It ends by itself although one of its threads waits for the end of its parent."""
+    evaluator = aw.evaluator("reach [m]")(lambda arm, task: length_of(arm))
+    pickled = evaluation_process.pickle_problem(aw.Problem(TASK, SPACE, evaluator=evaluator))
+    process = evaluation_process.EvaluationProcess(pickled, timeout=60.0)
+    design = SPACE.sample(1, 0)[0]
+    command = "import armwright.study.evaluation_process as it; it.IDLE_SECONDS = 0.0; it.main()"
+    start = subprocess.Popen
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(subprocess, "Popen", lambda args, **options: start([args[0], "-c", command, args[3]], **options))
+        process._start()
+        assert process._process is not None
+        assert process._process.wait() == evaluation_process.IDLE_EXIT
+    assert process.measure(design) == (pytest.approx(length_of(SPACE.arm(design))),)
+    process.close()
 
 
 @pytest.mark.slow

@@ -152,8 +152,6 @@ def load_problem(
     names = () if objectives is None else tuple(name.strip() for name in objectives.split(","))
     chosen = ()
     if measured is not None:
-        # what the task states of its objectives does not apply to an evaluator's
-        loaded = loaded.model_copy(update={"objectives": None, "reference_point": None, "resolution": ()})
         chosen = named_objectives(names, measured.objectives) if names else measured.objectives
     elif objectives is not None and names != (loaded.objectives or tuple(o.name for o in PAPER_OBJECTIVES)):
         # the task's reference point applies to its own objectives only

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -128,11 +129,16 @@ class Problem:
     def __post_init__(self) -> None:
         """Resolve what the base stands on, device, objectives and constraints.
 
+        What the task states of its objectives does not apply to those of an evaluator.
+
         Raises:
             SpaceError: the base cannot stand on the obstacle that the space names.
             TaskError: reference point or resolution are for other objectives, or a constraint cannot be parsed.
             SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
+        if self.evaluator is not None:
+            nothing: dict[str, Any] = {"objectives": None, "reference_point": None, "resolution": ()}
+            object.__setattr__(self, "task", self.task.model_copy(update=nothing))
         object.__setattr__(self, "space", supported_space(self.space, self.task.obstacles))
         implied = implied_constraints(self.task, self.has_drives, self.space.has_bodies)
         texts = (*self.task.constraints, *implied)

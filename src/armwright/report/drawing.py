@@ -40,7 +40,8 @@ def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Arr
     """Return the limits (2, 2) of a plane of two objectives: low and high of each.
 
     The plane reaches beyond the reference point, but only beyond the largest values if the reference point is more than
-    twice as far in either. It begins at 0, or near the smallest value if all values within the reference point are similar.
+    twice as far in either. It begins at 0, or near the smallest value if all values within the reference point are
+    similar.
 
     Args:
         values: (N, 2) designs to show: those nearer than the limits, else their front.
@@ -54,7 +55,8 @@ def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Arr
         return np.column_stack([np.zeros(2), shown * point])
     best, worst = values.min(axis=0), values.max(axis=0)
     is_far = np.any((worst > 0.0) & (point > FAR_REFERENCE * worst))
-    high = np.where(is_far & (worst > 0.0), FITTED * worst, shown * (point if len(within) else np.maximum(point, worst)))
+    beyond = shown * (point if len(within) else np.maximum(point, worst))
+    high = np.where(is_far & (worst > 0.0), FITTED * worst, beyond)
     low = np.where((best > SIMILAR * high) & (best < point), best - (FITTED - 1.0) * (high - best), 0.0)
     return np.column_stack([low, high])
 

@@ -16,6 +16,7 @@ from armwright.runs.survival import FACTORS, Survival, evaluate_survival
 
 MAX_TRIED = 10  # designs for each role
 VERIFIED, NOT_SIMULATED = "verified", "not simulated"
+BY_EVALUATOR = f"{NOT_SIMULATED}: a custom evaluator measured it"
 OUT_OF_TIME = f"{NOT_SIMULATED}: the time is up"
 
 
@@ -46,7 +47,7 @@ class Recommendation:
         role: Why it is recommended: knee, or least OBJECTIVE.
         design: Its number.
         status: `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the
-            reason if the time was up.
+            reason if the time was up or a custom evaluator measured the design.
         demoted: The designs tried before.
         survival: Which perturbations it survives; None without constraints, or if the time was up.
     """
@@ -75,12 +76,16 @@ def recommend(
 ) -> list[Recommendation]:
     """Return the recommended designs: simulated, unless MuJoCo, a cycle or its durations are missing.
 
+    With a custom evaluator neither our simulation nor our perturbations say what it would measure.
+
     Args:
         history: The trials.
         simulator: Keeps what it simulates; None for a new one.
         has_time: Returns whether there is time.
     """
     roles = candidates(history)
+    if history.problem.evaluator is not None:
+        return [Recommendation(role, numbers[0], BY_EVALUATOR) for role, numbers in roles.items()]
     try:
         simulator = simulator or Simulator(history)
         chosen = [_verified(role, numbers, simulator, has_time, len(roles)) for role, numbers in roles.items()]

@@ -59,7 +59,7 @@ class DesignEncoding:
         """Return the (N, R) real columns of points on the unit cube; points outside it are reflected, then clipped."""
         reflected = 1.0 - np.abs(1.0 - np.abs(units))
         scaled = self._scaled_low + reflected * (self._scaled_high - self._scaled_low)
-        scaled[:, self._log] = np.exp(scaled[:, self._log])
+        scaled[..., self._log] = np.exp(scaled[..., self._log])
         return self._on_grid(np.clip(scaled, self._low, self._high))
 
     def _scaled(self, reals: Array) -> Array:

@@ -181,7 +181,8 @@ def main() -> None:
 
 
 def _end_with_parent() -> None:
-    sys.stdin.buffer.read()
+    while os.read(0, 1):  # not sys.stdin, whose lock this process would need to end by itself
+        pass
     os.killpg(0, signal.SIGKILL)
 
 

@@ -58,6 +58,11 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
     path = Path(path)
     config, _ = read_run(path)
     method = config.study
+    if config.evaluator is not None:
+        raise SettingsError(
+            f"{path} was measured by the evaluator {config.evaluator}, which a refinement would call a thousand times "
+            "for each design; continue the run with a larger --n-total instead"
+        )
     with RunFolder(path) as folder:
         trials = folder.open_trials(config)
         summary = read_summary(path)

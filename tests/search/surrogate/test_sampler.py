@@ -58,7 +58,7 @@ def test_gain_is_bounded_by_what_is_stated_else_by_the_worst_values() -> None:
     seen.failed[2] = True
     worst = np.delete(seen.values, 2, axis=0).max(axis=0)
     assert Surrogate(problem()).reference_point(seen) == pytest.approx(worst)
-    stated = Surrogate(problem(reference_point=(0.4, 1.3)))
+    stated = Surrogate(Problem(TASK.model_copy(update={"reference_point": (0.4, 1.3)})))
     assert stated.reference_point(seen) == pytest.approx([0.4, 1.3])
 
 
@@ -238,6 +238,35 @@ def test_failures_are_avoided() -> None:
     row = surrogate.choose(Observations(known.matrix, values, failed, known.pending), 0)
     assert failed.any()
     assert row[0] > 0.2
+
+
+def test_rare_success_is_sought_among_its_likes() -> None:
+    """One design in fifteen succeeds; the sampler learns from failures before it can model an objective."""
+
+    @aw.evaluator("span [m]", "height [m]")
+    def short(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+        if arm.length > 0.5:
+            raise ValueError("too long")
+        return arm.length, abs(arm.base[2])
+
+    failures = {
+        sampler: [
+            trial.failure is not None
+            for seed in range(3)
+            for trial in aw.optimize(
+                problem(evaluator=short),
+                sampler=sampler,
+                proposer="none",
+                n_init=10,
+                n_total=20,
+                seed=seed,
+                allow_failures=True,
+            ).trials[20:]
+        ]
+        for sampler in ("surrogate", "random")
+    }
+    assert sum(failures["random"]) > 22  # of 30
+    assert sum(failures["surrogate"]) < 15
 
 
 def test_failed_trials_of_a_script_are_not_learned_from() -> None:

@@ -16,11 +16,9 @@ from armwright.problem.problem import Problem
 from armwright.search.callable_names import name_of
 from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.search.surrogate.proposal_screen import Rejection, rejection
-from armwright.search.surrogate.surrogate import Observations, Surrogate
+from armwright.search.surrogate.surrogate import STARTUP, Observations, Surrogate
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import Design
-
-STARTUP = 5  # trials that are random if the study begins with the sampler
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,7 @@ class SurrogateSampler(BaseSampler):
 
     def infer_relative_search_space(self, study: Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
         """Return all parameters of the space; none for an enqueued trial or without enough finished ones."""
-        if "fixed_params" in trial.system_attrs or _n_evaluated(study) < STARTUP:
+        if "fixed_params" in trial.system_attrs or _n_finished(study) < STARTUP:
             return {}
         return distributions(self._surrogate.problem.space)
 
@@ -134,6 +132,7 @@ def has_failed(trial: FrozenTrial) -> bool:
     return trial.state is TrialState.FAIL or not np.all(np.isfinite(trial.values))
 
 
-def _n_evaluated(study: Study) -> int:
-    """Return the number of trials whose evaluation did not fail."""
-    return sum(not has_failed(t) for t in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,)))
+def _n_finished(study: Study) -> int:
+    """Return the number of designs that were evaluated, with or without success."""
+    finished = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.FAIL))
+    return sum(bool(trial.params) for trial in finished)

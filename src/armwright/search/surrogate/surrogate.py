@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from armwright.arrays import Array
 from armwright.pareto import feasible_mask, total_violation
@@ -16,13 +15,16 @@ from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import stated_bounds, with_bounds
 from armwright.search.surrogate.acquisition import Forecast, expected_gain
 from armwright.search.surrogate.candidates import Candidates
-from armwright.search.surrogate.cheap_features import PHYSICS, CheapFeatures, Description, FeatureFunction
-from armwright.search.surrogate.gaussian_process import GaussianProcess, fit
+from armwright.search.surrogate.cheap_features import CheapFeatures, Description, FeatureFunction
+from armwright.search.surrogate.gaussian_process import GaussianProcess, Hyperparameters
 from armwright.search.surrogate.response import ResponseModel, choose_model
+from armwright.search.surrogate.success import SuccessModel, choose_success_model, success_labels
 from armwright.seeding import derived_seed
 
 REFRESH = 20  # trials after which new designs are screened
 MUTANTS = 600  # variations of the present front
+STARTUP = 5  # successful evaluations before objectives are modelled
+RANDOM = 64  # random designs that are considered until then
 GROWTH = 10  # models are chosen anew when the trials have grown by one tenth
 
 
@@ -79,9 +81,24 @@ class Surrogate:
 
     def choose(self, observations: Observations, seed: int) -> Array:
         """Return the (P,) design to evaluate next."""
+        if (~observations.failed).sum() < STARTUP:
+            return self._safest(observations, seed)
         screen = Screen(self, observations)
         matrix, known = self.considered(observations, screen, seed)
         return matrix[int(np.argmax(screen.score(matrix, known)))]
+
+    def _safest(self, observations: Observations, seed: int) -> Array:
+        """Return the (P,) design that is most probable to succeed, of random ones and variations of successful ones.
+
+        Designs that violate constraints are left aside while there are others.
+        """
+        space, rng = self.problem.space, np.random.default_rng(seed)
+        matrix = space.normalised(space.matrix(space.sample(RANDOM, seed)))
+        matrix = np.vstack([matrix, self._mutants(observations, ~observations.failed, rng)])
+        known, success = self._features.describe(matrix), self.success(observations)
+        violation = total_violation(known.violations)
+        probability = np.ones(len(matrix)) if success is None else success.probability(known.inputs)
+        return matrix[int(np.lexsort((-probability, violation))[0])]
 
     def considered(self, observations: Observations, screen: "Screen", seed: int) -> tuple[Array, Description]:
         """Return the (N, P) candidates for the next design, and their description."""
@@ -109,8 +126,7 @@ class Surrogate:
 
     def models(self, observations: Observations) -> tuple[ResponseModel, ...]:
         """Return the model of each objective, chosen with the evaluated designs."""
-        n = len(observations.matrix)
-        used = observations.before(n - n % max(1, n // GROWTH))
+        used = self._used(observations)
         kept = ~used.failed
         values = used.values[kept]
 
@@ -119,6 +135,25 @@ class Surrogate:
             return tuple(choose_model(inputs, column) for column in values.T)
 
         return self._remembered("models", (used.matrix.tobytes(), values.tobytes()), chosen)
+
+    def success(self, observations: Observations) -> SuccessModel | None:
+        """Return the model of the success of evaluations, chosen as those of the objectives; None if nothing failed."""
+        if not observations.failed.any():
+            return None
+        used = self._used(observations)
+        used = used if used.failed.any() else observations
+
+        def chosen() -> tuple[str, Hyperparameters]:
+            return choose_success_model(self.describe_known(used.matrix).inputs, used.failed)
+
+        inputs, hyperparameters = self._remembered("success", (used.matrix.tobytes(), used.failed.tobytes()), chosen)
+        known = self.describe_known(observations.matrix).inputs[inputs]
+        return SuccessModel(inputs, GaussianProcess(known, success_labels(observations.failed), hyperparameters))
+
+    def _used(self, observations: Observations) -> Observations:
+        """Return the designs that models are chosen with: all up to the last tenth."""
+        n = len(observations.matrix)
+        return observations.before(n - n % max(1, n // GROWTH))
 
     def reference_point(self, observations: Observations) -> Array:
         """Return the (M,) bound of the hypervolume that is to grow: as stated, else the worst values so far.
@@ -174,7 +209,7 @@ class Screen:
         self.feasible = kept & feasible_mask(known.violations)
         self._models = surrogate.models(observations)
         self._reference_point = self._transformed(surrogate.reference_point(observations)[None])[0]
-        self._success = _success_process(known, observations.failed)
+        self._success = surrogate.success(observations)
         values = self._transformed(observations.values[kept])
         inputs = known[np.flatnonzero(kept)].inputs
         self._processes = self._learned = self._conditioned(inputs, values)
@@ -236,8 +271,7 @@ class Screen:
         """Return (N,) the probabilities that evaluations succeed."""
         if self._success is None:
             return np.ones(len(known.violations))
-        mean, deviation = self._success.predict(known.inputs[PHYSICS])
-        return np.maximum(ndtr(mean / np.hypot(deviation, np.sqrt(self._success.hyperparameters.noise))), 1e-3)
+        return self._success.probability(known.inputs)
 
     def _transformed(self, values: Array) -> Array:
         """Return the (N, M) objectives as their models see them."""
@@ -259,14 +293,3 @@ class Screen:
         both = {name: np.vstack([table, pending.inputs[name]]) for name, table in inputs.items()}
         self._processes = self._conditioned(both, np.vstack([values, imagined]))
         self._front = np.vstack([self._front, imagined[feasible_mask(pending.violations)]])
-
-
-def _success_process(known: Description, failed: NDArray[np.bool_]) -> GaussianProcess | None:
-    """Return a process of success (1) and failure (-1); None if nothing failed.
-
-    Least-squares classification: Rasmussen & Williams, section 6.5.
-    """
-    if not failed.any():
-        return None
-    labels = np.where(failed, -1.0, 1.0)
-    return GaussianProcess(known.inputs[PHYSICS], labels, fit(known.inputs[PHYSICS], labels))
