@@ -23,7 +23,7 @@ are named by --methods.
 | pd | distance from the targets and work of motors with a PD law, in MuJoCo | 10 to 30 ms |
 | settling | time until the tip rests at the targets, and its distance then | 10 to 30 ms |
 | control | two random smooth functions of the parameters | < 1 ms |
-| simulation | `examples/mujoco_simulation.py:follow` | 0.3 to 0.5 s |
+| simulation | `examples/mujoco_simulation.py:follow` | 40 ms |
 """
 
 import argparse

@@ -107,7 +107,7 @@ def show_check(console: Console, problem: Problem) -> None:
     show_task(console, problem.task, has_drives=problem.has_drives, has_bodies=has_bodies, is_brief=True)
     show_target_table(console, problem)
     show_cycle(console, problem.task)
-    minimised = ", ".join(f"{objective.name} [{objective.unit}]" for objective in problem.objectives)
+    minimised = ", ".join(f"{objective.name}{objective.unit_in_brackets}" for objective in problem.objectives)
     console.print(f"  minimised: {minimised}")
     if ignored := describe_ignored_errors(problem):
         console.print(f"  {ignored}")

@@ -59,8 +59,10 @@ def show_picked_table(console: Console, history: History, picked: Sequence[Front
     quantities = quantities_of_front(history, names)
     minimised = [objective.name for objective in history.problem.objectives]
     further = [name for name in dict.fromkeys(names) if name not in minimised]
-    units = {objective.name: objective.unit for objective in (*QUANTITIES.values(), *history.problem.objectives)}
-    heads = [f"{name.replace('_', ' ')} [{units[name]}]" if name in units else name for name in (*minimised, *further)]
+    units = {
+        objective.name: objective.unit_in_brackets for objective in (*QUANTITIES.values(), *history.problem.objectives)
+    }
+    heads = [f"{name.replace('_', ' ')}{units[name]}" if name in units else name for name in (*minimised, *further)]
     columns = (
         *numbers("#"), Column("source", rank=3), *numbers(*heads), Column("types", rank=1),
         Column("links [m]", rank=4), Column("motors", rank=5, least=12),

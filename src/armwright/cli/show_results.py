@@ -45,7 +45,8 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
         _show_failures(console, history, summary["failures"])
     if summary["duplicates"]:
         console.print(
-            f"{summary['duplicates']} trials repeated the design of an earlier one and were not evaluated again"
+            f"{summary['duplicates']} trial{'s' * (summary['duplicates'] > 1)} repeated the design of an earlier one, "
+            "without another evaluation"
         )
     _show_learned(console, summary.get("surrogate"))
     if summary["proposer"] is not None:

@@ -64,6 +64,11 @@ class Objective:
                 return each
 
     @property
+    def unit_in_brackets(self) -> str:
+        """Its unit behind a name: ` [m]`; empty if it has none."""
+        return f" [{self.unit}]" if self.unit else ""
+
+    @property
     def is_of_targets(self) -> bool:
         """True if each target contributes to it."""
         return self.over != "arm"

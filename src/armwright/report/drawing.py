@@ -74,8 +74,10 @@ def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], limits:
     """
     for i, axis in enumerate("xy"):
         objective = problem.objectives[i]
-        toy = "; toy masses" if objective.name == TORQUE.name and problem.space.is_toy else ""
-        label = f"{objective.label} [{objective.unit.replace(' x ', ' × ')}{toy}]"
+        unit = objective.unit_in_brackets.replace(" x ", " × ")
+        if objective.name == TORQUE.name and problem.space.is_toy:
+            unit = unit.replace("]", "; toy masses]")
+        label = f"{objective.label}{unit}"
         axes.set(**{f"{axis}label": label, f"{axis}lim": tuple(limits[i])})
     if np.all(np.asarray(reference[:2]) <= limits[:, 1]):
         axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)

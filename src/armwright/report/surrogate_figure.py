@@ -43,8 +43,8 @@ def draw_surrogate(history: History, learned: Mapping[str, Any]) -> Figure:
     panels: list[Any] = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
     for k, (objective, one) in enumerate(zip(history.problem.objectives, learned["objectives"], strict=True)):
         _draw_objective(panels[k], one, history.values[numbers, k], sources)
-        unit = objective.unit.replace(" x ", " × ")
-        panels[k].set(xlabel=f"Evaluated [{unit}]", ylabel=f"Predicted from the other designs [{unit}]")
+        unit = objective.unit_in_brackets.replace(" x ", " × ")
+        panels[k].set(xlabel=f"Evaluated{unit}", ylabel=f"Predicted from the other designs{unit}")
         panels[k].set_title(titles[k])
     for axes in panels[len(titles) :]:
         axes.set_visible(False)

@@ -210,7 +210,7 @@ class _Export:
             f"A run of armwright on {self.config.task.name}, seed {self.config.seed}: {len(self.history)} designs, "
             f"{len(front)} on the front, each of these with its URDF as an artifact."
         )
-        heads = ["trial", "joints", *(f"{o.name} [{o.unit}]" for o in objectives), "source", "verdict"]
+        heads = ["trial", "joints", *(f"{o.name}{o.unit_in_brackets}" for o in objectives), "source", "verdict"]
         rows = [
             [str(m.number), m.design.joints, *(f"{v:.4g}" for v in m.values), m.source, verdicts.get(m.number, "")]
             for m in front

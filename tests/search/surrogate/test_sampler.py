@@ -158,6 +158,12 @@ def test_features_that_are_not_finite_numbers_are_refused(value: list[float]) ->
         _ = Surrogate(problem(), lambda design: value).input_names
 
 
+@pytest.mark.parametrize("value", ["long", {"length": 1.0}, [1.0, [2.0]], [None]])
+def test_features_that_are_no_numbers_are_refused(value: object) -> None:
+    with pytest.raises(SettingsError, match="features: expected"):
+        Surrogate(problem(), lambda design: value).describe(observed(problem(), 2).matrix)  # type: ignore[arg-type, return-value]
+
+
 def test_features_of_varying_length_are_refused() -> None:
     with pytest.raises(SettingsError, match="expected 4 finite numbers for every design"):
         _ = Surrogate(problem(load_space("desk-sorting")), lambda design: design.links).input_names

@@ -62,7 +62,8 @@ export function duration(seconds) {
 // Escapes the tags that Plotly interprets.
 export const plain = (text) => String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
 
-export const title = (objective) => plain(`${objective.label} [${objective.unit.replace(" x ", " × ")}]`);
+export const heading = ({ label, unit }) => label + (unit ? ` [${unit.replace(" x ", " × ")}]` : "");
+export const title = (objective) => plain(heading(objective));
 
 export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

@@ -2,7 +2,7 @@
 
 import { showRow } from "./design.js";
 import { listen, set, state } from "./state.js";
-import { $, element, metres, number, plural } from "./format.js";
+import { $, element, heading, metres, number, plural } from "./format.js";
 
 let content = null;
 let sorted = { key: "0", up: true };
@@ -22,7 +22,7 @@ function columns() {
     { key: "number", name: "#", value: (i) => i },
     { key: "source", name: "source", text: true, value: (i) => content.look(i).label },
     ...content.objectives.map((o, k) => ({
-      key: String(k), name: `${o.label} [${o.unit.replace(" x ", " × ")}]`, value: (i) => content.values(i)[k],
+      key: String(k), name: heading(o), value: (i) => content.values(i)[k],
     })),
   ];
   if (head.result.robust !== null) {
@@ -52,8 +52,8 @@ function drawMeanings() {
   const { head } = content, names = [...content.objectives.map((o) => o.name), ...head.constraints.map((c) => c.name)];
   const known = [...new Set(names)].filter((name) => name in head.quantities).map((name) => head.quantities[name]);
   $("meanings").hidden = !known.length;
-  $("meanings").querySelector("dl").replaceChildren(...known.flatMap(({ label, unit, description }) =>
-    [element("dt", {}, `${label} [${unit.replace(" x ", " × ")}]`), element("dd", {}, description)]));
+  $("meanings").querySelector("dl").replaceChildren(...known.flatMap((quantity) =>
+    [element("dt", {}, heading(quantity)), element("dd", {}, quantity.description)]));
 }
 
 // Shows only these designs of the front, in this order until the table is sorted by a column.

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,7 +230,7 @@ class CheapFeatures:
 
 def _checked_features(function: FeatureFunction, designs: Sequence[Design]) -> Array:
     """Return (N, F) the custom features of designs, or raise SettingsError."""
-    rows = [np.atleast_1d(np.asarray(function(design), dtype=np.float64)) for design in designs]
+    rows = [_numbers(function(design)) for design in designs]
     for row, design in zip(rows, designs, strict=True):
         if row.shape != rows[0].shape or row.ndim != 1 or not np.all(np.isfinite(row)):
             raise SettingsError(
@@ -237,6 +238,14 @@ def _checked_features(function: FeatureFunction, designs: Sequence[Design]) -> A
                 f"{dict(design.params)}"
             )
     return np.array(rows)
+
+
+def _numbers(given: Any) -> Array:
+    """Return what a custom function returned as an array; SettingsError if it is not made of numbers."""
+    try:
+        return np.atleast_1d(np.asarray(given, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise SettingsError(f"features: expected numbers, got {given!r}") from None
 
 
 def _is_defined(quantity: Objective, evaluation: Evaluation) -> bool:
