@@ -48,7 +48,8 @@ def answer_schema(problem: Problem, options: PromptOptions) -> dict[str, Any]:
     fields: dict[str, Any] = {parameter.name: _property(parameter) for parameter in problem.space.parameters}
     if options.expects:
         for objective in problem.objectives:
-            text = f"the {objective.symbol} that you expect of this design, summed over all targets{objective.unit_in_brackets}"
+            unit = objective.unit_in_brackets
+            text = f"the {objective.symbol} that you expect of this design, summed over all targets{unit}"
             fields[f"expected_{objective.name}"] = {"type": "number", "description": text}
     fields["reason"] = {"type": "string", "description": "the main reason for this design, in one sentence"}
     if options.proposals > 1:
