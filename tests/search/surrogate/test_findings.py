@@ -116,14 +116,18 @@ def test_ratio_of_scaled_unit_is_in_the_objective_s_unit() -> None:
     torque = lognormal(0)
     text = describe_correction(objective("N m"), 1.2 * torque / 40.0, {TORQUE: torque})
     assert text == "energy is 1.2 times our torque (80 % of designs: 1.2)"
+    text = describe_correction(objective("N m"), torque / 40.0, {TORQUE: torque})
+    assert text == "energy equals our torque (80 % of designs: 1)"
 
 
-def test_long_and_short_arms_have_different_ratios() -> None:
+@pytest.mark.parametrize("quantile", [0.3, 0.5, 0.8])
+def test_long_and_short_arms_have_different_ratios(quantile: float) -> None:
     rng = np.random.default_rng(1)
     lengths, torque = rng.uniform(0.2, 1.0, 60), lognormal(2)
-    values = torque * np.where(lengths > float(f"{np.median(lengths):.2g}"), 1.4, 1.0) * rng.uniform(0.97, 1.03, 60)
+    threshold = float(f"{np.quantile(lengths, quantile):.2g}")
+    values = torque * np.where(lengths > threshold, 1.4, 1.0) * rng.uniform(0.97, 1.03, 60)
     text = describe_correction(objective("N m"), values, {PEAK_TORQUE: torque, LENGTH: lengths})
-    assert f"times our peak torque on arms longer than {np.median(lengths):.2g} m and" in text
+    assert f"times our peak torque on arms longer than {threshold:g} m and" in text
 
 
 def test_small_addition_is_a_difference() -> None:

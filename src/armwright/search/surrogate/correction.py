@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.problem.objective import Objective
@@ -22,6 +23,7 @@ COUNTED = 0.9  # of the designs must have a positive objective and quantity
 SPREAD = 1.5  # the largest 90 % quantile of ratios over their 10 % quantile
 LEAST_VARIATION = 0.2  # interquartile range of the objective's logarithm
 UNEXPLAINED = 0.5  # the largest interquartile range of the ratio's logarithm over that of the objective
+SPLITS = np.linspace(0.1, 0.9, 9)  # quantiles of the lengths between which arms may differ
 LEAST_DIFFERENCE = 1.1  # of median ratios of short and long arms
 LEAST_WITHIN = 0.9  # of the designs, whose difference from a quantity is stated
 DIFFERENCE = 0.1  # the largest such difference over the range of 80 % of the objective's values
@@ -99,15 +101,22 @@ def _describe_ratios(objective: str, quantity: str, ratios: Array, lengths: Arra
     if not whole.is_narrow:
         return "", np.inf
     times, within = whole.describe()
-    return f"{objective} is {times} {quantity} (80 % of designs: {within})", _interquartile(np.log(ratios))
+    relation = "equals" if times == "1 times" else f"is {times}"
+    return f"{objective} {relation} {quantity} (80 % of designs: {within})", _interquartile(np.log(ratios))
 
 
 def _describe_by_length(objective: str, quantity: str, ratios: Array, lengths: Array) -> tuple[str, float] | None:
-    """Return the same apart for arms above and below the rounded median length; None if these do not differ."""
-    threshold = float(f"{np.median(lengths):.2g}")
-    is_long = lengths > threshold
-    if min(is_long.sum(), (~is_long).sum()) < FEWEST_OF_PART:
+    """Return the same apart for arms above and below some length; None if these do not differ.
+
+    The length is the rounded quantile that leaves the least variance of the ratios' logarithms.
+    """
+    logs = np.log(ratios)
+    thresholds = {float(f"{length:.2g}") for length in np.quantile(lengths, SPLITS)}
+    splits = {t: lengths > t for t in sorted(thresholds)}
+    splits = {t: long for t, long in splits.items() if min(long.sum(), (~long).sum()) >= FEWEST_OF_PART}
+    if not splits:
         return None
+    threshold, is_long = min(splits.items(), key=lambda one: _variance_within(logs, one[1]))
     long, short = Ratio(ratios[is_long]), Ratio(ratios[~is_long])
     if not (long.is_narrow and short.is_narrow and long.differs_from(short)):
         return None
@@ -116,8 +125,13 @@ def _describe_by_length(objective: str, quantity: str, ratios: Array, lengths: A
         f"{objective} is {times} {quantity} on arms longer than {threshold:g} m and {other_times} on others "
         f"(80 % of designs: {within} and {other_within})"
     )
-    rest = np.log(ratios) - np.log(np.where(is_long, np.median(long.values), np.median(short.values)))
+    rest = logs - np.log(np.where(is_long, np.median(long.values), np.median(short.values)))
     return text, _interquartile(rest)
+
+
+def _variance_within(values: Array, is_one: NDArray[np.bool_]) -> float:
+    """Return the variance of values (N,) that are in two parts, each about its own mean."""
+    return float(sum(((part - part.mean()) ** 2).sum() for part in (values[is_one], values[~is_one]))) / len(values)
 
 
 def _describe_difference(objective: Objective, values: Array, quantities: Quantities) -> str:
