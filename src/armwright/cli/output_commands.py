@@ -7,7 +7,16 @@ from typing import Annotated
 import typer
 
 from armwright.cli.activity import activity
-from armwright.cli.options import Csv, Json, ModelName, ModelOptionsFile, RunFolder, SpaceFile, load_problem
+from armwright.cli.options import (
+    Csv,
+    EvaluatorName,
+    Json,
+    ModelName,
+    ModelOptionsFile,
+    RunFolder,
+    SpaceFile,
+    load_problem,
+)
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json
 from armwright.exceptions import FailureError, SettingsError
 
@@ -138,6 +147,7 @@ def prompt(
         int | None, typer.Option(help="With --after: print the prompt of this trial as it was sent.")
     ] = None,
     space: SpaceFile = None,
+    evaluator: EvaluatorName = None,
     prompt: Annotated[
         str | None,
         typer.Option(help="Prompt: plus, minus, full, or a template file.", show_default="the run's, else plus"),
@@ -182,9 +192,9 @@ def prompt(
         if number is not None:
             raise SettingsError(f"--number {number} needs --after RUN")
         n_init = 10 if n_init is None else n_init
-        shown = preview(load_problem(task, space), options, n_init=n_init, seed=seed or 0)
+        shown = preview(load_problem(task, space, evaluator=evaluator), options, n_init=n_init, seed=seed or 0)
     else:
-        for option, value in (("--n-init", n_init), ("--seed", seed)):
+        for option, value in (("--n-init", n_init), ("--seed", seed), ("--evaluator", evaluator)):
             if value is not None:
                 raise SettingsError(f"{option} {value} is for a new run; {after} has its own")
         shown = preview_after(

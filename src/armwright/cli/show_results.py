@@ -18,6 +18,7 @@ from armwright.runs.assumptions import count_assumed
 from armwright.runs.history import History
 from armwright.runs.infeasibility import describe_infeasibility
 from armwright.runs.results import REPORT
+from armwright.spaces.custom_parameters import describe_custom
 from armwright.study.direct_search import FrontRun
 from armwright.study.progress import StudyResult
 from armwright.study.refine_run import RefinedRun
@@ -234,9 +235,11 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
 
 def _front_table(history: History, robust: set[int] | None) -> Table:
     objectives = [SHORT_NAMES.get(o, o.name.replace("_", " ")) for o in history.problem.objectives]
+    custom = history.problem.space.custom
     columns = (
         *numbers("#"), Column("source", rank=5), *([] if robust is None else [Column("verdict", rank=1)]),
-        *numbers(*objectives), Column("joints"), Column("base [m]", rank=4), Column("links [m]", rank=3),
+        *numbers(*objectives), Column("joints"), *([Column("parameters", rank=2)] if custom else []),
+        Column("base [m]", rank=4), Column("links [m]", rank=3),
     )  # fmt: skip
     reference = history.reference_point or (math.inf,) * len(objectives)
     inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front
@@ -248,6 +251,7 @@ def _front_table(history: History, robust: set[int] | None) -> Table:
             *(() if robust is None else ("robust" if member.number in robust else "sensitive",)),
             *map(format_value, member.values),
             member.design.joints,
+            *([describe_custom(custom, member.design.params)] if custom else []),
             " ".join(f"{value:5.2f}" for value in member.design.origin),
             " ".join(f"{value:.2f}" for value in member.design.links),
         ]
