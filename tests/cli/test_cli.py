@@ -11,10 +11,13 @@ import threading
 from pathlib import Path
 
 import pytest
+import typer
 import yaml
 from rich.console import Console
+from rich.text import Text
 
 from armwright.cli import search_commands
+from armwright.cli.app import app
 from armwright.cli.progress import study_progress
 from armwright.cli.show_results import show_result
 from armwright.llm import client as chat
@@ -194,6 +197,15 @@ def test_version_and_help() -> None:
         *("report", "live", "prompt", "doctor"),
     ]
     assert "--n-step" in armwright("optimize", "--help").stdout
+
+
+def test_no_bracket_of_a_help_text_is_taken_for_markup() -> None:
+    """Units in brackets vanish from --help unless they are escaped."""
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    texts = [text for command in commands.values() for text in (command.help, *(p.help for p in command.params))]
+    assert sum("[" in (text or "") for text in texts) > 5
+    for text in filter(None, texts):
+        assert Text.from_markup(text).plain == text.replace("\\[", "[")
 
 
 def test_optimize_shows_its_options_in_groups() -> None:

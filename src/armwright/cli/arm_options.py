@@ -17,7 +17,7 @@ BasePose = Annotated[
     typer.Option(
         "--base",
         metavar="X,Y,Z[,YAW]",
-        help="Where base links stand [m], and how far they are turned about the vertical [°].",
+        help=r"Where base links stand \[m], and how far they are turned about the vertical [°].",
         show_default="searched",
     ),
 ]

@@ -31,7 +31,7 @@ def init(
         Path | None, typer.Option("--from", help="CSV file with x, y, z in its first three columns.")
     ] = None,
     unit: Annotated[str, typer.Option(help="Unit of the CSV file: m or mm.")] = "m",
-    offset: Annotated[tuple[float, float, float], typer.Option(help="Offset X Y Z added to every point [m].")] = (
+    offset: Annotated[tuple[float, float, float], typer.Option(help=r"Offset X Y Z added to every point \[m].")] = (
         0,
         0,
         0,
@@ -139,9 +139,9 @@ def actuators(
         str | None, typer.Option(help='Bound of the peak torque, else of the stall torque, such as ">=2" [N m].')
     ] = None,
     speed: Annotated[
-        str | None, typer.Option(help='Bound of the no-load speed, such as ">5" [rad/s] or ">50 rpm".')
+        str | None, typer.Option(help=r'Bound of the no-load speed, such as ">5" \[rad/s] or ">50 rpm".')
     ] = None,
-    mass: Annotated[str | None, typer.Option(help='Bound of the mass, such as "<=0.08" [kg] or "<=80 g".')] = None,
+    mass: Annotated[str | None, typer.Option(help=r'Bound of the mass, such as "<=0.08" \[kg] or "<=80 g".')] = None,
     price: Annotated[str | None, typer.Option(help='Bound of the price, such as "<=60" [USD].')] = None,
     voltage: Annotated[str | None, typer.Option(help="Voltage, such as 12, or a bound [V].")] = None,
     where: Annotated[

@@ -46,13 +46,13 @@ def reach_map(
     spacing: Annotated[
         float | None,
         typer.Option(
-            help="Distance of neighbouring points [m].", show_default="about 2,000 points", rich_help_panel=GRID
+            help=r"Distance of neighbouring points \[m].", show_default="about 2,000 points", rich_help_panel=GRID
         ),
     ] = None,
     box: Annotated[
         str | None,
         typer.Option(
-            help="Smallest, then largest coordinates x,y,z,x,y,z of the points [m].",
+            help=r"Smallest, then largest coordinates x,y,z,x,y,z of the points \[m].",
             show_default="all that the tip reaches",
             rich_help_panel=GRID,
         ),
@@ -70,11 +70,11 @@ def reach_map(
     ] = 1.0,
     payload: Annotated[
         float | None,
-        typer.Option(help="Payload at the tip that the motors have to hold [kg].", rich_help_panel=CONDITIONS),
+        typer.Option(help=r"Payload at the tip that the motors have to hold \[kg].", rich_help_panel=CONDITIONS),
     ] = None,
     clearance: Annotated[
         float | None,
-        typer.Option(help="Least distance from the arm itself and from obstacles [m].", rich_help_panel=CONDITIONS),
+        typer.Option(help=r"Least distance from the arm itself and from obstacles \[m].", rich_help_panel=CONDITIONS),
     ] = None,
     obstacles: Annotated[
         bool,

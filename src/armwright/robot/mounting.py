@@ -65,8 +65,8 @@ def mounted(described: UrdfArm, mounting: Mounting) -> UrdfArm:
     if yaw != 0.0:
         if not can_turn(arm):
             raise SettingsError(
-                f"yaw = {yaw:g} rad: expected an arm whose first joint turns about the vertical, got "
-                f'"{described.joints[0]}" of {described.name}; leave the yaw out'
+                f"base turned by {math.degrees(yaw):g}°: expected an arm whose first joint turns about the vertical, "
+                f'which "{described.joints[0]}" of {described.name} does not; leave the turn out'
             )
         first = arm.joints[0]
         middle = (first.lower + first.upper) / 2.0

@@ -83,7 +83,12 @@ def urdf_sheet(
         actuators: Those of its joints by name that `driven` has put there.
         job: What it is there for.
         price: Its price as stated, in place of that of its parts [USD].
+
+    Raises:
+        SettingsError: If the price is not a finite number of at least 0.
     """
+    if price is not None and not 0.0 <= price < np.inf:
+        raise SettingsError(f"price: expected a finite number of at least 0 USD, got {price:g}")
     actuators, arm = actuators or {}, described.arm
     if job is None:
         arm = replace(arm, safety_factor=SAFETY_FACTOR)
