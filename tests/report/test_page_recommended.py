@@ -12,6 +12,7 @@ from playwright.sync_api import Browser
 import armwright as aw
 from armwright.problem.objectives import QUANTITIES
 from armwright.report.page import write_report
+from armwright.runs.datasheet.design_sheet import design_sheet
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.runs.results import read_summary
@@ -97,7 +98,7 @@ def test_cards_state_what_the_kernels_compute(
     def value(name: str) -> float:
         return float(QUANTITIES[name](evaluation)[0])
 
-    assert stated["Reach"] == f"{1e3 * arm.reach:.3g} mm"
+    assert stated["Reach"] == f"{1e3 * design_sheet(run, number).reach:.3g} mm"
     assert stated["Price"] == f"{value('price'):,.0f} USD"
     assert stated["Mass"] == f"{arm.mass:.3g} kg"
     assert stated["Cycle time"] == f"{value('cycle_time'):.3g} s"

@@ -9,6 +9,7 @@ from armwright.tasks.moments import MAX_MASS
 
 MOST_DECIMALS = 3
 ENOUGH = 3  # significant digits
+SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (math.degrees(1.0), "°")}  # of objectives
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def key_figures(sheet: DataSheet) -> Table:
         ("current", f"{NOT_STATED} ({sheet.missing['supply']})" if sheet.peak_current is None else supply),
         ("price", _stated(sheet, "price", "USD") if sheet.price is None else f"{money(sheet.price)} USD"),
     ]
-    rows += [("objective " + name, f"{number(value)} {unit}") for name, (value, unit) in sheet.objectives.items()]
+    rows += [("objective " + name, _objective(value, unit)) for name, (value, unit) in sheet.objectives.items()]
     return Table("Key figures", (), tuple(rows), (0, 1))
 
 
@@ -158,6 +159,12 @@ def sensitivity_table(sheet: DataSheet) -> Table:
     shown = [f"{', '.join(parts)} {reason}" for reason, parts in parts_by_reason.items()]
     note = f"Impossible: {'; '.join(shown)}." if shown else sheet.missing.get("sensitivities", "")
     return Table("Sensitivities", header, rows, (0, 1, 7), note)
+
+
+def _objective(value: float | None, unit: str) -> str:
+    """Return an objective, a length in millimetres and an angle in degrees."""
+    factor, shown = SHOWN_UNITS.get(unit, (1.0, unit))
+    return number(value) if value is None else f"{number(value, factor)} {shown}".rstrip()
 
 
 def _stated(sheet: DataSheet, key: str, unit: str, factor: float = 1.0) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
+from armwright.kinematics.reach_postures import postures_over_reach
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import QUANTITIES
@@ -39,8 +40,8 @@ def recommended_designs(history: History, recommended: Sequence[Mapping[str, Any
         recommended: The recommendations of a summary, several of which may be of one design.
 
     Returns:
-        design, status and survival as in the summary; roles: all its roles; reach [m]; quantities: what else it can
-        do, by name; loads: what its joints do along the cycle, None if that is not known.
+        design, status and survival as in the summary; roles: all its roles; reach: of its data sheet [m]; quantities:
+        what else it can do, by name; loads: what its joints do along the cycle, None if that is not known.
     """
     numbers = list(dict.fromkeys(one["design"] for one in recommended))
     if not numbers:
@@ -56,7 +57,7 @@ def recommended_designs(history: History, recommended: Sequence[Mapping[str, Any
                 "roles": [one["role"] for one in entries],
                 "status": entries[0]["status"],
                 "survival": entries[0]["survival"],
-                "reach": history.member(number).arm.reach,
+                "reach": postures_over_reach(history.member(number).arm, (1.0,)).reach,
                 "quantities": {name: float(each[row]) for name, each in quantities.items() if each is not None},
                 "loads": _loads(history, evaluation, row, number),
             }

@@ -6,7 +6,7 @@ import { listen, set, state } from "./state.js";
 import { $, element, onTheme, plural, quantity, why } from "./format.js";
 
 const ROLES = { knee: "Best compromise" };
-const REACH = "The largest distance of the tip from the first joint, with the arm stretched out.";
+const REACH = "The largest horizontal distance of the tip from the first joint.";
 
 let content = null;
 
