@@ -176,7 +176,7 @@ def resimulated(params: dict[str, Any]) -> list[float]:
 
 def compare_engines(file: Path, most: int) -> None:
     """Print the rank correlation of the engines over the designs of all fronts."""
-    members = [member for line in read(file) for member in line["front"]]
+    members = [member for line in read(file) for member in line.get("front", ())]
     rows = np.unique(np.linspace(0, len(members) - 1, most).round().astype(int))
     first = np.array([members[i]["values"] for i in rows])
     second = np.array([resimulated(members[i]["params"]) for i in rows])
