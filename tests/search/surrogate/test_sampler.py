@@ -246,6 +246,16 @@ def test_failures_are_avoided() -> None:
     assert row[0] > 0.2
 
 
+def test_late_successes_are_modelled() -> None:
+    """All five successes are among the last tenth, which models are otherwise not chosen with."""
+    p = problem()
+    known = observed(p, 109)
+    failed = np.arange(109) < 104
+    values = np.where(failed[:, None], np.inf, known.values)
+    row = Surrogate(p).choose(Observations(known.matrix, values, failed, known.pending), 0)
+    assert p.space.designs(row[None])
+
+
 def test_rare_success_is_sought_among_its_likes() -> None:
     """One design in fifteen succeeds; the sampler learns from failures before it can model an objective."""
 

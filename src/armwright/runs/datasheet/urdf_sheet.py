@@ -117,7 +117,7 @@ def urdf_sheet(
     if existing is not None:
         sheet = _on_task(sheet, existing)
     if price is not None:
-        sheet = replace(sheet, assumptions={**sheet.assumptions, "price": "as given to --price"})
+        sheet = replace(sheet, assumptions={**sheet.assumptions, "price": "as stated by the user"})
     return replace(sheet, missing=_missing(sheet, existing))
 
 

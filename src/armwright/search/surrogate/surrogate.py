@@ -127,6 +127,7 @@ class Surrogate:
     def models(self, observations: Observations) -> tuple[ResponseModel, ...]:
         """Return the model of each objective, chosen with the evaluated designs."""
         used = self._used(observations)
+        used = used if (~used.failed).sum() >= STARTUP else observations
         kept = ~used.failed
         values = used.values[kept]
 
