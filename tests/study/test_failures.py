@@ -167,7 +167,7 @@ def test_run_goes_on_if_one_of_the_first_evaluations_succeeds() -> None:
     assert [member.number for member in found.front] == [1]
 
 
-def test_reference_point_waits_for_the_first_success(tmp_path: Path) -> None:
+def test_reference_point_follows_the_first_five_successes(tmp_path: Path) -> None:
     calls: list[int] = []
 
     @aw.evaluator("reach [m]")
@@ -183,9 +183,27 @@ def test_reference_point_waits_for_the_first_success(tmp_path: Path) -> None:
         points.append(progress.hypervolume)
 
     found = aw.optimize(aw.Problem(TASK, SPACE, evaluator=later), **SHORT, allow_failures=True, watch=watch)
-    first = int(np.flatnonzero(~found.history.failed)[0])
-    assert found.config.reference_point == pytest.approx([1.1 * found.history.values[first, 0]])
+    values = found.history.values[~found.history.failed, 0]
+    assert found.config.reference_point == pytest.approx([1.1 * values[:5].min()])
     assert points[-1] == pytest.approx(found.summary["hypervolume"]["final"])
+
+
+def test_reference_point_of_rare_successes_is_the_same_after_a_resumption(tmp_path: Path) -> None:
+    @aw.evaluator("reach [m]", "height [m]")
+    def rare(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+        if arm.base[0] < 0.3:
+            raise ValueError("out of reach")
+        return length_of(arm), 1.0 + arm.base[2]
+
+    problem = aw.Problem(TASK, SPACE, evaluator=rare)
+    settings: dict[str, Any] = {"proposer": "none", "sampler": "random", "n_init": 6, "allow_failures": True}
+    whole = aw.optimize(problem, **settings, n_total=24, out=tmp_path / "whole")
+    points = []
+    for n_total in (2, 8, 24):
+        points.append(aw.optimize(problem, **settings, n_total=n_total, out=tmp_path / "parts").config.reference_point)
+    assert points[-1] == whole.config.reference_point
+    assert points[0] != points[-1]  # fewer than five have succeeded
+    assert 0.0 < whole.history.failed.mean() < 1.0
 
 
 @pytest.mark.slow

@@ -33,6 +33,7 @@ INITIAL_DESIGN = "initial_design"  # of the user, such as an existing arm
 REFINE = "refine"  # a refined design of the front
 FRONT_SEARCH = "front_search"
 NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, REFINE, FRONT_SEARCH)
+FEW = 5  # successful trials that a reference point is chosen from
 # Properties that a longer history extends.
 CACHED = ("values", "violations", "masked_objectives", "front", "proposed", "_hypervolumes", "_first_of")
 
@@ -198,14 +199,23 @@ class History:
     def found_reference_point(self) -> tuple[float, ...] | None:
         """Choose a reference point: from the bounds that the constraints imply, else from the first n_init trials.
 
-        If all of these failed, the trials up to the first that did not; None without one.
+        If fewer than FEW of these succeeded, the trials up to the FEW-th success, or all so far; None without any.
         """
-        succeeded = np.flatnonzero(~self.failed)
+        succeeded = np.flatnonzero(~self.failed)[: self._n_needed]
         if not len(succeeded):
             return None
-        first = slice(max(self.n_init, int(succeeded[0]) + 1))
+        first = slice(max(self.n_init, int(succeeded[-1]) + 1))
         found = found_reference_point(self.values[first], self.violations[first])
         return with_bounds(found, stated_bounds(self.problem))
+
+    @property
+    def has_reference_trials(self) -> bool:
+        """Whether enough trials have succeeded for a reference point that further ones do not change."""
+        return len(self) >= self.n_init and int((~self.failed).sum()) >= self._n_needed
+
+    @property
+    def _n_needed(self) -> int:
+        return max(1, min(FEW, self.n_init))
 
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
         """Evaluate the designs of these trials again; the result is equal to the bit."""

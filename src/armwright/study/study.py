@@ -172,6 +172,7 @@ class Study:
         self._n_refined = sum(trial.refines is not None for trial in self._trials)
         self._latest = History(problem, (), self._method.n_init, config.reference_point, self._method)
         self._tracker = FrontTracker(n_objectives, config.reference_point)
+        self._is_frozen = problem.reference_point is not None
         for values in self._history().masked_objectives:
             self._tracker.add(values)
         self._freeze_reference_point()
@@ -413,11 +414,16 @@ class Study:
         return self._latest
 
     def _freeze_reference_point(self) -> None:
-        """Store a reference point that the task leaves open, once the random trials give it."""
-        if self._config.reference_point is None and len(self._trials) >= self._method.n_init:
-            reference_point = self._history().found_reference_point()
-            if reference_point is None:  # no evaluation succeeded yet
-                return
+        """Store a reference point that the task leaves open, once the random trials give it.
+
+        It follows the trials until enough of them have succeeded.
+        """
+        if self._is_frozen or len(self._trials) < self._method.n_init:
+            return
+        history = self._history()
+        self._is_frozen = history.has_reference_trials
+        reference_point = history.found_reference_point()
+        if reference_point is not None and reference_point != self._config.reference_point:
             self._config = self._config.model_copy(update={"reference_point": reference_point})
             self._tracker.set_reference_point(reference_point)
             if self._folder is not None:
