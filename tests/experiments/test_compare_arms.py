@@ -171,7 +171,7 @@ def test_designs_and_arms_have_the_values_of_their_data_sheets(run: Path, compar
         assert tuple(value for value, _ in sheet.objectives.values()) == design.values
     for arm, file in zip(compared.arms, (UR5, PANDA), strict=True):
         placement = placed(compared.problem, read_urdf(file), seed=0)
-        sheet = urdf_sheet(placement.described, job=Job(compared.problem, placement.description))
+        sheet = urdf_sheet(placement.described, job=Job(compared.problem, placement.mounting, placement.description))
         assert (sheet.reach, sheet.payload_at_full_reach) == (arm.reach, arm.payload_at_full_reach)
         assert (sheet.mass, sheet.price, sheet.violated) == (arm.mass, arm.price, arm.violated)
         assert sheet.position_error == arm.measures["worst_error"]

@@ -254,7 +254,7 @@ def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
     task = Task(name="feeder", targets=((0.4, -0.2, 0.3), (0.4, 0.2, 0.3), (0.1, 0.4, 0.5)))
     problem = aw.Problem(task, DesignSpace.model_validate(SPACE))
     there = mounted(described, Mounting((0.0, 0.0, 0.0), 0.4))
-    sheet = urdf_sheet(there, job=Job(problem, "here"))
+    sheet = urdf_sheet(there, job=Job(problem, Mounting((0.0, 0.0, 0.0), 0.4), "here"))
     model = pinocchio.buildModelFromUrdf(str(robot("panda")))
     places = [model.joints[model.getJointId(joint.name)].idx_q for joint in sheet.joints]
     assert [joint.lower for joint in sheet.joints] == pytest.approx(model.lowerPositionLimit[places], abs=1e-12)
@@ -267,8 +267,37 @@ def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
         assert joint.used is not None
         assert joint.unused == pytest.approx((joint.used[0] - joint.lower, joint.upper - joint.used[1]), abs=1e-12)
     assert sheet.assumptions["place"] == "here"
+    assert (sheet.base_position, sheet.base_yaw) == ((0.0, 0.0, 0.0), 0.4)
+    assert not sheet.drawing.is_at_zero  # the fourth joint cannot be at 0
+    values = np.clip(pinocchio.neutral(model), model.lowerPositionLimit, model.upperPositionLimit)
+    data = model.createData()
+    pinocchio.framesForwardKinematics(model, data, values)
+    tip = data.oMf[model.getFrameId(described.tip, pinocchio.FrameType.BODY)].translation
+    end = pinocchio.utils.rotate("z", 0.4) @ tip
+    assert sheet.drawing.links[-1][2] == pytest.approx(end, abs=1e-6)
     assert sheet.missing.keys() >= {"payload", "cycle_time", "deflection"}
     assert sheet.position_error is not None
+
+
+def test_efforts_and_speeds_that_the_cycle_exceeds_are_stated() -> None:
+    """A URDF states no corner speed, so that its utilisation is unknown, but its effort and its speed are limits."""
+    points = ((0.5, -0.3, 0.2), (0.5, 0.3, 0.2))
+    cycle = {"time": 0.2, "steps": [{"to": 1}, {"to": 2}]}
+    task = Task(name="fast", targets=points, payload=2.0, cycle=cycle)  # type: ignore[arg-type]
+    problem = aw.Problem(task, DesignSpace(joints=3))
+    arm = replace(read_urdf(robot("ur5_robot")).arm, safety_factor=1.5)
+    described = replace(read_urdf(robot("ur5_robot")), arm=arm)
+    sheet = urdf_sheet(described, job=Job(problem, Mounting(), "here"))
+    evaluation = problem.physics_of_arms(stack_arms([arm]))
+    torque = np.abs(evaluation.loads.torques[0]).max(axis=(0, 1))
+    speed = np.abs(evaluation.loads.speeds[0]).max(axis=(0, 1))
+    efforts = np.array([joint.effort for joint in arm.joints])
+    speeds = np.array([joint.speed for joint in arm.joints])
+    assert [joint.peak_utilisation for joint in sheet.joints] == pytest.approx(1.5 * torque / efforts, rel=1e-5)
+    assert (1.5 * torque / efforts).max() > 1.0
+    assert (speed / speeds).max() > 1.0
+    assert f"along the cycle it needs {(1.5 * torque / efforts).max():.0%} of one, safety" in sheet.violated[-2]
+    assert sheet.violated[-1] == f"its speeds (along the cycle it needs {(speed / speeds).max():.0%} of one)"
 
 
 def test_command_places_an_existing_arm_on_a_task(tmp_path: Path) -> None:

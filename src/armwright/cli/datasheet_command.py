@@ -45,7 +45,7 @@ def datasheet(
     price: Annotated[float | None, typer.Option(help="Price of an arm that exists [USD].")] = None,
     tip: Tip = None,
     base_link: BaseLink = None,
-    seed: Annotated[int, typer.Option(help="Seed of the base search.")] = 0,
+    seed: Annotated[int | None, typer.Option(help="Seed of the base search.", show_default="0")] = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Output folder.", show_default="designs/NNNN of the run, or NAME-datasheet"),
@@ -61,7 +61,7 @@ def datasheet(
 
     if Path(source).is_dir():
         of_urdf = {"--actuators": actuators, "--task": task, "--space": space, "--base": base, "--price": price,
-                   "--tip": tip, "--base-link": base_link}  # fmt: skip
+                   "--tip": tip, "--base-link": base_link, "--seed": seed}  # fmt: skip
         for option, value in of_urdf.items():
             if value is not None:
                 raise SettingsError(f"{option} {value}: expected a URDF, got the run {source}, which has its own arms")
@@ -76,7 +76,7 @@ def datasheet(
                 raise SettingsError(f"{option} {value}: expected a task, too; try --task TASK")
         with activity("placing the arm" if task and base is None else "writing the data sheet"):
             described = read_urdf(find_urdf(source), tip, base_link)
-            sheet = _sheet_of_urdf(described, actuators, task, space, base, price, seed)
+            sheet = _sheet_of_urdf(described, actuators, task, space, base, price, seed or 0)
         folder = Path(f"{Path(source).stem}-datasheet")
     files = write_datasheet(sheet, folder if out is None else out)
     if json_:
@@ -106,4 +106,4 @@ def _sheet_of_urdf(
         return urdf_sheet(described, named, price=price)
     problem = load_problem(task, space)
     placement = placed(problem, described, seed, parse_base(base))
-    return urdf_sheet(placement.described, named, Job(problem, placement.description), price)
+    return urdf_sheet(placement.described, named, Job(problem, placement.mounting, placement.description), price)

@@ -16,7 +16,6 @@ from armwright.cli.options import (
     ModelOptionsFile,
     Scheduler,
     SpaceFile,
-    TaskName,
     select_workers,
 )
 from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_csv, print_json
@@ -156,7 +155,9 @@ def compare(
 
 
 def compare_arms(
-    task: TaskName,
+    task: Annotated[
+        str, typer.Argument(metavar="TASK", help="A built-in task (see `armwright tasks`), or a YAML file.")
+    ],
     arms: Annotated[
         list[str],
         typer.Argument(

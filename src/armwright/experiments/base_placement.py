@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.exceptions import SettingsError
 from armwright.kinematics.arm_arrays import stack_arms
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.existing_arm import known_values
@@ -72,7 +73,12 @@ def placed(problem: Problem, described: UrdfArm, seed: int, mounting: Mounting |
         described: The arm, its base link at the origin.
         seed: Of the search for the base.
         mounting: Where the base link stands; None to search.
+
+    Raises:
+        SettingsError: If the seed is negative, or the arm cannot be turned as the mounting demands.
     """
+    if seed < 0:
+        raise SettingsError(f"seed: expected a whole number of at least 0, got {seed}")
     arm = with_tool(with_travel(described.arm, problem.space.travel), problem.task.tool)
     equipped = replace(described, arm=replace(arm, safety_factor=problem.space.safety_factor))
     if mounting is not None:

@@ -1,5 +1,6 @@
 """What is known of an existing arm on a task: a URDF may lack drives, prices and the shape of links."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,13 @@ from armwright.exceptions import SettingsError
 from armwright.problem.constraints import Constraint
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import CLEARANCE_QUANTITIES, PRICE
+from armwright.problem.objectives import (
+    CLEARANCE_QUANTITIES,
+    CYCLE_TIME,
+    DYNAMIC_UTILISATION,
+    PRICE,
+    SPEED_UTILISATION,
+)
 from armwright.problem.problem import Problem
 from armwright.text import rounded
 
@@ -58,12 +65,27 @@ class ExistingArm:
 
     @property
     def violated(self) -> tuple[str, ...]:
-        """The constraints that it violates, with what it has."""
-        return tuple(
+        """The constraints that it violates, with what it has, and the limits of its own drives along the cycle."""
+        of_task = tuple(
             f"{constraint.description} (it has {rounded(measured)})"
             for constraint, measured in self._measured
             if measured is not None and float(constraint.violation(np.array(measured))) > 0.0
         )
+        return of_task + tuple(self._overloads)
+
+    @property
+    def _overloads(self) -> Iterator[str]:
+        """Yield which efforts and speeds of the URDF the cycle exceeds; corner speeds, which it lacks, aside."""
+        drives, bounded = self.evaluation.arms.actuation, {c.quantity for c in self.problem.constraints}
+        if drives is None or self.evaluation.cycle_paths is None or self.value(CYCLE_TIME) is None:
+            return
+        loads = self.evaluation.loads
+        torque = drives.safety_factor[0] * np.abs(loads.torques[0]).max(axis=(0, 1)) / drives.peak[0]
+        speed = np.abs(loads.speeds[0]).max(axis=(0, 1)) / drives.no_load_speed[0]
+        if np.nanmax(torque, initial=0.0) > 1.0 and self.value(DYNAMIC_UTILISATION) is None:
+            yield f"its efforts (along the cycle it needs {np.nanmax(torque):.0%} of one, safety factor included)"
+        if np.nanmax(speed, initial=0.0) > 1.0 and SPEED_UTILISATION not in bounded:
+            yield f"its speeds (along the cycle it needs {np.nanmax(speed):.0%} of one)"
 
     @property
     def undecided(self) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ MM = 1e3
 
 
 def draw_side(axes: Any, sheet: DataSheet) -> None:
-    """Draw the arm with all joints at 0 from the side, its dimensions, and the outline of its reach."""
+    """Draw the arm from the side, with its joints at 0 or the nearest limit, its dimensions, and what it reaches."""
     drawing = sheet.drawing
     outline = _points(drawing.side)
     axes.fill(*(MM * outline.T), facecolor=REACHED, edgecolor=LINK, linewidth=0.8, zorder=1)
@@ -46,7 +46,8 @@ def draw_side(axes: Any, sheet: DataSheet) -> None:
     _label(axes, labels, high[0], (high - low)[1])
     _frame(axes, low, high + ROOM * np.array([(high - low)[0], 0.0]), "x [mm]", "z [mm]")
     top, bottom = MM * outline[:, 1].max(), MM * outline[:, 1].min()
-    axes.set_title(f"Side view, joints at 0; tip from z = {bottom:.0f} to {top:.0f} mm")
+    posture = "joints at 0" if drawing.is_at_zero else "joints at 0 or the limit next to it"
+    axes.set_title(f"Side view, {posture}; tip from z = {bottom:.0f} to {top:.0f} mm")
 
 
 def draw_top(axes: Any, sheet: DataSheet) -> None:
@@ -73,7 +74,7 @@ def draw_top(axes: Any, sheet: DataSheet) -> None:
     axes.plot(*(MM * base), marker="s", markersize=5, color=FRONT, zorder=4)
     _frame(axes, low, high, "x [mm]", "y [mm]")
     starred = "; stars: targets" if len(targets) else ""
-    axes.set_title(f"Top view, tip within R = {MM * distance.max():.0f} mm{starred}")
+    axes.set_title(f"Top view, tip within R = {MM * sheet.reach:.0f} mm{starred}")
 
 
 def draw_payload(axes: Any, sheet: DataSheet) -> None:

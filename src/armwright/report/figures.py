@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from armwright.report.drawing import (
     several_panels,
     write_drawn,
 )
-from armwright.report.point_labels import PointLabel, place_labels
+from armwright.report.point_labels import PointLabel, place_labels, place_legend
 from armwright.report.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
 from armwright.report.surrogate_figure import draw_surrogate
 from armwright.runs.attribution import front_by_source, gained_by_source
@@ -37,6 +38,7 @@ from armwright.runs.results import FIGURES, read_summary
 
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials; 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # drawn part of the plane, as a multiple of the reference point
+OVERLAP = 0.01  # of the limits of the axes: marks that are nearer to each other overlap
 MARK_PAD = 0.08  # [inch] around a panel with marks on its edge
 
 
@@ -220,15 +222,13 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
         if np.all(np.array(m.values[:2]) <= limits[:, 1])
     ]
     arms = _draw_existing(axes, limits[:, 1], existing)
-    if arms:  # where no lines lead to their marks
-        axes.legend(handles=[*_legend(history), _mark(EXISTING)], loc="best")
-    else:
-        axes.legend(handles=_legend(history), loc="upper right")
     area = hypervolume(history.masked_objectives, reference)
     n = len(history.front)
     axes.set_title(f"{history.problem.task.name}: {n} design{'s' * (n != 1)} on the front, hypervolume {area:.2f}")
     marks = [(reference[0], reference[1]), *((m.values[0], m.values[1]) for m in history.front)]
     marks = [mark for mark in marks if np.all(np.array(mark) <= limits[:, 1])]
+    handles = [*_legend(history), *([_mark(EXISTING)] if arms else [])]
+    place_legend(axes, handles, [*marks, *(label.at for label in labels + arms)])
     place_labels(axes, labels + arms, marks)
     return figure
 
@@ -236,7 +236,8 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
 def _draw_existing(axes: Any, edge: Array, existing: Sequence[ComparedArm]) -> list[PointLabel]:
     """Draw existing arms in the plane of the first two objectives and return their labels.
 
-    An arm outside the drawn part is placed at its edge (2,), with its values in the label.
+    An arm outside the drawn part is placed at its edge (2,), with its values in the label. Arms whose marks
+    overlap share a label.
     """
     labels: list[PointLabel] = []
     for arm in existing:
@@ -246,7 +247,12 @@ def _draw_existing(axes: Any, edge: Array, existing: Sequence[ComparedArm]) -> l
         x, y = np.minimum(place, edge).tolist()
         beyond = "" if np.all(place <= edge) else f"\nbeyond, at {_short(place[0])}, {_short(place[1])}"
         axes.scatter(x, y, **EXISTING.points | {"edgecolors": FRONT}, zorder=6, clip_on=False)
-        labels.append(PointLabel(f"{arm.name}{beyond}", (x, y), EXISTING.colour))
+        label = PointLabel(f"{arm.name}{beyond}", (x, y), EXISTING.colour)
+        near = [i for i, one in enumerate(labels) if np.all(np.abs(np.subtract(one.at, label.at)) < OVERLAP * edge)]
+        if near:
+            labels[near[0]] = replace(labels[near[0]], text=f"{labels[near[0]].text}\n{label.text}")
+        else:
+            labels.append(label)
     return labels
 
 

@@ -74,7 +74,10 @@ def mounted(described: UrdfArm, mounting: Mounting) -> UrdfArm:
         lower, upper = max(first.lower + shift, -MAX_ANGLE), min(first.upper + shift, MAX_ANGLE)
         arm = replace(arm, joints=(replace(first, lower=lower, upper=upper), *arm.joints[1:]))
         zero = described.zeros[0] - described.signs[0] * shift
-        described = replace(described, zeros=(zero, *described.zeros[1:]))
+        notes = described.notes
+        if upper - lower < first.upper - first.lower:
+            notes = (*notes, f"not the whole range of {described.joints[0]} is used, because the base is turned")
+        described = replace(described, zeros=(zero, *described.zeros[1:]), notes=notes)
         cos, sin = math.cos(yaw), math.sin(yaw)
         x, y = cos * x - sin * y, sin * x + cos * y
     across, along, up = mounting.position

@@ -77,7 +77,7 @@ function range(k) {
   if (reference === null) return undefined;
   const all = [...Array(content.n).keys()].filter((i) => !content.hasFailed(i)), feasible = all.filter((i) => content.isFeasible(i));
   const within = (feasible.length ? feasible : all).filter((i) => [x, y].every((m) => content.values(i)[m] <= VIEW * reference[m]));
-  const shown = within.length ? within : frontUntil(content.n);
+  const front = frontUntil(content.n), shown = within.length ? within : front.length ? front : all;
   if (!shown.length) return [0, VIEW * reference[k]];
   const largest = (m) => Math.max(...shown.map((i) => content.values(i)[m]));
   const best = Math.min(...shown.map((i) => content.values(i)[k])), worst = largest(k);

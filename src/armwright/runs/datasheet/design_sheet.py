@@ -69,6 +69,8 @@ def sheet_of(history: History, member: FrontMember, verdict: Verdict) -> DataShe
         name=problem.task.name,
         design=member.number,
         joint_letters=member.design.joints,
+        base_position=arm.base,
+        base_yaw=0.0,
         role=verdict.role,
         status=verdict.status,
         survival=verdict.survival,

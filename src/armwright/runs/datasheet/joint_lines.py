@@ -82,8 +82,9 @@ def _needs(evaluation: Evaluation) -> dict[str, Array]:
     torques, speeds = (values[:1].reshape(1, -1, dof) for values in (loads.torques, loads.speeds))
     need["torque"] = np.maximum(at_rest, np.abs(torques).max(axis=(0, 1)))
     if drives is not None:
-        moving = torque_speed_utilisation(torques, speeds, drives).max(axis=(0, 1))
-        need["peak_utilisation"] = np.fmax(need["peak_utilisation"], moving)
+        share = drives.safety_factor[0] * need["torque"] / drives.peak[0]
+        moving = torque_speed_utilisation(torques, speeds, drives).max(axis=(0, 1))  # NaN without a corner speed
+        need["peak_utilisation"] = np.fmax(share, moving)
         need["speed_utilisation"] = np.abs(speeds).max(axis=(0, 1)) / drives.no_load_speed[0]
         need["thermal_utilisation"] = drives.safety_factor[0] * loads.rms_torques[0] / drives.continuous[0]
     return need

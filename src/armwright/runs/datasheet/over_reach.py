@@ -1,5 +1,7 @@
 """Payload, deflection and backlash of an arm over its reach, and its drawing."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from armwright.arrays import Array
@@ -39,13 +41,21 @@ def _deflections(postures: ReachPostures, payload: float) -> Array:
     return deflections_over_reach(postures, stiffness, payload)
 
 
-def drawing_of(arm: Arm, targets: Array) -> Drawing:
-    """Return the drawing of an arm; targets: (T, 3) [m], or none."""
-    q = [min(max(0.0, joint.lower), joint.upper) for joint in arm.joints]
+def drawing_of(arm: Arm, targets: Array, zeros: Sequence[float] | None = None) -> Drawing:
+    """Return the drawing of an arm.
+
+    Args:
+        arm: The arm.
+        targets: (T, 3) [m], or none.
+        zeros: Values of the joints that count as 0; 0 by default.
+    """
+    zeros = [0.0] * len(arm.joints) if zeros is None else zeros
+    q = [min(max(zero, joint.lower), joint.upper) for joint, zero in zip(arm.joints, zeros, strict=True)]
     lines = [(_vector(start), _vector(end)) for start, end in link_lines(arm, q)]
     numbers = [*range(1, len(arm.links) + 1), 0]
     return Drawing(
         base=arm.base,
+        is_at_zero=np.allclose(q, zeros),
         links=tuple((number, *line) for number, line in zip(numbers, lines, strict=True)),
         column=None if arm.column is None else arm.column.length,
         targets=tuple(_vector(target) for target in targets),

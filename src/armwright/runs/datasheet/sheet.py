@@ -18,8 +18,8 @@ UNITS: Mapping[str, str] = {
     "mean_current": "A", "voltage": "V", "lower": "rad, or m of a prismatic joint", "upper": "as lower",
     "used": "as lower", "unused": "as lower", "torque": "N m, or N of a prismatic joint", "peak_torque": "as torque",
     "peak_utilisation": "of the peak torque, safety factor included", "speed_utilisation": "of the no-load speed",
-    "thermal_utilisation": "of the continuous torque, safety factor included", "base": "m", "points": "m",
-    "targets": "m", "links": "m",
+    "thermal_utilisation": "of the continuous torque, safety factor included", "base": "m",
+    "base_position": "m", "base_yaw": "rad", "points": "m", "targets": "m", "links": "m",
 }  # fmt: skip
 
 
@@ -162,6 +162,7 @@ class Drawing:
 
     Attributes:
         base: The position of the first joint.
+        is_at_zero: Whether all joints are at 0; if not, some are at the limit nearest to it.
         links: Start and end of each link and of the tool, with the number of the link; 0 for the tool.
         column: The length of the column below the base; None without one.
         targets: The targets of the task.
@@ -170,6 +171,7 @@ class Drawing:
     """
 
     base: tuple[float, float, float]
+    is_at_zero: bool
     links: tuple[tuple[int, tuple[float, float, float], tuple[float, float, float]], ...]
     column: float | None
     targets: tuple[tuple[float, float, float], ...]
@@ -183,6 +185,8 @@ class DataSheet:
 
     Attributes:
         name: Its name.
+        base_position: The position of its base link on the task, or of a design's first joint.
+        base_yaw: The turn of its base link about the vertical.
         design: The number of the design in its run; None for an existing arm.
         joint_letters: The joint types in order.
         role: Why the design is recommended; empty if it is not.
@@ -224,6 +228,8 @@ class DataSheet:
     masses: tuple[MassLine, ...]
     over_reach: tuple[ReachLine, ...]
     drawing: Drawing
+    base_position: tuple[float, float, float] | None = None
+    base_yaw: float | None = None
     role: str = ""
     status: str = ""
     survival: str = ""

@@ -12,8 +12,9 @@ from armwright.problem.objectives import BACKLASH_ERROR, CYCLE_TIME, DEFLECTION,
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import ActuatorRecord, named_actuator, value_of
 from armwright.robot.arm import Arm, Joint
+from armwright.robot.mounting import Mounting
 from armwright.robot.urdf_reader import UrdfArm
-from armwright.runs.assumptions import describe_assumed
+from armwright.runs.assumptions import ALONG_CYCLE, describe_assumed
 from armwright.runs.datasheet.joint_lines import joint_lines
 from armwright.runs.datasheet.over_reach import drawing_of, link_line, reach_lines
 from armwright.runs.datasheet.parts import price_source
@@ -22,9 +23,13 @@ from armwright.runs.supply_record import supply_of
 
 SAFETY_FACTOR = 1.5  # of torques, as that of designs by default
 NO_TASK = "an arm without a task"
+OF_TASK = (
+    "base_position", "base_yaw", "payload", "position_error", "backlash_error", "cycle_time", "supply", "used",
+    "utilisation", "thermal_utilisation",
+)  # fmt: skip
 NO_EFFORT = "not every joint states an effort"
 NO_DRIVES = "a URDF states no {} of its drives"
-ENTERING = ("stall_torque", "peak_torque", "backlash", "joint_stiffness")  # values of actuators that a sheet shows
+ENTERING = ("stall_torque", "peak_torque", "backlash")  # values of actuators that a sheet without a task shows
 
 
 def read_actuators(text: str, joints: Sequence[str]) -> dict[str, ActuatorRecord]:
@@ -63,10 +68,12 @@ class Job:
 
     Attributes:
         problem: The task, its objectives and constraints.
-        place: Where the base link stands, in words.
+        mounting: Where the base link stands.
+        place: The same in words, and why there.
     """
 
     problem: Problem
+    mounting: Mounting
     place: str
 
 
@@ -110,12 +117,14 @@ def urdf_sheet(
         masses=_masses(arm),
         parts=_parts(actuators),
         over_reach=over_reach,
-        drawing=drawing_of(arm, targets),
+        drawing=drawing_of(arm, targets, described.values_in_arm(np.zeros(len(arm.joints))).tolist()),
         assumptions=_assumptions(described, actuators, arm.safety_factor, job),
         not_modelled="",
     )
     if existing is not None:
         sheet = _on_task(sheet, existing)
+    if job is not None:
+        sheet = replace(sheet, base_position=job.mounting.position, base_yaw=job.mounting.yaw)
     if price is not None:
         sheet = replace(sheet, assumptions={**sheet.assumptions, "price": "as stated by the user"})
     return replace(sheet, missing=_missing(sheet, existing))
@@ -217,8 +226,7 @@ def _missing(sheet: DataSheet, existing: ExistingArm | None) -> dict[str, str]:
     """Return why values are not stated."""
     found = {"sensitivities": "an existing arm has no design space"}
     if existing is None:
-        of_task = ("payload", "position_error", "backlash_error", "cycle_time", "supply", "used", "utilisation")
-        found |= dict.fromkeys((*of_task, "thermal_utilisation"), NO_TASK)
+        found |= dict.fromkeys(OF_TASK, NO_TASK)
     else:
         found |= _missing_on_task(sheet, existing)
     if sheet.price is None:
@@ -270,14 +278,15 @@ def _assumptions(
     }
     if described.notes:
         found["URDF"] = "; ".join(described.notes)
-    assumed = {record.name: _assumed(record) for record in actuators.values()}
+    entering = ENTERING if job is None or job.problem.task.cycle is None else (*ENTERING, *ALONG_CYCLE)
+    assumed = {record.name: _assumed(record, entering) for record in actuators.values()}
     if any(assumed.values()):
         shown = {name: values for name, values in assumed.items() if values}
         found["actuators"] = f"defaults of their kind or estimates: {describe_assumed(shown)}"
     return found
 
 
-def _assumed(record: ActuatorRecord) -> dict[str, float]:
+def _assumed(record: ActuatorRecord, entering: Sequence[str]) -> dict[str, float]:
     completed = record.completed()
-    values = {name: value_of(completed, name) for name in record.assumed if name in ENTERING}
+    values = {name: value_of(completed, name) for name in record.assumed if name in entering}
     return {name: value for name, value in values.items() if value is not None}
