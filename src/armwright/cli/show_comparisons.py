@@ -127,8 +127,8 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     print_table(console, Table(columns, rows, "--json and --csv print all", title=title, gap=1))
     console.print(
         f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; torque "
-        "util. = the largest share of a joint's effort limit, and payload = what is held at the whole reach, both with "
-        f"a safety factor of {space.safety_factor:g}"
+        "util. = the largest share of a joint's effort limit at rest, and payload = what is held at the whole reach, "
+        f"both with a safety factor of {space.safety_factor:g}"
     )
     if comparison.designs and space.is_toy:
         console.print(f"the designs have toy masses ({space.mass_note}); torques compare only with real ones (`mass:`)")
