@@ -208,4 +208,5 @@ def _format_measure(value: float) -> str:
 def _describe_dominance(arm: ComparedArm, front: int) -> str:
     if arm.dominates is None:
         return "not comparable with the front"
-    return f"dominates {arm.dominates} of the {front} designs of the front, dominated by {arm.dominated_by}"
+    designs = f"the {front} designs" if front > 1 else "the one design"
+    return f"dominates {arm.dominates} of {designs} of the front, dominated by {arm.dominated_by}"

@@ -169,7 +169,8 @@ def describe_conflict(record: Mapping[str, Any]) -> str:
     for names in record["conflicts"]:
         together = " and ".join(names) + (" together" if len(names) > 1 else "")
         alone = f" ({', '.join(f'{met[name]:,}' for name in names)} alone)" if len(names) > 1 else ""
-        parts.append(f"none of {designs:,} designs satisfies {together}{alone}")
+        none = f"none of {designs:,} designs satisfies" if designs > 1 else "the only design does not satisfy"
+        parts.append(f"{none} {together}{alone}")
     change = f"bounds that would admit one: {', '.join(record['admitting'])}"
     single = record["admitting_alone"]
     if single is not None and record["admitting"] != [single]:

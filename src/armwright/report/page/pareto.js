@@ -221,7 +221,7 @@ function draw() {
   const outside = reference === null ? 0
     : [...Array(n).keys()].filter((i) => !content.hasFailed(i)).filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
   const notes = ["Click a design to see its arm."];
-  if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
+  if (outside) notes.push(`${outside} of ${plural(n, "design")} ${outside === 1 ? "lies" : "lie"} outside this view; zoom out to see more.`);
   if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
   if (failed.length) notes.push(`Not shown: ${plural(failed.length, "design")} whose evaluation failed.`);
   for (const arm of content.head.existing_arms) notes.push(describeExisting(arm, high));
