@@ -402,6 +402,10 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
         (("task.yaml", UR5, "--base", "0,0,0,nan"), '--base "0,0,0,nan": expected three numbers with commas'),
         (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),
         (("task.yaml", UR5, "--price", "ur5"), '--price "ur5": expected ARM=USD'),
+        (
+            ("task.yaml", UR5, "--price", "ur5_robot=1", "--price", "ur5_robot=2"),
+            "expected one price of ur5_robot, got two",
+        ),
         (("task.yaml", UR5, "--price", "ur5_rob=1e4"), 'unknown arm "ur5_rob". Did you mean "ur5_robot"?'),
         (("task.yaml", UR5, "--price", "ur5_robot=-1"), "expected a finite number of at least 0 USD, got -1.0"),
         (("target-1", UR5, "--run", run), "with other targets, another tool or other payloads"),

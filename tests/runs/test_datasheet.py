@@ -354,6 +354,7 @@ def test_command_writes_html_pdf_and_json(run: Path, tmp_path: Path) -> None:
         (("--base", "0,0,0"), "--base 0,0,0: expected a task, too; try --task TASK"),
         (("--space", "desk"), "--space desk: expected a task, too; try --task TASK"),
         (("--price", "-3"), "price: expected a finite number of at least 0 USD, got -3"),
+        (("--price", "cheap"), '--price "cheap": expected a number of USD, such as 28000'),
         (("--price", "nan"), "price: expected a finite number of at least 0 USD, got nan"),
         (("--task", "target-11"), 'Did you mean "target-1"?'),
         (("--design", "2"), "--design 2: expected a run folder, got"),

@@ -1,6 +1,7 @@
 """Options of commands about existing arms."""
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -21,6 +22,31 @@ BasePose = Annotated[
         show_default="searched",
     ),
 ]
+
+
+def parse_price(text: str) -> float:
+    """Parse `28000` into a price [USD]."""
+    try:
+        return float(text)
+    except ValueError:
+        raise SettingsError(f'--price "{text}": expected a number of USD, such as 28000') from None
+
+
+def parse_prices(texts: Sequence[str]) -> dict[str, float]:
+    """Parse `ur5e=28000`, each of another arm, into prices by name [USD]."""
+    prices: dict[str, float] = {}
+    for text in texts:
+        name, _, price = text.rpartition("=")
+        try:
+            value = float(price)
+        except ValueError:
+            name = ""
+        if not name:
+            raise SettingsError(f'--price "{text}": expected ARM=USD, such as ur5e=28000')
+        if name in prices:
+            raise SettingsError(f"--price: expected one price of {name}, got two")
+        prices[name] = value
+    return prices
 
 
 def parse_base(text: str | None) -> "Mounting | None":

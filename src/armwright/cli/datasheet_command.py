@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.activity import activity
-from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base
+from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base, parse_price
 from armwright.cli.options import TASK, Json, SpaceFile
 from armwright.cli.streams import print_json
 from armwright.exceptions import SettingsError
@@ -42,7 +42,7 @@ def datasheet(
     ] = None,
     space: SpaceFile = None,
     base: BasePose = None,
-    price: Annotated[float | None, typer.Option(help="Price of an arm that exists [USD].")] = None,
+    price: Annotated[str | None, typer.Option(metavar="USD", help="Price of an arm that exists.")] = None,
     tip: Tip = None,
     base_link: BaseLink = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the base search.", show_default="0")] = None,
@@ -92,7 +92,7 @@ def _sheet_of_urdf(
     task: str | None,
     space: Path | None,
     base: str | None,
-    price: float | None,
+    price: str | None,
     seed: int,
 ) -> "DataSheet":
     """Return the data sheet of an arm, in its place on a task if one is named."""
@@ -101,9 +101,9 @@ def _sheet_of_urdf(
     from armwright.runs.datasheet.urdf_sheet import Job, driven, read_actuators, urdf_sheet
 
     named = {} if actuators is None else read_actuators(actuators, described.joints)
-    described = driven(described, named)
+    described, stated = driven(described, named), None if price is None else parse_price(price)
     if task is None:
-        return urdf_sheet(described, named, price=price)
+        return urdf_sheet(described, named, price=stated)
     problem = load_problem(task, space)
     placement = placed(problem, described, seed, parse_base(base))
-    return urdf_sheet(placement.described, named, Job(problem, placement.mounting, placement.description), price)
+    return urdf_sheet(placement.described, named, Job(problem, placement.mounting, placement.description), stated)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from armwright.cli.activity import activity
-from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base
+from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base, parse_prices
 from armwright.cli.options import (
     Csv,
     Figures,
@@ -19,7 +19,7 @@ from armwright.cli.options import (
     select_workers,
 )
 from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_csv, print_json
-from armwright.exceptions import FailureError, SettingsError
+from armwright.exceptions import FailureError
 
 
 def experiment(
@@ -197,7 +197,7 @@ def compare_arms(
             tip=tip,
             base_link=base_link,
             seed=seed,
-            prices=dict(map(_parse_price, price or ())),
+            prices=parse_prices(price or ()),
         )
     drawn: list[Path] = []
     if run is not None and figures:
@@ -212,17 +212,6 @@ def compare_arms(
         print_csv(arm_rows(compared))
     else:
         show_arms(open_console(), compared, drawn)
-
-
-def _parse_price(text: str) -> tuple[str, float]:
-    """Parse `ur5e=28000` into the name of an arm and its price [USD]."""
-    name, _, price = text.rpartition("=")
-    try:
-        if name:
-            return name, float(price)
-    except ValueError:
-        pass
-    raise SettingsError(f'--price "{text}": expected ARM=USD, such as ur5e=28000')
 
 
 def runs(
