@@ -37,15 +37,12 @@ def parse_prices(texts: Sequence[str]) -> dict[str, float]:
     prices: dict[str, float] = {}
     for text in texts:
         name, _, price = text.rpartition("=")
-        try:
-            value = float(price)
-        except ValueError:
-            name = ""
-        if not name:
-            raise SettingsError(f'--price "{text}": expected ARM=USD, such as ur5e=28000')
         if name in prices:
             raise SettingsError(f"--price: expected one price of {name}, got two")
-        prices[name] = value
+        try:
+            prices[name] = float(price if name else "")
+        except ValueError:
+            raise SettingsError(f'--price "{text}": expected ARM=USD, such as ur5e=28000') from None
     return prices
 
 
