@@ -41,8 +41,8 @@ def tab(folder: Path, browser: Browser) -> Iterator[Tab]:
     opened = Tab(browser, offline=True)
     opened.open(folder / "report.html")
     yield opened
-    assert not opened.faults
     opened.close()
+    assert not opened.faults
 
 
 def stored(folder: Path, design: int) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import pytest
 
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arm_arrays import stack_arms
+from armwright.kinematics.forward import forward_kinematics
 from armwright.kinematics.ik import solve_postures
 from armwright.robot.mounting import Mounting, can_turn, mounted, needs_turning
 from armwright.robot.urdf_reader import read_urdf
@@ -20,16 +21,19 @@ TURNED = ("ur5_robot", "panda", "z1", "kinova", "xarm7", "so101", "kuka")
 @pytest.mark.parametrize("name", TURNED)
 @pytest.mark.parametrize("yaw", [-3.1, -0.7, 0.0, 2.2])
 def test_tool_of_a_turned_arm_is_where_pinocchio_sees_it(name: str, yaw: float) -> None:
-    """Compare positions in the world and axes of the tool, with the joint values of the URDF."""
+    """Compare positions of the tool and its rotations between postures in the world, and the joints' torques."""
     plain = read_urdf(robot(name))
     place = Mounting((0.3, -0.2, 0.5), yaw)
     there = mounted(plain, place)
     q = random_values(there.arm, 20, seed=4)
-    tips, torques = seen_by_pinocchio(robot(name), there, q, payload=0.0)
+    tips, rotations, torques = seen_by_pinocchio(robot(name), there, q, payload=0.0)
     pose = pinocchio.SE3(pinocchio.utils.rotate("z", yaw), np.array(place.position))
     arrays = stack_arms([there.arm], "float64")
     ours = solve_postures(arrays, np.zeros((20, 3)), 0, initial_q=q[None], precision="float64")
     assert np.abs(ours.reached[0] - [pose.act(tip) for tip in tips]).max() < 5e-5
+    turns = pose.rotation @ rotations @ rotations[0].T @ pose.rotation.T
+    frames = forward_kinematics(arrays, q[None]).rotation[0, :, -1]
+    assert np.abs(frames @ frames[0].T - turns).max() < 5e-5  # URDFs round their angles
     assert np.abs(ours.torque[0] - torques).max() < 1e-3 * np.abs(torques).max()
 
 

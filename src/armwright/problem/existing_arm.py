@@ -82,10 +82,11 @@ class ExistingArm:
         loads = self.evaluation.loads
         torque = drives.safety_factor[0] * np.abs(loads.torques[0]).max(axis=(0, 1)) / drives.peak[0]
         speed = np.abs(loads.speeds[0]).max(axis=(0, 1)) / drives.no_load_speed[0]
-        if np.nanmax(torque, initial=0.0) > 1.0 and self.value(DYNAMIC_UTILISATION) is None:
-            yield f"its efforts (along the cycle it needs {np.nanmax(torque):.0%} of one, safety factor included)"
+        decided = DYNAMIC_UTILISATION in bounded and self.value(DYNAMIC_UTILISATION) is not None
+        if np.nanmax(torque, initial=0.0) > 1.0 and not decided:
+            yield f"an effort of its file (along the cycle it needs {np.nanmax(torque):.0%}, safety factor included)"
         if np.nanmax(speed, initial=0.0) > 1.0 and SPEED_UTILISATION not in bounded:
-            yield f"its speeds (along the cycle it needs {np.nanmax(speed):.0%} of one)"
+            yield f"a speed of its file (along the cycle it needs {np.nanmax(speed):.0%})"
 
     @property
     def undecided(self) -> tuple[str, ...]:

@@ -46,8 +46,8 @@ def draw_side(axes: Any, sheet: DataSheet) -> None:
     _label(axes, labels, high[0], (high - low)[1])
     _frame(axes, low, high + ROOM * np.array([(high - low)[0], 0.0]), "x [mm]", "z [mm]")
     top, bottom = MM * outline[:, 1].max(), MM * outline[:, 1].min()
-    posture = "joints at 0" if drawing.is_at_zero else "joints at 0 or the limit next to it"
-    axes.set_title(f"Side view, {posture}; tip from z = {bottom:.0f} to {top:.0f} mm")
+    posture = "joints at 0; " if drawing.is_at_zero else "joints at 0 or the limit next to it\n"
+    axes.set_title(f"Side view, {posture}tip from z = {bottom:.0f} to {top:.0f} mm")
 
 
 def draw_top(axes: Any, sheet: DataSheet) -> None:

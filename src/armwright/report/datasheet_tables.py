@@ -9,7 +9,7 @@ from armwright.tasks.moments import MAX_MASS
 
 MOST_DECIMALS = 3
 ENOUGH = 3  # significant digits
-SHOWN_UNITS = {"m": (1e3, "mm"), "rad": (math.degrees(1.0), "°")}  # of objectives
+SHOWN_UNITS = {"m": (1e3, " mm"), "rad": (math.degrees(1.0), "°")}  # of objectives
 
 
 @dataclass(frozen=True)
@@ -163,8 +163,8 @@ def sensitivity_table(sheet: DataSheet) -> Table:
 
 def _objective(value: float | None, unit: str) -> str:
     """Return an objective, a length in millimetres and an angle in degrees."""
-    factor, shown = SHOWN_UNITS.get(unit, (1.0, unit))
-    return number(value) if value is None else f"{number(value, factor)} {shown}".rstrip()
+    factor, shown = SHOWN_UNITS.get(unit, (1.0, f" {unit}"))
+    return number(value) if value is None else f"{number(value, factor)}{shown}".rstrip()
 
 
 def _stated(sheet: DataSheet, key: str, unit: str, factor: float = 1.0) -> str:

@@ -36,7 +36,12 @@ def place_legend(axes: Any, handles: Sequence[Any], points: Sequence[tuple[float
         box = legend.get_window_extent().padded(BESIDE)
         return sum(box.contains(*axes.transData.transform(point)) for point in points)
 
-    axes.legend(handles=handles, loc=min(CORNERS, key=hidden))
+    counts: dict[str, int] = {}
+    for corner in CORNERS:
+        counts[corner] = hidden(corner)
+        if not counts[corner]:
+            return
+    axes.legend(handles=handles, loc=min(CORNERS, key=counts.__getitem__))
 
 
 def place_labels(axes: Any, labels: Sequence[PointLabel], points: Sequence[tuple[float, float]]) -> None:
