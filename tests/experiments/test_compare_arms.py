@@ -41,6 +41,7 @@ from tests.support.browser import Tab
 from tests.support.command_line import armwright
 from tests.support.robots import robot
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 TASK = Task(name="feeder", targets=((0.4, -0.2, 0.1), (0.4, 0.2, 0.1), (0.1, 0.35, 0.5)), payload=(0.5, 0.5, 0.0))
 SPACE = DesignSpace(
     joints=3,
@@ -215,11 +216,48 @@ def test_run_folder_keeps_existing_arms_for_figures_and_page(run: Path, compared
     trace = tab.ask('(({ x, y, text }) => ({ x, y, text }))(pareto.data.find((one) => one.name === "existing arm"))')
     assert trace["text"] == ["ur5_robot", "panda"]
     assert trace["y"] == [arm.values[1] for arm in kept]
-    note = tab.text("#pareto-note")
+    stated = table(tab)
+    assert list(stated) == [arm.name for arm in kept]  # a task without constraints has no recommended designs
     for arm in kept:
         designs = "1 design" if arm.dominates == 1 else f"{arm.dominates} designs"
-        assert f"{arm.name}" in note
-        assert f"dominates {designs} of the front, dominated by {arm.dominated_by}" in note
+        assert stated[arm.name]["On this task"] == (
+            f"dominates {designs} of the front, dominated by {arm.dominated_by}"
+        )
+        assert stated[arm.name]["Reach"] == (f"{1e3 * arm.reach:.3g} mm" if arm.reach < 1.0 else f"{arm.reach:.3g} m")
+        assert stated[arm.name]["Mass"] == f"{arm.mass:.3g} kg"
+
+
+def test_page_shows_existing_arms_beside_the_recommended_designs(tmp_path: Path, tab: Tab) -> None:
+    """The recommended designs state the same reach, payload and quantities as the comparison computes for them."""
+    task, space = (EXAMPLES / f"6-price-{part}.yaml" for part in ("task", "space"))
+    run = tmp_path / "run"
+    aw.find_front(aw.Problem(aw.load_task(task), aw.load_space(space)), evaluations=300, out=run)
+    comparison = compare_arms(task, [UR5], run, prices={"ur5_robot": 28000.0})
+    tab.open(write_report(run))
+    stated, (arm,) = table(tab), comparison.arms
+    assert stated[arm.name]["Price"] == "28,000 USD"
+    assert stated[arm.name]["Deflection"] == "–"
+    designs = {design.name: design for design in comparison.designs}
+    shown = [name for name in stated if name != arm.name]
+    assert set(shown) & set(designs)
+    for name in shown:
+        assert stated[name]["On this task"] == "meets all constraints"
+    for name in set(shown) & set(designs):
+        design, held = designs[name], designs[name].payload_at_full_reach
+        assert held is not None
+        assert stated[name]["Reach"] == f"{1e3 * design.reach:.3g} mm"
+        assert stated[name]["Payload there"] == f"{held:.3g} kg"
+        assert stated[name]["Deflection"] == f"{1e3 * (design.measures['deflection'] or 0.0):.3g} mm"
+    tab.page.locator("#existing button").last.click()
+    assert tab.page.locator("#existing tr.chosen button").inner_text() == shown[-1]
+    assert tab.faults == []
+
+
+def table(tab: Tab) -> dict[str, dict[str, str]]:
+    """Return the page's table of existing arms: the cells of each arm by the heads of their columns."""
+    heads = tab.ask("[...document.querySelectorAll('#existing th')].map((one) => one.firstChild.textContent)")
+    rows = tab.ask("[...document.querySelectorAll('#existing tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))")
+    return {row[0]: dict(zip(heads, row, strict=True)) for row in rows}
 
 
 def test_arm_name_with_markup_is_escaped_on_the_page(run: Path, tmp_path: Path, tab: Tab) -> None:

@@ -13,7 +13,7 @@ import armwright as aw
 from armwright.runs.folder import read_run
 from armwright.runs.recommendation import candidates, recommend
 from armwright.runs.results import read_summary
-from armwright.runs.selection import survival_of
+from armwright.runs.selection import pick, survival_of
 from armwright.runs.simulated_run import Simulator
 from armwright.runs.survival import HEAVIER, MOVED, PERTURBATIONS, SHIFTED, SUPPLY
 from armwright.spaces.design_space import DesignSpace
@@ -39,9 +39,9 @@ def test_a_finished_run_states_what_is_verified(run: Path) -> None:
     found = [one.pop("survival") for one in summary["recommended"]]
     assert summary["recommended"] == [
         {"role": role, "design": 0, "status": "verified", "demoted": []}
-        for role in ("knee", "least peak_torque", "least length")
+        for role in ("knee", "least peak_torque", "least length", "least price")
     ]
-    assert [list(survival) for survival in found] == [["verdict", "perturbations", "simulated"]] * 3
+    assert [list(survival) for survival in found] == [["verdict", "perturbations", "simulated"]] * 4
     names = [one["name"] for one in found[0]["perturbations"]]
     assert names == list(PERTURBATIONS)
     assert {file.name for file in (run / "designs" / "0000").iterdir()} >= {"arm.xml", "trajectory.csv"}
@@ -104,7 +104,7 @@ def test_pick_states_which_perturbations_a_design_survives(run: Path) -> None:
 
 
 def test_designs_without_a_cycle_are_perturbed_if_they_have_constraints() -> None:
-    for constraints, n in (([], 0), (["torque_utilisation <= 0.5"], 3)):
+    for constraints, n in (([], 0), (["torque_utilisation <= 0.5"], 4)):
         content = {"name": "hold", "targets": [[0.3, 0.0, 0.2]], "payload": 0.5, "constraints": constraints}
         space = DesignSpace.model_validate(SPACE | {"motor_bodies": False})
         problem = aw.Problem(Task.model_validate(content), space)
@@ -169,3 +169,20 @@ def test_ends_of_the_front_have_the_least_objectives() -> None:
     for index, role in enumerate(("least position_error", "least torque")):
         first = candidates(history)[role][0]
         assert history.values[first, index] == min(member.values[index] for member in history.front)
+
+
+def test_cheapest_and_stiffest_designs_are_roles_where_they_are_known() -> None:
+    """Position error and torque are none then: constraints see to both."""
+    examples = Path(__file__).parents[2] / "examples"
+    task = aw.load_task(examples / "6-price-task.yaml")
+    space = aw.load_space(examples / "6-price-space.yaml")
+    for objectives, ends in ((("mass", "cycle_time"), ["mass", "cycle_time"]), (("position_error", "torque"), [])):
+        changes = {"objectives": objectives, "reference_point": None}
+        problem = aw.Problem(task.model_copy(update=changes), space)
+        history = aw.find_front(problem, evaluations=300).history
+        roles = candidates(history)
+        assert list(roles) == ["knee", *(f"least {name}" for name in (*ends, "price", "deflection"))]
+        for name in ("price", "deflection"):
+            assert roles[f"least {name}"][0] == pick(history, by=name)[0].number
+    toy = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=10, verify=False).history
+    assert list(candidates(toy)) == ["knee", "least position_error", "least torque"]

@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 def simulate(
     run: RunFolder,
     design: Annotated[int | None, typer.Option(help="Number of the design.")] = None,
-    recommended: Annotated[
-        bool, typer.Option("--recommended", help="The knee of the front and its two ends (the default).")
-    ] = False,
+    recommended: Annotated[bool, typer.Option("--recommended", help="The recommended designs (the default).")] = False,
     all_: Annotated[bool, typer.Option("--all", help="All designs of the front.")] = False,
     json_: Json = False,
     csv_: Csv = False,

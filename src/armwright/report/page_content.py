@@ -31,6 +31,7 @@ from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.assumptions import assumed_values
 from armwright.runs.config import FrontMethod, Method, RunConfig
+from armwright.runs.datasheet.sheet import NOT_MODELLED
 from armwright.runs.folder import read_config
 from armwright.runs.front_gap import known_front
 from armwright.runs.history import REFINE, History
@@ -126,6 +127,7 @@ class RunContent:
             "looks": {trial.source: look(trial.source)._asdict() for trial in self.history},
             "existing": EXISTING._asdict(),
             "existing_arms": _existing_arms(self.folder, self.history),
+            "not_modelled": NOT_MODELLED,
             "reach_maps": {number: shown.head for number, shown in reach_maps.items()},
             "result": _result(self.history, self.summary),
             "recommended": self._recommended,
@@ -155,6 +157,9 @@ def _existing_arms(folder: Path, history: History) -> list[dict[str, Any]]:
         {
             "name": arm.name,
             "values": arm.values,
+            "reach": arm.reach,
+            "payload_at_full_reach": arm.payload_at_full_reach,
+            "quantities": {**arm.measures, "mass": arm.mass, "price": arm.price},
             "violated": arm.violated,
             "dominance": dominance_counts(arm.values, arm.violated, history),
         }

@@ -7,12 +7,12 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.kinematics.reach_postures import postures_over_reach
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import QUANTITIES
 from armwright.robot.arm import Joint
 from armwright.runs.cycle_export import trajectory_of
+from armwright.runs.datasheet.over_reach import reach_lines
 from armwright.runs.history import History
 from armwright.runs.infeasibility import describe_infeasibility
 
@@ -40,8 +40,9 @@ def recommended_designs(history: History, recommended: Sequence[Mapping[str, Any
         recommended: The recommendations of a summary, several of which may be of one design.
 
     Returns:
-        design, status and survival as in the summary; roles: all its roles; reach: of its data sheet [m]; quantities:
-        what else it can do, by name; loads: what its joints do along the cycle, None if that is not known.
+        design, status and survival as in the summary; roles: all its roles; reach: of its data sheet [m];
+        payload_at_full_reach: what its actuators hold there [kg], None if unknown; quantities: what else it can do, by
+        name; loads: what its joints do along the cycle, None if that is not known.
     """
     numbers = list(dict.fromkeys(one["design"] for one in recommended))
     if not numbers:
@@ -51,13 +52,15 @@ def recommended_designs(history: History, recommended: Sequence[Mapping[str, Any
     found: list[dict[str, Any]] = []
     for row, number in enumerate(numbers):
         entries = [one for one in recommended if one["design"] == number]
+        farthest = reach_lines(history.member(number).arm, float(evaluation.payload.max()))[-1]
         found.append(
             {
                 "design": number,
                 "roles": [one["role"] for one in entries],
                 "status": entries[0]["status"],
                 "survival": entries[0]["survival"],
-                "reach": postures_over_reach(history.member(number).arm, (1.0,)).reach,
+                "reach": farthest.distance,
+                "payload_at_full_reach": farthest.payload,
                 "quantities": {name: float(each[row]) for name, each in quantities.items() if each is not None},
                 "loads": _loads(history, evaluation, row, number),
             }

@@ -1,13 +1,20 @@
-"""The recommended designs of a front: its knee and its two ends, each verified in the simulator.
+"""The recommended designs of a front: its knee, its ends, the cheapest and the stiffest, verified in the simulator.
 
 For each it is stated which perturbations it survives.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+import numpy as np
+
+from armwright.arrays import Array
 from armwright.exceptions import MissingExtraError, SettingsError
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import DEFLECTION, POSITION_ERROR, PRICE, TORQUE
 from armwright.runs.history import History
 from armwright.runs.ranking import knee_first
 from armwright.runs.simulated_run import Simulator
@@ -44,7 +51,7 @@ class Recommendation:
     """A recommended design.
 
     Attributes:
-        role: Why it is recommended: knee, or least OBJECTIVE.
+        role: Why it is recommended: knee, or least QUANTITY.
         design: Its number.
         status: `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the
             reason if the time was up or a custom evaluator measured the design.
@@ -60,15 +67,45 @@ class Recommendation:
 
 
 def candidates(history: History) -> dict[str, list[int]]:
-    """Return the designs of the front by role, the best first."""
+    """Return the designs of the front by role, the best first.
+
+    The roles are the knee, the least first and last objective, and the least price and deflection if the built-in
+    physics knows them for all designs. With both, position error and torque are no roles of their own: all these
+    designs are precise and strong enough, if the task has constraints.
+    """
     if not history.front:
         return {}
-    roles = {"knee": [member.number for member in knee_first(history, history.front)]}
-    objectives = history.problem.objectives
-    for index in (0, len(objectives) - 1):
-        by_value = sorted(history.front, key=lambda member: member.values[index])
-        roles[f"least {objectives[index].name}"] = [member.number for member in by_value]
-    return roles
+    order = knee_first(history, history.front)  # equal ones follow it
+    objectives = [objective.name for objective in history.problem.objectives]
+    columns = dict(zip(objectives, np.array([member.values for member in order]).T, strict=True))
+    known = columns | _price_and_deflection(history, [member.number for member in order])
+    roles = [objectives[0], objectives[-1]]
+    if {PRICE.name, DEFLECTION.name} <= set(known) and history.problem.constraints:
+        roles = [name for name in roles if name not in (POSITION_ERROR.name, TORQUE.name)]
+    roles += [quantity.name for quantity in (PRICE, DEFLECTION) if quantity.name in known]
+    return {
+        "knee": [member.number for member in order],
+        **{f"least {name}": [order[row].number for row in np.argsort(known[name], kind="stable")] for name in roles},
+    }
+
+
+def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str, Array]:
+    """Return (N,) prices [USD] and deflections [m] by name, without objectives and what is not known of all designs."""
+    if history.problem.evaluator is not None:
+        return {}
+
+    def values(quantity: Objective, evaluation: Evaluation) -> Array | None:
+        with suppress(SettingsError):
+            found = quantity(evaluation)
+            return found if np.isfinite(found).all() else None
+        return None
+
+    first = history.evaluation(numbers[:1])
+    others = [quantity for quantity in (PRICE, DEFLECTION) if quantity not in history.problem.objectives]
+    asked = [quantity for quantity in others if values(quantity, first) is not None]
+    evaluation = history.evaluation(numbers) if asked else first
+    found = {quantity.name: values(quantity, evaluation) for quantity in asked}
+    return {name: column for name, column in found.items() if column is not None}
 
 
 def recommend(

@@ -1,7 +1,7 @@
 """Plan of the wall-clock time of a search: how much for evaluations, and how much for what follows them.
 
 Until the cost of results is measured on designs of the run, a fixed share is reserved for them. Afterwards, the reserve
-is the cost of simulating and perturbing the recommended designs, at most three, and of verifying the front, at most 300
+is the cost of simulating and perturbing the recommended designs, at most five, and of verifying the front, at most 300
 designs. If verification takes more than a share of the budget, fewer designs of the front are kept.
 """
 
@@ -24,7 +24,7 @@ RECOMMENDED_SHARE = 0.2  # of the budget at most, to simulate and perturb the re
 UNKNOWN_SHARE = 0.3  # of the budget for results whose costs are unknown
 MEASURED_AT = 0.2  # spent share of the budget from which on costs are measured
 DRAWING_SHARE, DRAWING_SECONDS = 0.15, (2.5, 6.0)  # [s]: page and figures
-RECOMMENDED = 3  # designs
+RECOMMENDED = 5  # designs
 SIMULATIONS = 3  # per recommended design: as it is, and with assumed values halved and doubled
 CHUNK_SHARE, CHUNK_SECONDS = 0.02, (0.5, 5.0)  # of the budget between two looks at the clock, and its bounds [s]
 FILES_SECONDS, CYCLE_FILES_SECONDS = 0.004, 0.05  # [s] of a design's files and its part of the page; with a cycle

@@ -5,6 +5,7 @@ import { Content, embedded } from "./content.js";
 import { drawCurve, openCurve } from "./curve.js";
 import { during } from "./cycle.js";
 import { drawDesign, openDesign, postures } from "./design.js";
+import { drawExisting, openExisting } from "./existing.js";
 import { drawConfiguration, drawHeader, openHeader } from "./header.js";
 import { fileFetcher, openLive } from "./live.js";
 import { drawLoads, openLoads } from "./loads.js";
@@ -34,6 +35,7 @@ function open() {
   openHeader(content);
   openCurve(content);
   openDesign(content, fileFetcher(content));
+  openExisting(content);
   openPareto(content);
   openTable(content);
   openPick(content);
@@ -61,6 +63,7 @@ function grow() {
   drawTranscript();
   drawConfiguration();
   drawReach();
+  drawExisting();
 }
 
 function take(buffer) {

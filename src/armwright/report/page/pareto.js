@@ -1,5 +1,6 @@
 // The designs in the plane of two objectives: their sources, their front and the selected design.
 
+import { describeDominance } from "./existing.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, isTouched, number, onTheme, plain, plural, title } from "./format.js";
 
@@ -224,26 +225,19 @@ function draw() {
   if (outside) notes.push(`${outside} of ${plural(n, "design")} ${outside === 1 ? "lies" : "lie"} outside this view; zoom out to see more.`);
   if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
   if (failed.length) notes.push(`Not shown: ${plural(failed.length, "design")} whose evaluation failed.`);
-  for (const arm of content.head.existing_arms) notes.push(describeExisting(arm, high));
+  notes.push(...content.head.existing_arms.map((arm) => whereExisting(arm, high)).filter(Boolean));
   if (many) notes.push("Large: on the front in all objectives; other designs may dominate them in this plane.");
   if (log) notes.push(`Logarithmic: values below ${number(floor)} are drawn at ${number(floor)}.`);
   if (content.head.is_toy) notes.push("Toy masses: use torques to compare designs, not to choose motors.");
   $("pareto-note").textContent = notes.join(" ");
 }
 
-// Describes an existing arm in the note.
-function describeExisting(arm, high) {
-  const [u, v] = [arm.values[x], arm.values[y]];
-  const place = high(x) !== undefined && (u > high(x) || v > high(y)) ? ` lies outside this view, at ${number(u)}, ${number(v)};` : ":";
-  if (u === null || v === null) return `${arm.name}: not comparable, because some of these values are unknown.`;
-  return `${arm.name}${place} ${describeDominance(arm)}.`;
-}
-
-function describeDominance(arm) {
-  if (arm.violated.length) return `violates ${arm.violated.join(", ")}`;
-  if (arm.dominance === null) return "not comparable";
-  const [worse, better] = arm.dominance;
-  return `dominates ${plural(worse, "design")} of the front, dominated by ${better}`;
+// Says where an existing arm is that the view does not show; empty for others.
+function whereExisting({ name, values }, high) {
+  const [u, v] = [values[x], values[y]];
+  if (u === null || v === null) return `${name} is not shown, because some of these values are unknown.`;
+  const isOutside = high(x) !== undefined && (u > high(x) || v > high(y));
+  return isOutside ? `${name} lies outside this view, at ${number(u)}, ${number(v)}.` : "";
 }
 
 function axis(objective, range, isLog) {

@@ -5,7 +5,9 @@ import { downloadOf, hasServer } from "./design.js";
 import { listen, set, state } from "./state.js";
 import { $, element, onTheme, plural, quantity, why } from "./format.js";
 
-const ROLES = { knee: "Best compromise" };
+const ROLES = {
+  knee: "Best compromise", "least price": "Cheapest", "least deflection": "Stiffest", "least cycle_time": "Fastest", "least mass": "Lightest",
+};
 const REACH = "The largest horizontal distance of the tip from the first joint.";
 
 let content = null;
@@ -46,7 +48,7 @@ export function drawRecommended() {
 function card(one) {
   const { design, roles, status, survival } = one;
   const show = () => set({ design });
-  const title = [...roles].map((role) => ROLES[role] ?? role.replaceAll("_", " ")).join(", ");
+  const title = roles.map((role, k) => { const name = ROLES[role] ?? role.replaceAll("_", " "); return k ? name.toLowerCase() : name; }).join(", ");
   return element("article", { class: "card", "data-design": design },
     element("button", { type: "button", class: "picture", onclick: show, "aria-label": `Show design ${design}` }, element("img", { alt: "" })),
     element("h3", {}, `${title[0].toUpperCase()}${title.slice(1)}: #${design} ${content.joints(design)}`),
@@ -82,7 +84,8 @@ function survives(survival) {
   const held = survival.perturbations.filter((one) => !one.broken.length).map((one) => one.name);
   const lines = broken.map(({ name, broken: by }) => {
     const [first, ...others] = by, more = others.length ? ` and ${plural(others.length, "other")}` : "";
-    return element("p", { class: "missed" }, `Breaks with ${name}: ${first.change}, ${first.constraint}${more}`);
+    const change = first.change === name ? "" : `${first.change}, `;
+    return element("p", { class: "missed" }, `Breaks with ${name}: ${change}${first.constraint}${more}`);
   });
   return [...lines, ...(held.length ? [element("p", { class: "note" }, `Holds ${held.join("; ")}.`)] : [])];
 }

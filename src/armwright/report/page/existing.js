@@ -1,0 +1,84 @@
+// Existing arms beside the recommended designs: what an arm that can be bought does better, and what worse.
+
+import { listen, set, state } from "./state.js";
+import { $, element, plural, quantity, why } from "./format.js";
+
+const REACH = { name: "reach", label: "Reach", unit: "m", more: true, description: "The largest horizontal distance of the tip from the first joint." };
+const PAYLOAD = {
+  name: "payload_at_full_reach", label: "Payload there", unit: "kg", more: true,
+  description: "The mass that the actuators hold at that distance in every posture found, with the safety factor.",
+};
+const ASKED = ["price", "mass", "cycle_time", "deflection", "backlash_error"]; // after the objectives
+const ANY = 1e4; // [kg]; as much as is computed
+
+let content = null;
+
+export function openExisting(shownContent) {
+  content = shownContent;
+  drawExisting();
+  listen((changed) => { if (changed.has("design")) mark(); });
+}
+
+export function drawExisting() {
+  const { existing_arms: arms, quantities: explained } = content.head;
+  $("existing-box").hidden = !arms.length;
+  if (!arms.length) return;
+  const objectives = content.objectives.map((one) => ({ ...one, ...explained[one.name] }));
+  const others = ASKED.filter((name) => objectives.every((one) => one.name !== name)).map((name) => ({ name, ...explained[name] }));
+  const rows = [...content.head.recommended.map(ofDesign), ...arms.map(ofArm)];
+  const columns = [...objectives, REACH, PAYLOAD, ...others].filter(({ name }) => rows.some((row) => isKnown(row.values[name])));
+  const best = new Map(columns.map((column) => [column.name, bestOf(column, rows)]));
+  const heads = columns.map(({ label, description }) => element("th", {}, label, why(label, description)));
+  $("existing").replaceChildren(
+    element("thead", {}, element("tr", {}, element("th", { class: "text" }, "Arm"), ...heads, element("th", { class: "text" }, "On this task"))),
+    element("tbody", {}, ...rows.map((row) => tableRow(row, columns, best))));
+  const note = ["Bold: the best value of a column, among the arms that violate nothing."];
+  if (rows.some((row) => columns.some(({ name }) => !isKnown(row.values[name])))) note.push("–: not stated by the arm's file.");
+  if (content.head.recommended.length) note.push(`Masses and prices of designs do not include ${content.head.not_modelled}.`);
+  $("existing-note").textContent = note.join(" ");
+  $("existing-title").textContent = content.head.recommended.length ? "Existing arms beside the recommended designs" : "Existing arms";
+  mark();
+}
+
+const isKnown = (value) => value !== null && value !== undefined;
+
+function ofDesign({ design, reach, payload_at_full_reach, quantities }) {
+  const values = { ...quantities, reach, payload_at_full_reach };
+  content.objectives.forEach(({ name }, k) => { values[name] = content.values(design)[k]; });
+  return { name: `#${design} ${content.joints(design)}`, values, design, verdict: "meets all constraints" };
+}
+
+function ofArm({ name, reach, payload_at_full_reach, quantities, values: minimised, violated, dominance }) {
+  const values = { ...quantities, reach, payload_at_full_reach };
+  content.objectives.forEach((one, k) => { values[one.name] = minimised[k]; });
+  return { name, values, violated, verdict: describeDominance({ violated, dominance, values: minimised }) };
+}
+
+function bestOf({ name, more }, rows) {
+  const values = rows.filter((row) => !row.violated?.length).map((row) => row.values[name]).filter(isKnown);
+  return values.length > 1 ? Math[more ? "max" : "min"](...values) : null;
+}
+
+function tableRow({ name, values, design, violated, verdict }, columns, best) {
+  const cells = columns.map((column) => {
+    const value = values[column.name] ?? null;
+    const text = value === null ? "–" : column === PAYLOAD && value >= ANY ? "any" : quantity(value, column.unit);
+    return element("td", {}, !violated?.length && value !== null && value === best.get(column.name) ? element("strong", {}, text) : text);
+  });
+  const first = design === undefined ? name : element("button", { type: "button", onclick: () => set({ design }) }, name);
+  return element("tr", { "data-design": design ?? null }, element("td", { class: "text" }, first), ...cells,
+    element("td", { class: `text wrap${violated?.length ? " missed" : ""}` }, verdict));
+}
+
+export function describeDominance({ violated, dominance, values }) {
+  if (violated.length) return `violates ${violated.join(", ")}`;
+  const unknown = content.objectives.filter((_, k) => values[k] === null).map(({ label }) => label.toLowerCase());
+  if (unknown.length) return `not comparable with the front: ${unknown.join(", ")} unknown`;
+  if (dominance === null) return "not comparable: there is no front";
+  const [worse, better] = dominance;
+  return `dominates ${plural(worse, "design")} of the front, dominated by ${better}`;
+}
+
+function mark() {
+  for (const row of $("existing").querySelectorAll("tr[data-design]")) row.classList.toggle("chosen", Number(row.dataset.design) === state.design);
+}
