@@ -256,7 +256,9 @@ def test_page_shows_existing_arms_beside_the_recommended_designs(tmp_path: Path,
 def table(tab: Tab) -> dict[str, dict[str, str]]:
     """Return the page's table of existing arms: the cells of each arm by the heads of their columns."""
     heads = tab.ask("[...document.querySelectorAll('#existing th')].map((one) => one.firstChild.textContent)")
-    rows = tab.ask("[...document.querySelectorAll('#existing tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))")
+    rows = tab.ask(
+        "[...document.querySelectorAll('#existing tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))"
+    )
     return {row[0]: dict(zip(heads, row, strict=True)) for row in rows}
 
 
