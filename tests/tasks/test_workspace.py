@@ -20,6 +20,7 @@ from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.rotations import cone_directions
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.catalogue import load_task, random_task
+from armwright.tasks.obstacles import Box
 from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region, sample_regions
 from armwright.yaml_documents import parse_document
@@ -245,6 +246,24 @@ def test_dexterous_volume_of_padded_arms_is_their_own() -> None:
     both = evaluate([short, long], [[0.1, 0.2, 0.3]], workspace=[box])
     alone = evaluate(short, [[0.1, 0.2, 0.3]], workspace=[box])
     assert DEXTEROUS_VOLUME(both)[0] == DEXTEROUS_VOLUME(alone)[0]
+
+
+def test_points_behind_an_obstacle_are_not_dexterous() -> None:
+    """A rod on three slides reaches all points of a box, those above a plate only where the plate is not in its way."""
+    joints = tuple(Joint("prismatic", axis, -0.5, 0.5) for axis in ("x", "y", "z"))
+    short, rod = (uniform_link((0.0, 0.0, length), mass=0.1, radius=0.01) for length in (1e-4, 0.3))
+    gantry = Arm((0.0, 0.0, 0.0), joints, (short, short, rod))
+    up = {"axis": (0, 0, 1), "half_angle": 0.0, "count": 1}
+    box = region(low=(-0.3, -0.3, 0.31), high=(0.3, 0.3, 0.6), points=300, directions=up)
+    plate = Box(kind="box", center=(0.25, 0.0, 0.405), size=(0.5, 2.0, 0.01))
+    points = sample_regions((box,))
+    gap = np.hypot(np.maximum(-points[:, 0], 0.0), np.maximum(0.4 - points[:, 2], 0.0)) - rod.radius
+    assert 0.2 < (gap > 0.0).mean() < 0.8
+    assert DEXTEROUS_VOLUME(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box]))[0] == 1.0
+    behind = evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[plate])
+    assert (gap > 1e-3).mean() <= DEXTEROUS_VOLUME(behind)[0] <= (gap > -1e-3).mean()  # reached within 1 mm
+    around = Box(kind="box", center=(0.0, 0.0, 0.45), size=(1.0, 1.0, 0.4))
+    assert DEXTEROUS_VOLUME(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[around]))[0] == 0.0
 
 
 def test_regions_without_directions_do_not_count() -> None:

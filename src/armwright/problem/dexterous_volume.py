@@ -7,7 +7,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arm_arrays import ArmArrays
-from armwright.kinematics.reachable_poses import PoseSearch, Tolerances, sample_postures
+from armwright.kinematics.reachable_poses import PoseSearch, PostureConditions, Tolerances, sample_postures
+from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.targets import ALIGNED, REACHED
 from armwright.tasks.workspace import Region, sample_regions
 
@@ -19,10 +20,11 @@ NO_DIRECTIONS = (
 )
 
 
-def dexterous_volumes(arms: ArmArrays, workspace: Sequence[Region]) -> Array:
+def dexterous_volumes(arms: ArmArrays, workspace: Sequence[Region], obstacles: Sequence[Obstacle] = ()) -> Array:
     """Return the (N,) shares of the points at which arms reach the stated share of directions.
 
-    Only regions with directions count.
+    Only regions with directions count, and only postures that touch no obstacle; if there are any, none in which the
+    arm touches itself, either.
 
     Raises:
         SettingsError: No region has directions.
@@ -31,12 +33,16 @@ def dexterous_volumes(arms: ArmArrays, workspace: Sequence[Region]) -> Array:
     if not asked:
         raise SettingsError(NO_DIRECTIONS)
     tolerances = Tolerances(REACHED, ALIGNED)
+    free = PostureConditions(clearance=0.0, obstacles=tuple(obstacles)) if obstacles else None
     dexterous = np.zeros(len(arms))
     for i in range(len(arms)):
         arm = arms[i : i + 1]
         samples = sample_postures(arm, N_SAMPLES)
         for region, directions in asked:
             points = sample_regions((region,))
-            found = PoseSearch(arm, samples, points, directions.vectors, tolerances, N_STARTS).find()
+            search = PoseSearch(arm, samples, points, directions.vectors, tolerances, N_STARTS)
+            found = search.find()
+            if free is not None:
+                found = search.find_usable(found, free)
             dexterous[i] += int((found.reached.mean(axis=1) >= directions.share).sum())
     return dexterous / sum(region.points for region, _ in asked)

@@ -216,7 +216,7 @@ class Evaluation(Scene):
     @cached_property
     def dexterous_volume(self) -> Array:
         """(N,) share of the workspace with enough directions; SettingsError if no region has directions."""
-        return dexterous_volumes(self.arms, self.workspace)
+        return dexterous_volumes(self.arms, self.workspace, self.obstacles)
 
     @property
     def excess_error(self) -> Array:
