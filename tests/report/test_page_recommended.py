@@ -139,6 +139,7 @@ def test_cards_show_different_pictures_and_select_their_designs(
     tab.page.locator(f'.card[data-design="{last}"] .picture').click()
     assert tab.ask("armwright.state.design") == last
     assert tab.page.locator(".card.chosen").get_attribute("data-design") == str(last)
+    assert tab.text("#design-note").endswith(f"Data sheet: armwright datasheet {run.name} --design {last}")
 
 
 def test_loads_are_those_of_the_exported_trajectory(

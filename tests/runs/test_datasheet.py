@@ -328,7 +328,9 @@ def test_first_recommended_design_is_the_default(run: Path, tmp_path: Path) -> N
     first = [one["design"] for one in summary["recommended"][:1]]
     done = armwright("datasheet", run, "--out", tmp_path, "--json")
     if first:
-        assert json.loads(done.stdout)["design"] == first[0]
+        sheet = json.loads(done.stdout)
+        assert sheet["design"] == first[0]
+        assert sheet["role"] == ", ".join(one["role"] for one in summary["recommended"] if one["design"] == first[0])
     else:
         assert done.returncode == 1
 

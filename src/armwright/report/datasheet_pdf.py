@@ -185,7 +185,7 @@ def title_of(sheet: DataSheet) -> str:
 
 def verdict_of(sheet: DataSheet) -> str:
     """Return role, verdict and survival in one sentence; empty for an existing arm."""
-    role = f"Recommended as {sheet.role}" if sheet.role else ""
+    role = f"recommended ({sheet.role.replace('_', ' ')})" if sheet.role else ""
     broken = f"infeasible: {', '.join(sheet.violated)}" if sheet.violated else ""
     parts = [part for part in (broken, role, sheet.status and f"simulation: {sheet.status}", sheet.survival) if part]
     text = "; ".join(parts)
@@ -204,6 +204,7 @@ def _first_page(sheet: DataSheet) -> Figure:
             head.paragraph(verdict)
         left = TextColumn(page, LEFT, head.y, HALF, size, drawn)
         left.table(tables.key_figures(sheet))
+        left.table(tables.reach_table(sheet))
         right = TextColumn(page, LEFT + HALF + GUTTER, head.y, HALF, size, drawn)
         right.table(tables.link_table(sheet))
         right.table(tables.mass_table(sheet))

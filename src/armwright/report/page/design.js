@@ -97,7 +97,8 @@ export function drawDesign() {
   const lines = head.cycle ? ` Cycle: ${head.cycle}.` : "";
   const cases = head.cases ? ` Objectives are the worst of the nominal task and ${head.cases}; everything else is of the nominal task.` : "";
   const ignored = head.ignored_errors ? ` In this task, ${head.ignored_errors}.` : "";
-  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${ignored}${loads} ${head.masses}.${describeAssumed(i)}${solids}${lines}${boxes}`;
+  const sheet = hasServer() ? "" : ` Data sheet: armwright datasheet ${head.folder} --design ${i}`;
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${ignored}${loads} ${head.masses}.${describeAssumed(i)}${solids}${lines}${boxes}${sheet}`;
 }
 
 // Describes the quantities that constraints bound.

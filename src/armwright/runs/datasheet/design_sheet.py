@@ -50,8 +50,8 @@ def design_sheet(run: Path, number: int | None = None) -> DataSheet:
     chosen = _first(history, recommended) if number is None else number
     if not 0 <= chosen < len(history):
         raise SettingsError(f"--design {chosen}: {run} has the designs 0 to {len(history) - 1}")
-    record = next((one for one in recommended if one["design"] == chosen), None)
-    return sheet_of(history, history.member(chosen), _verdict(run, chosen, record))
+    records = [one for one in recommended if one["design"] == chosen]
+    return sheet_of(history, history.member(chosen), _verdict(run, chosen, records))
 
 
 def _first(history: History, recommended: Sequence[Mapping[str, Any]]) -> int:
@@ -100,11 +100,11 @@ def sheet_of(history: History, member: FrontMember, verdict: Verdict) -> DataShe
     )
 
 
-def _verdict(run: Path, number: int, record: Mapping[str, Any] | None) -> Verdict:
-    """Return the verdict on a design; record: its own among the recommended ones."""
-    if record is not None:
-        survival = record["survival"]
-        return Verdict(record["role"], record["status"], "" if survival is None else survival["verdict"])
+def _verdict(run: Path, number: int, records: Sequence[Mapping[str, Any]]) -> Verdict:
+    """Return the verdict on a design; records: its own among the recommended ones, one for each role."""
+    if records:
+        roles, status, survival = ", ".join(one["role"] for one in records), records[0]["status"], records[0]["survival"]
+        return Verdict(roles, status, "" if survival is None else survival["verdict"])
     try:
         simulated = json.loads((run / SIMULATION).read_text(encoding="utf-8"))["designs"]
         status = next((str(one["verdict"]) for one in simulated if one["design"] == number), NOT_SIMULATED)

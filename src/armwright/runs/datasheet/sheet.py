@@ -189,7 +189,7 @@ class DataSheet:
         base_yaw: The turn of its base link about the vertical.
         design: The number of the design in its run; None for an existing arm.
         joint_letters: The joint types in order.
-        role: Why the design is recommended; empty if it is not.
+        role: Why the design is recommended, such as `knee, least price`; empty if it is not.
         status: The verdict of the simulation.
         survival: Which perturbations it holds.
         violated: The constraints that it violates, or why its evaluation failed.
