@@ -7,9 +7,10 @@ import pytest
 
 from armwright.exceptions import RunFolderError
 from armwright.problem.problem import Problem
-from armwright.report.arm_figures import draw_arms
+from armwright.report.arm_figures import draw_arm, draw_arms
 from armwright.report.figures import chosen_members, draw_attribution, draw_hypervolume, draw_samples, write_figures
 from armwright.report.style import line
+from armwright.spaces.design_space import paper_space
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task, random_task
@@ -94,6 +95,20 @@ def test_arms_along_a_cycle_are_drawn_within_the_axes(tmp_path: Path) -> None:
             points = np.transpose(drawn.get_data_3d())  # type: ignore[attr-defined]
             assert (low <= points).all()
             assert (points <= high).all()
+
+
+def test_legend_of_arms_lists_what_is_drawn() -> None:
+    near, far = ((0.3, 0.0, 0.2), (0.2, 0.2, 0.2)), ((1.4, 0.0, 0.2), (0.2, 0.2, 0.2))
+    for by in ("line", "joint"):
+        for targets in (near, far):
+            steps = [{"to": 1}, {"to": 2, "by": by}]
+            task = Task.model_validate({"name": "two", "targets": targets, "cycle": {"time": 1.0, "steps": steps}})
+            problem = Problem(task, paper_space(joints=5))
+            history = optimize(problem, proposer="none", n_init=5, n_total=5, verify=False).history
+            member = history.member(0)
+            labels = [text.get_text() for text in draw_arm(history, "arm", member).legends[0].get_texts()]
+            assert ("missed by" in labels) == history.evaluation([0]).unreached.any() == (targets is far)
+            assert ("line of the cycle" in labels) == (by == "line")
 
 
 def test_chosen_members_are_the_ends_of_the_front_and_of_its_part_in_the_box(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def test_motion_in_time_follows_the_joint_path(run: Path, tab: Tab, history: His
     ):  # fmt: skip
         at = tab.ask(f"armwright.during(armwright.content.head, {number}, {time})")
         assert at["q"] == pytest.approx(posture(history, number, motion, share), abs=6e-3)
-        assert (at["target"], at["step"]) == (target, target + 1)
+        assert (at["target"], at["step"], at["moves"]) == (target, target + 1, share < 1.0)
     off_front = next(n for n in range(len(history)) if n not in {member.number for member in history.front})
     assert tab.ask(f"armwright.during(armwright.content.head, {off_front}, 0)") is None
 
@@ -108,8 +108,9 @@ def test_play_drives_the_arm_through_its_cycle(run: Path, tab: Tab, history: His
     })()""")
     tab.page.locator("#play").click()
     for target in (2, 3, 1):
-        tab.page.get_by_text(f"Target {target} of 3").wait_for()
+        tab.page.get_by_text(f"To target {target} of 3").wait_for()
     tab.page.locator("#play").click()
+    assert tab.text("#target-note").startswith("Target ")  # it shows the posture there
     assert tab.faults == []
     seen = [(target, np.array(joints)) for target, joints in tab.ask("seen")]
     tips = np.array([joints[-1] for _, joints in seen])

@@ -210,12 +210,15 @@ def _legend(evaluation: Evaluation, is_narrow: bool) -> tuple[list[Line2D | Patc
         legend_mark("base", "s", FRONT),
         *(legend_mark(JOINT_LABEL[axis], "o", JOINT[axis]) for axis in "xyz"),
         legend_mark("target", "*", TARGET, markersize=9, markeredgecolor=FRONT),
-        Line2D([], [], **MISS, label="missed by"),
     ]
+    if evaluation.unreached.any():
+        handles.append(Line2D([], [], **MISS, label="missed by"))
     if evaluation.obstacles:
         handles.append(Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle"))
     if evaluation.plan is not None:
-        handles += [Line2D([], [], **MOVE, label="line of the cycle"), Line2D([], [], **TIP, label="its tip")]
+        if any(motion.by == "line" for motion in evaluation.plan.motions):
+            handles.append(Line2D([], [], **MOVE, label="line of the cycle"))
+        handles.append(Line2D([], [], **TIP, label="path of the tip"))
     if evaluation.workspace:
         handles.append(Line2D([], [], **EDGE, label="workspace"))
     return handles, NARROW if is_narrow else len(handles)

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
@@ -153,6 +153,8 @@ def draw_search(history: History, search: Mapping[str, Any]) -> Figure:
     evaluations, volumes = np.array(search["hypervolume_history"]).T
     axes.step(evaluations, volumes, where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     axes.set_xscale("log")
+    if evaluations[-1] < 100 * evaluations[0]:  # else decades suffice
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))  # the usual one writes markup
     axes.xaxis.set_minor_formatter(NullFormatter())
     _label_hypervolume(axes, history, "Designs evaluated")

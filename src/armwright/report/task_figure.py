@@ -103,11 +103,12 @@ def _handles(problem: Problem) -> list[Line2D | Patch]:
     ]
     if problem.task.obstacles:
         handles.append(Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle"))
-    if problem.scenes[0].plan is not None:
-        handles += [
-            Line2D([], [], **MOVE, label="line of the cycle"),
-            Line2D([], [], **PATH, label="joint motion between"),
-        ]
+    plan = problem.scenes[0].plan
+    ways = {motion.by for motion in plan.motions} if plan else set[str]()
+    if "line" in ways:
+        handles.append(Line2D([], [], **MOVE, label="line of the cycle"))
+    if ways - {"line"}:
+        handles.append(Line2D([], [], **PATH, label="joint motion between"))
     if problem.task.workspace:
         handles.append(Line2D([], [], **EDGE, label="workspace"))
     return handles

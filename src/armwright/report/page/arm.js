@@ -12,7 +12,7 @@ import { $, colour, element, number, onTheme, shown } from "./format.js";
 const MOVE = 700; // [ms] from one posture to the next
 const REST = 500; // [ms] at a target while playing
 const VIEW = [0.55, -1, 0.42]; // initial direction of the camera
-const PICTURE = [480, 320], CLOSER = 1.3; // [px] of snapshots, and how much nearer they are than the whole frame
+const PICTURE = [480, 320], CLOSER = 1.24; // [px] of snapshots, and how much nearer they are than the whole frame
 const FILLS = 0.8; // an arm smaller than this share of the frame's radius gets a new frame
 const ARROW = 0.16; // length of arrows, as a share of the frame's radius
 const SLACK = 0.2; // share of the frame's radius by which an arm may leave it before it grows
@@ -26,6 +26,7 @@ let materials = {};
 let moving = null; // { from, to, began } in joint space
 let playing = false;
 let began = null; // time [ms] at which the played cycle began; null while not moving along one
+let onTheWay = false; // whether the arm moves along the cycle, so that it is at no target
 let cloud = null; // { points, colours, radius, corners } of points around the arm; null for none
 
 export function openArm(shownContent) {
@@ -374,6 +375,7 @@ function play(on) {
   playing = on;
   clearInterval(beat);
   beat = began = null;
+  onTheWay = false;
   $("play").setAttribute("aria-pressed", on);
   $("play").textContent = on ? "Stop" : "Play";
   if (!on) drawArm();
@@ -394,7 +396,10 @@ function drive(now) {
     play(true);
     return;
   }
+  const changed = at.moves !== onTheWay;
+  onTheWay = at.moves;
   set({ target: at.target });
+  if (changed) describeTarget();
   empty(groups.ghost);
   drawPosture(groups.arm, content.arm(state.design), at.q, materials);
   paintTargets();
@@ -407,8 +412,8 @@ function describeTarget() {
   if (i === null) return;
   const one = postures(i)[state.target], n = content.targets.length;
   $("arm-title").textContent = `#${i} ${content.joints(i)}`;
-  const verdict = one.missed ? `missed by ${describeMiss(one)}: ${why(content.arm(i), one)}` : "reached";
-  $("target-note").textContent = `Target ${state.target + 1} of ${n}: ${verdict}`;
+  const verdict = one.missed ? `missed by ${describeMiss(one)}: ${why(content.arm(i), one)}` : "reached", which = `arget ${state.target + 1} of ${n}`;
+  $("target-note").textContent = onTheWay ? `To t${which}` : `T${which}: ${verdict}`;
   $("target-note").className = one.missed ? "missed" : "";
   $("compare").setAttribute("aria-pressed", state.compared !== null);
   $("compare").textContent = state.compared === null ? "Compare" : `Beside #${state.compared} ✕`;

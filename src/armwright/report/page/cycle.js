@@ -3,7 +3,7 @@
 const PAUSE = 1; // [s] after the end of an open cycle, before it begins again
 
 // Returns where a design is at a time [s] after the cycle began: its joint values, the target that it moves to or rests
-// at, and the step. Returns null for a design whose way is not known.
+// at, the step, and whether it moves. Returns null for a design whose way is not known.
 export function during(head, design, time) {
   const cycle = head.cycles[design];
   if (cycle === undefined) return null;
@@ -12,10 +12,10 @@ export function during(head, design, time) {
   let left = time % cycle.seconds.reduce((sum, seconds, m) => sum + seconds + rests[m], 0);
   for (const [m, { target, step }] of head.motions.entries()) {
     const share = Math.min(1, left / cycle.seconds[m]);
-    if (left < cycle.seconds[m] + rests[m]) return { q: between(cycle.q[m], profile(share)), target, step };
+    if (left < cycle.seconds[m] + rests[m]) return { q: between(cycle.q[m], profile(share)), target, step, moves: share < 1 };
     left -= cycle.seconds[m] + rests[m];
   }
-  return { q: cycle.q.at(-1).at(-1), target: head.motions.at(-1).target, step: head.motions.at(-1).step };
+  return { q: cycle.q.at(-1).at(-1), target: head.motions.at(-1).target, step: head.motions.at(-1).step, moves: false };
 }
 
 // From rest to rest (docs/method.md, section 17).

@@ -42,6 +42,7 @@ export function quantity(value, unit) {
     case "of allowed": return `${percent(value, 0)} of allowed`;
     case "fraction": return percent(value, 0);
     case "USD": return `${Math.round(value).toLocaleString("en")} USD`;
+    case "targets": case "joints": case "voltages": return `${number(value, 3)} ${value === 1 ? unit.slice(0, -1) : unit}`;
     default: return `${number(value, 3)} ${unit.replace(" x ", " × ")}`;
   }
 }

@@ -103,8 +103,8 @@ def sheet_of(history: History, member: FrontMember, verdict: Verdict) -> DataShe
 def _verdict(run: Path, number: int, records: Sequence[Mapping[str, Any]]) -> Verdict:
     """Return the verdict on a design; records: its own among the recommended ones, one for each role."""
     if records:
-        roles, status, survival = ", ".join(one["role"] for one in records), records[0]["status"], records[0]["survival"]
-        return Verdict(roles, status, "" if survival is None else survival["verdict"])
+        first, roles = records[0], ", ".join(one["role"] for one in records)
+        return Verdict(roles, first["status"], "" if first["survival"] is None else first["survival"]["verdict"])
     try:
         simulated = json.loads((run / SIMULATION).read_text(encoding="utf-8"))["designs"]
         status = next((str(one["verdict"]) for one in simulated if one["design"] == number), NOT_SIMULATED)
