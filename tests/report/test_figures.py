@@ -104,10 +104,11 @@ def test_legend_of_arms_lists_what_is_drawn() -> None:
             steps = [{"to": 1}, {"to": 2, "by": by}]
             task = Task.model_validate({"name": "two", "targets": targets, "cycle": {"time": 1.0, "steps": steps}})
             problem = Problem(task, paper_space(joints=5))
-            history = optimize(problem, proposer="none", n_init=5, n_total=5, verify=False).history
-            member = history.member(0)
+            history = optimize(problem, proposer="none", n_init=20, n_total=20, verify=False).history
+            number = int(history.values[:, 0].argmin())
+            member = history.member(number)
             labels = [text.get_text() for text in draw_arm(history, "arm", member).legends[0].get_texts()]
-            assert ("missed by" in labels) == history.evaluation([0]).unreached.any() == (targets is far)
+            assert ("missed by" in labels) == history.evaluation([number]).unreached.any() == (targets is far)
             assert ("line of the cycle" in labels) == (by == "line")
 
 
