@@ -22,12 +22,7 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
     assert summary["search"]["evaluations"] >= 4000
     assert summary["folder"] == "runs/target-1-design-seed4"
 
-    rows = armwright("design", "target-1", "--evaluations", "4000", "--seed", "4", "--no-figures", "--csv").stdout
-    assert rows == (in_folder / "runs" / "target-1-design-seed4" / "front.csv").read_text()
-    assert "expected one of them" in refused(2, "design", "target-1", "--json", "--csv")
-
-    rows = armwright("optimize", "target-1", *SHORT, "--proposer", "none", "--out", "mine", "--csv").stdout
-    assert rows == (in_folder / "mine" / "front.csv").read_text()
+    armwright("optimize", "target-1", *SHORT, "--proposer", "none", "--out", "mine")
     refined = armwright("refine", "mine", "--evaluations", "120")
     assert refined.returncode == 0, refined.stderr
     assert "improved designs" in refined.stdout

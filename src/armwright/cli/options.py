@@ -104,7 +104,6 @@ Figures = Annotated[
     ),
 ]
 SummaryJson = Annotated[bool, typer.Option("--json", help="Print only summary.json to stdout.", rich_help_panel=OUTPUT)]
-FrontCsv = Annotated[bool, typer.Option("--csv", help="Print only front.csv to stdout.", rich_help_panel=OUTPUT)]
 Json = Annotated[bool, typer.Option("--json", help="Print only JSON to stdout.", rich_help_panel=OUTPUT)]
 Csv = Annotated[bool, typer.Option("--csv", help="Print only CSV to stdout, in SI units.", rich_help_panel=OUTPUT)]
 Scheduler = Annotated[

@@ -1,9 +1,9 @@
 """Commands that search designs: design, optimize, refine."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -17,7 +17,6 @@ from armwright.cli.options import (
     EvaluationTimeout,
     EvaluatorName,
     Figures,
-    FrontCsv,
     MaxCost,
     MemoryName,
     ModelName,
@@ -34,14 +33,7 @@ from armwright.cli.options import (
     load_problem,
     select_workers,
 )
-from armwright.cli.streams import (
-    check_formats,
-    exit_interrupted,
-    open_console,
-    print_command,
-    print_json,
-    repeat_command,
-)
+from armwright.cli.streams import exit_interrupted, open_console, print_command, print_json, repeat_command
 from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 
 
@@ -73,7 +65,6 @@ def design(
     seed: Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-design-seedSEED")] = None,
     json_: SummaryJson = False,
-    csv_: FrontCsv = False,
 ) -> None:
     """Find the whole Pareto front of TASK by direct search in batches.
 
@@ -91,7 +82,7 @@ def design(
 
     if from_ is not None and proposer is not None:
         raise SettingsError("--from and --proposer both set the initial designs; use one of them")
-    console = open_console(check_formats(json_, csv_))
+    console = open_console(json_)
     announce_compilation(console)
     plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=figures, started=started)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
@@ -118,8 +109,8 @@ def design(
         drawn = _draw(folder, lambda seconds: plan.left >= seconds) if figures else []
     except KeyboardInterrupt:
         exit_interrupted(console, f"the search is saved in {folder}/")
-    if json_ or csv_:
-        _print_data(folder, run.summary, csv_)
+    if json_:
+        print_json({"folder": folder, **run.summary})
         return
     if run.resumed:
         search = run.summary["search"]
@@ -209,7 +200,6 @@ def optimize(
         ),
     ] = False,
     json_: SummaryJson = False,
-    csv_: FrontCsv = False,
 ) -> None:
     """Search designs for TASK by black-box trials and proposals.
 
@@ -224,7 +214,7 @@ def optimize(
     from armwright.spaces.design_file import read_design
     from armwright.study.study import optimize as run_study
 
-    console = open_console(check_formats(json_, csv_))
+    console = open_console(json_)
     announce_compilation(console)
     problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
     if space is None and (note := space_note(problem)):
@@ -278,8 +268,8 @@ def optimize(
             files = {"folder": folder, "question": pending.question, "answer": pending.answer}
             print_json({**files, "refusal": pending.refusal})
         return
-    if json_ or csv_:
-        _print_data(folder, run.summary, csv_)
+    if json_:
+        print_json({"folder": folder, **run.summary})
     else:
         if finished_before:
             console.print(f"{folder}/ is finished; nothing was computed again. A larger --n-total extends it.")
@@ -294,30 +284,18 @@ def refine(
     run: RunFolder,
     evaluations: Annotated[int, typer.Option(help="Evaluations per design of the front.")] = 1000,
     json_: SummaryJson = False,
-    csv_: FrontCsv = False,
 ) -> None:
     """Refine base and link lengths of RUN's Pareto designs, and add the improved designs to the run."""
     from armwright.cli.show_results import show_refined
     from armwright.study.refine_run import refine_run
 
-    is_data = check_formats(json_, csv_)
     with activity("refining the designs of the front"):
         refined = refine_run(run, evaluations)
     _draw(run)
-    if is_data:
-        _print_data(run, refined.summary, csv_)
+    if json_:
+        print_json({"folder": run, **refined.summary})
         return
     show_refined(open_console(), refined)
-
-
-def _print_data(folder: Path, summary: Mapping[str, Any], is_csv: bool) -> None:
-    """Print the front of a finished run as CSV, or its summary as JSON."""
-    if is_csv:
-        from armwright.runs.results import FRONT_TABLE
-
-        typer.echo((folder / FRONT_TABLE).read_text(encoding="utf-8"), nl=False)
-    else:
-        print_json({"folder": folder, **summary})
 
 
 def _draw(folder: Path, has_time: Callable[[float], bool] = lambda _: True) -> list[Path]:

@@ -37,8 +37,7 @@ from armwright.runs.verification import Verification, verify_front
 SUMMARY = "summary.json"
 FIGURES = "figures"  # drawn by report/figures.py
 REPORT = "report.html"  # made by report/page.py
-FRONT_TABLE = "front.csv"
-TABLES = ("trials.csv", FRONT_TABLE)
+TABLES = ("trials.csv", "front.csv")
 MAX_FALLBACK_SHARE = 0.1  # of a proposer's trials; runs with more are flagged, and tables leave them out
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
 CASES = ("exact", "moved", "started")  # in which the objectives of a design are verified
@@ -59,7 +58,7 @@ def write_results(
     rows = [_row(history, trial) for trial in history]
     folder.write_text("trials.csv", to_csv(rows))
     on_front = sorted(member.number for member in history.front)
-    folder.write_text(FRONT_TABLE, to_csv(rows[number] | _flat_verdict(verdicts.get(number)) for number in on_front))
+    folder.write_text("front.csv", to_csv(rows[number] | _flat_verdict(verdicts.get(number)) for number in on_front))
     write_designs(folder, history, verdicts)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
