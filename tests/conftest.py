@@ -100,8 +100,12 @@ _started: list[str] = []
 
 
 def _note_process(event: str, arguments: tuple[Any, ...]) -> None:
-    if event == "subprocess.Popen" and arguments[1][0] != "uname":  # which Python's own `platform` asks
-        _started.append(str(arguments[1]))
+    if event != "subprocess.Popen":
+        return
+    command = str(arguments[1])
+    # Python's own `platform` asks uname, and the first import of mujoco asks a process for the version of glfw.
+    if arguments[1][0] != "uname" and "glfwGetVersion" not in command:
+        _started.append(command)
 
 
 sys.addaudithook(_note_process)

@@ -110,13 +110,14 @@ def test_targets_of_cycles_are_named_and_tools_extend_the_arm() -> None:
     arm = space(joints=5, link=[0.1, 0.3], origin_x=[-0.1, 0.1], origin_y=[-0.1, 0.1], origin_z=[0.0, 0.1])
     targets = [{"name": "bin", "position": [0.3, 0.0, 0.1]}, {"name": "home", "position": [1.7, 0.0, 0.05]}]
     cycle = {"steps": [{"to": "bin"}, {"to": "home"}], "time": 2.0}
-    evidence, message = only(problem(targets, arm, cycle=cycle))
+    evidence, message = only(problem(targets, arm, cycle=cycle, objectives=["torque"]))
     assert evidence == PROVEN
     assert message.startswith(
         "target home (1.7, 0, 0.05) m is 1.6 m from the nearest allowed base, but the longest arm"
     )
     assert "reaches 1.5 m; move it, or widen" in message
-    assert found(problem(targets, arm, cycle=cycle, tool={"tip": [0.0, 0.0, 0.101]})) == []
+    longer = problem(targets, arm, cycle=cycle, objectives=["torque"], tool={"tip": [0.0, 0.0, 0.101]})
+    assert found(longer) == []
 
 
 def test_targets_within_what_the_task_allows_are_not_refused() -> None:
@@ -173,7 +174,7 @@ def test_target_on_a_surface_or_within_its_tolerance_is_fine(target: Any) -> Non
 )
 def test_proven_obstacles_leave_no_feasible_design(height: float, bounds: list[str], is_proven: bool) -> None:
     arm = space(joints=5, origin_z=[0.1, 0.6])
-    checked = problem([[0.3, 0.1, height]], arm, obstacles=[TABLE], constraints=bounds)
+    checked = problem([[0.3, 0.1, height]], arm, obstacles=[TABLE], constraints=bounds, objectives=["torque"])
     assert [evidence for evidence, _ in found(checked)] == [PROVEN] * is_proven
     if is_proven:
         sampled = violations(checked, random_designs(checked, 3000, np.random.default_rng(0)))
@@ -262,9 +263,9 @@ def test_constraints_that_designs_can_satisfy_are_not_refused(bounds: list[str])
 
 def test_stated_durations_bound_the_time_of_a_cycle() -> None:
     cycle = {"steps": [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}], "time": 1.5, "dwell": 0.5}
-    targets = [HERE, [0.4, -0.2, 0.3]]
-    assert found(problem(targets, cycle=cycle, constraints=["cycle_time <= 4"])) == []
-    evidence, message = only(problem(targets, cycle=cycle, constraints=["cycle_time <= 3.9"]))
+    keys: dict[str, Any] = {"targets": [HERE, [0.4, -0.2, 0.3]], "cycle": cycle, "objectives": ["torque"]}
+    assert found(problem(**keys, constraints=["cycle_time <= 4"])) == []
+    evidence, message = only(problem(**keys, constraints=["cycle_time <= 3.9"]))
     assert (evidence, "cycle_time is at least 4 s" in message) == (PROVEN, True)
 
 
@@ -308,12 +309,16 @@ def test_approach_beyond_reach_is_proven() -> None:
     ]
     cycle = {"steps": [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}], "time": 1.5}
     arm = space(joints=5, origin_z=[0.0, 0.1])
-    assert found(problem(targets, arm, cycle={**cycle, "approach": 1.2})) == []  # 1.4 m above the highest base
-    (evidence, message), second = found(problem(targets, arm, cycle={**cycle, "approach": 60}))
+
+    def raised(approach: float) -> Problem:
+        return problem(targets, arm, cycle={**cycle, "approach": approach}, objectives=["torque"])
+
+    assert found(raised(1.2)) == []  # 1.4 m above the highest base
+    (evidence, message), second = found(raised(60))
     assert evidence == PROVEN
     assert message.startswith("cycle: the approach of target bin begins at (0.4, 0.2, 60.3) m, 60.2 m from")
     assert (second[0], "approach = 60 m exceeds" in second[1]) == (SUSPECTED, True)
-    checked = problem(targets, arm, cycle={**cycle, "approach": 1.4})
+    checked = raised(1.4)
     assert only(checked)[0] == PROVEN
     sampled = violations(checked, random_designs(checked, 30, np.random.default_rng(0)))
     names = [constraint.quantity.name for constraint in checked.constraints]

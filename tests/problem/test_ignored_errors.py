@@ -10,7 +10,7 @@ from armwright.problem.checks.instant import check_instantly
 from armwright.problem.ignored_errors import describe_ignored_errors, stated_tolerance
 from armwright.problem.objectives import OBJECTIVES
 from armwright.problem.problem import Problem
-from armwright.spaces.design_space import default_space, paper_space
+from armwright.spaces.design_space import DesignSpace, default_space, paper_space
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.targets import ALIGNED, REACHED
 from armwright.tasks.task import Task
@@ -120,21 +120,41 @@ def test_fronts_hold_one_design_within_the_tolerances() -> None:
 
 
 @pytest.mark.parametrize(
-    ("targets", "constraints", "n"),
+    ("targets", "constraints", "start"),
     [
-        ([{"position": HERE, "tolerance": 0.002}], ["unreached_targets <= 0"], 1),
-        ([{"position": HERE, "tolerance": 0.002}, THERE], ["unreached_targets <= 0"], 0),
-        ([{"position": HERE, "tolerance": 0.002}], [], 0),
-        ([HERE], ["unreached_targets <= 0"], 0),
+        ([{"position": HERE, "tolerance": 0.002}], ["unreached_targets <= 0"], "worst_error: 0 for"),
+        ([{"position": HERE, "tolerance": 0.002}, THERE], ["unreached_targets <= 0"], "worst_error: next to 0 for"),
+        ([{"position": HERE, "tolerance": 0.002}], [], None),
+        ([HERE], ["unreached_targets <= 0"], "worst_error: next to 0 for"),
+        ([HERE], ["unreached_targets <= 1"], None),
     ],
 )
 def test_objectives_that_no_feasible_design_can_improve_are_reported(
-    targets: list[Any], constraints: list[str], n: int
+    targets: list[Any], constraints: list[str], start: str | None
 ) -> None:
     keys: dict[str, Any] = {"objectives": ["worst_error", "torque"], "constraints": constraints}
-    found = [one for one in check_instantly(problem(*targets, **keys)) if "0 for every feasible design" in str(one)]
-    assert len(found) == n
-    assert all("worst_error" in str(one) for one in found)
+    found = [str(one) for one in check_instantly(problem(*targets, **keys)) if "for every feasible design" in str(one)]
+    assert len(found) == (start is not None)
+    assert all(one.startswith(str(start)) for one in found)
+
+
+def test_objectives_that_suit_the_task_are_suggested() -> None:
+    """The suggestion can be evaluated, and the check has nothing against it."""
+    cycle = {"steps": [{"to": 1}, {"to": 2}]}
+    motors = DesignSpace.model_validate({"name": "m", "joints": 4, "actuators": ["XL430-W250", "XM430-W350"]})
+    for keys, space in (
+        ({"constraints": ["unreached_targets <= 0"]}, paper_space()),
+        ({"cycle": cycle}, paper_space()),
+        ({"cycle": {**cycle, "time": 2.0}}, paper_space()),
+        ({"cycle": cycle}, motors),
+        ({"cycle": {**cycle, "time": 2.0}}, motors),
+    ):
+        first = Problem(task(HERE, THERE, **keys), space)  # type: ignore[arg-type]
+        (text,) = [str(one) for one in check_instantly(first) if "for every feasible design" in str(one)]
+        names = text.partition("objectives: [")[2].partition("]")[0].split(", ")
+        second = Problem(task(HERE, THERE, **keys, objectives=names), space)  # type: ignore[arg-type]
+        assert check_instantly(second) == []
+        assert second.evaluate(space.sample(3, 0)).values.shape == (3, 2)
 
 
 def test_descriptions_name_the_objectives() -> None:

@@ -202,9 +202,9 @@ def test_expensive_results_leave_fewer_designs_and_less_search(clock: Clock) -> 
     assert left == sorted(left, reverse=True)
     assert kept == [300, 300, 120, 12]
     plan.costs = ResultCosts(0.01, simulation=0.5)
-    assert plan.search_left == pytest.approx(left[1] - 9 * 0.5)
+    assert plan.search_left == pytest.approx(left[1] - 15 * 0.5)
     plan.costs = ResultCosts(0.01, simulation=0.5, survival=0.25)
-    assert plan.search_left == pytest.approx(left[1] - 9 * 0.5 - 3 * 0.25)
+    assert plan.search_left == pytest.approx(left[1] - 15 * 0.5 - 5 * 0.25)
 
 
 def test_simulations_and_perturbations_need_time(clock: Clock) -> None:

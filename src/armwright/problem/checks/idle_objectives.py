@@ -1,4 +1,4 @@
-"""Objectives that are 0 for every feasible design, so that a search cannot improve them."""
+"""Error objectives that constraints keep within the tolerances, so that a search cannot improve them."""
 
 import numpy as np
 
@@ -6,34 +6,55 @@ from armwright.problem.checks.finding import SUSPECTED, Finding
 from armwright.problem.constraints import Constraint
 from armwright.problem.ignored_errors import ANGLES, LINES, POSITIONS, stated_tolerance
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import UNREACHED_TARGETS
+from armwright.problem.objectives import CYCLE_TIME, DYNAMIC_TORQUE, MASS, PEAK_TORQUE, PRICE, UNREACHED_TARGETS
 from armwright.problem.problem import Problem
 
 
 def check_idle_objectives(problem: Problem) -> list[Finding]:
-    """Find objectives whose errors the constraints keep below the stated tolerances."""
+    """Find objectives whose errors the constraints keep within the tolerances."""
     findings: list[Finding] = []
-    for objective in problem.objectives:
-        for constraint in problem.constraints:
-            if _is_idle(problem, objective, constraint):
+    for constraint in problem.constraints:
+        bounded = [objective for objective in problem.objectives if _is_bounded(problem, objective, constraint)]
+        for ignored, why in ((True, "below which they count as 0"), (False, "and postures are found more exactly")):
+            names = [objective.name for objective in bounded if _is_ignored(problem, objective) == ignored]
+            if names:
                 findings.append(
                     Finding(
-                        f'objective {objective.name} is 0 for every feasible design: "{constraint.description}" keeps '
-                        f"errors within the stated tolerances, below which they count as 0; try objectives without "
-                        f"{objective.name}, or leave out the tolerances",
+                        f"{' and '.join(names)}: {'0' if ignored else 'next to 0'} for every feasible design, as "
+                        f'"{constraint.description}" keeps errors within the {"stated " if ignored else ""}tolerances, '
+                        f"{why}; try {_others(problem)}",
                         SUSPECTED,
                     )
                 )
     return findings
 
 
-def _is_idle(problem: Problem, objective: Objective, constraint: Constraint) -> bool:
-    """Return whether a constraint keeps an error objective at 0."""
-    name, task = objective.name, problem.task
-    if name in LINES:
-        tolerance = stated_tolerance(task, objective)
+def _is_bounded(problem: Problem, objective: Objective, constraint: Constraint) -> bool:
+    """Return whether a constraint keeps an error objective within the tolerances."""
+    if objective.name in LINES:
+        tolerance = stated_tolerance(problem.task, objective)
         return constraint.quantity == objective and constraint.bound <= float(tolerance.min(initial=0.0))
-    if name not in (*POSITIONS, *ANGLES) or constraint.quantity != UNREACHED_TARGETS or constraint.bound >= 1.0:
-        return False
-    relevant = task.target_arrays.n_angular > 0 if name in ANGLES else np.full(len(task.targets), True)
-    return bool((stated_tolerance(task, objective)[relevant] > 0.0).all())
+    is_error = objective.name in (*POSITIONS, *ANGLES)
+    return is_error and constraint.quantity == UNREACHED_TARGETS and constraint.bound < 1.0
+
+
+def _is_ignored(problem: Problem, objective: Objective) -> bool:
+    """Return whether errors within the tolerances count as 0 at all targets."""
+    if objective.name in LINES:
+        return True
+    arrays = problem.task.target_arrays
+    relevant = arrays.n_angular > 0 if objective.name in ANGLES else np.full(len(arrays), True)
+    return bool((stated_tolerance(problem.task, objective)[relevant] > 0.0).all())
+
+
+def _others(problem: Problem) -> str:
+    """Return objectives that suit the task, as its file would state them."""
+    motors, cycle = problem.space.actuators, problem.task.cycle
+    if cycle is None:
+        first = PEAK_TORQUE
+    elif None not in cycle.durations():
+        first = DYNAMIC_TORQUE
+    else:
+        first = CYCLE_TIME if motors else PEAK_TORQUE
+    second = PRICE if motors and all(motor.price is not None for motor in motors) else MASS
+    return f"objectives: [{first.name}, {second.name}]"
