@@ -1,66 +1,51 @@
-"""Reference points that direct searches find."""
+"""The reference point that a direct search chooses, and the hypervolumes that it bounds."""
 
-from pathlib import Path
-
+import moocore
 import numpy as np
 import pytest
 
-from armwright.pareto import hypervolume
-from armwright.problem.problem import Problem
-from armwright.runs.folder import read_config
-from armwright.runs.results import read_summary
-from armwright.spaces.design_space import paper_space
-from armwright.study.front_run import find_front
+import armwright as aw
+from armwright.problem.problem import Outcomes, Problem
+from armwright.study.reference_survey import ReferenceSurvey
 from armwright.tasks.task import Task
 
-TARGETS = ((0.3, 0.0, 0.3), (0.2, 0.1, 0.4))
+TASK = Task.model_validate(
+    {
+        "name": "near",
+        "targets": [[0.3, 0.1, 0.2]],
+        "objectives": ["mass", "torque"],
+        "constraints": ["worst_error <= 1"],
+    }
+)
 
 
-def problem(*constraints: str) -> Problem:
-    content = {"name": "open", "targets": TARGETS, "objectives": ["worst_error", "torque"], "constraints": constraints}
-    return Problem(Task.model_validate(content), paper_space())
+@pytest.mark.parametrize("size", [1, 37])
+def test_history_is_that_of_all_feasible_designs(size: int) -> None:
+    """Compare with moocore at the end of each chunk of designs."""
+    rng = np.random.default_rng(size)
+    values, violations = rng.uniform(size=(600, 2)), rng.uniform(-1.0, 1.0, (600, 1))
+    survey, point = ReferenceSurvey(Problem(TASK), seed=0), (0.9, 0.8)
+    for start in range(0, len(values), size):
+        chunk = slice(start, start + size)
+        survey.add(Outcomes(values[chunk], violations[chunk]))
+        numbers, volumes = np.array([(0, 0.0), *survey.history(point)]).T
+        assert (np.diff(numbers) > 0).all()
+        feasible = values[: start + size][violations[: start + size, 0] <= 0.0]
+        expected = moocore.hypervolume(feasible, ref=point) if len(feasible) else 0.0
+        assert volumes[-1] == pytest.approx(expected)
 
 
-def test_bounded_objectives_take_their_bounds() -> None:
-    run = find_front(problem("worst_error <= 0.003", "torque <= 2"), evaluations=500, seed=0)
-    assert run.history.reference_point == pytest.approx((0.0033, 2.2))
-    assert run.summary["search"]["reference_point_from"] == ["worst_error <= 0.003", "torque <= 2"]
-
-
-def test_other_objectives_take_a_point_from_feasible_designs() -> None:
-    run = find_front(problem("worst_error <= 0.01"), evaluations=20_000, seed=0)
-    assert run.history.reference_point is not None
-    error, torque = run.history.reference_point
-    assert error == pytest.approx(0.011)
-    assert run.summary["search"]["reference_point_from"] == ["worst_error <= 0.01", "feasible designs"]
-    highest = run.history.values[:, 1].max()
-    assert highest < torque < 5.0 * highest
-    final = run.summary["search"]["hypervolume_history"][-1][1]
-    assert final == pytest.approx(hypervolume(run.history.values, (error, torque)), rel=1e-2)
-
-
-def test_a_search_without_feasible_designs_states_that_its_point_is_provisional() -> None:
-    run = find_front(problem("worst_error <= 0.01", "length <= 0.13"), evaluations=1000, seed=0)
-    assert not run.history.feasible.any()
-    assert run.summary["search"]["reference_point_from"] == ["worst_error <= 0.01", "random designs"]
-
-
-@pytest.mark.parametrize("evaluations", [700, 5000])
-def test_a_resumed_search_finds_the_same_point(evaluations: int, tmp_path: Path) -> None:
-    """The first session ends before, or after, the point is set."""
-    bounded = problem("worst_error <= 0.05")
-    whole = find_front(bounded, evaluations=8000, seed=0)
-    first = find_front(bounded, evaluations=evaluations, seed=0, out=tmp_path / "run")
-    assert (first.history.reference_point == whole.history.reference_point) == (evaluations == 5000)
-    resumed = find_front(bounded, evaluations=8000, seed=0, out=tmp_path / "run")
-    assert resumed.resumed > 0
-    assert resumed.history.reference_point == whole.history.reference_point
-    assert read_config(tmp_path / "run").reference_point == whole.history.reference_point
-    assert np.array_equal(resumed.history.values, whole.history.values)
-    assert resumed.summary["search"]["hypervolume_history"] == whole.summary["search"]["hypervolume_history"]
-    assert read_summary(tmp_path / "run") == resumed.summary
-
-
-def test_the_point_stays_once_it_is_set() -> None:
-    runs = [find_front(problem("worst_error <= 0.05"), evaluations=n, seed=0) for n in (5000, 7000)]
-    assert runs[0].history.reference_point == runs[1].history.reference_point
+def test_no_hypervolume_is_reported_before_its_reference_point_is_chosen() -> None:
+    reported = list[float | None]()
+    run = aw.find_front(Problem(TASK), evaluations=4000, watch=lambda progress: reported.append(progress.hypervolume))
+    n_unknown = reported.index(next(volume for volume in reported if volume is not None))
+    assert n_unknown > 0
+    assert None not in reported[n_unknown:]
+    evaluations, volumes = np.array(run.summary["search"]["hypervolume_history"]).T
+    assert evaluations[0] < 100
+    assert (np.diff(volumes) >= -1e-12).all()
+    assert volumes[-1] == pytest.approx(run.summary["hypervolume"]["final"])
+    short = aw.find_front(Problem(TASK), evaluations=500)  # too few for a final point
+    evaluations, volumes = np.array(short.summary["search"]["hypervolume_history"]).T
+    assert len(volumes) > 3
+    assert volumes[-1] == pytest.approx(short.summary["hypervolume"]["final"])

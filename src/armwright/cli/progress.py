@@ -36,7 +36,7 @@ def study_progress(console: Console) -> Generator[Callable[[StudyProgress], None
             if progress.reason and progress.source != "rules":  # the rules are explained in the report
                 console.print(f"trial {progress.number}, {look(progress.source).label}: {progress.reason}")
             source, done = look(progress.source).label, progress.iteration
-            volume = "-" if progress.hypervolume is None else f"{progress.hypervolume:.3f}"
+            volume = _volume(progress.hypervolume)
             new = {kind: text for kind, text in progress.latest_failures.items() if shown.get(kind) != text}
             if new.keys() - shown.keys() or (new and progress.iteration >= due):
                 for kind, text in new.items():
@@ -73,9 +73,11 @@ def search_progress(console: Console) -> Generator[Callable[[SearchProgress], No
                 _print_at_once(console, describe_rate(progress))
             spent = 1.0 if progress.is_ended else progress.share
             count = f"{progress.evaluations:9,} evaluations"
-            state = f"{progress.seconds:6.1f} s  hypervolume {progress.hypervolume:.3f}  front {progress.front_size}"
+            state = (
+                f"{progress.seconds:6.1f} s  hypervolume {_volume(progress.hypervolume)}  front {progress.front_size}"
+            )
             if progress.is_ended:
-                state = f"hypervolume {progress.hypervolume:.3f}  {VERIFYING}"
+                state = f"hypervolume {_volume(progress.hypervolume)}  {VERIFYING}"
             if update is not None:
                 update(total=1.0, completed=spent, count=count, state=state)
             elif spent >= due and not progress.is_ended:
@@ -83,6 +85,10 @@ def search_progress(console: Console) -> Generator[Callable[[SearchProgress], No
                 due = spent + SHARE_INTERVAL
 
         yield watch
+
+
+def _volume(hypervolume: float | None) -> str:
+    return "-" if hypervolume is None else f"{hypervolume:.3f}"
 
 
 def announce_compilation(console: Console) -> None:

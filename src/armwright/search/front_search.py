@@ -18,7 +18,7 @@ Random designs would take most of a short search. Its first generation may be cu
 added to later generations. Longer searches end lower that way, probably because evolved designs displace newcomers.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -167,11 +167,12 @@ class FrontSearch:
         matrix = self.ask()[:limit]
         self.tell(matrix, self._evaluate(matrix))
 
-    def move_reference_point(self, reference_point: Sequence[float]) -> None:
-        """Replace the reference point; the recorded hypervolumes begin anew."""
+    def move_reference_point(self, reference_point: Sequence[float], history: Iterable[tuple[int, float]] = ()) -> None:
+        """Replace the reference point; history: earlier evaluations and hypervolumes, bounded by this point."""
         self._reference_point = np.asarray(reference_point, dtype=np.float64)
         self._update_front(self._matrix, self._values)
-        self._history = [(self._evaluations, self.hypervolume)]
+        earlier = [(n, volume) for n, volume in history if n < self._evaluations]
+        self._history = [*earlier, (self._evaluations, self.hypervolume)]
 
     def best(self, n: int) -> Indices:
         """Return the sorted indices in `matrix` of at most `n` designs that keep most of the hypervolume."""

@@ -94,7 +94,7 @@ class DirectSearch:
                 values = self._evaluate(matrix)
                 self.search.tell(matrix[: len(values)], values)
                 if self.survey.close():
-                    self.search.move_reference_point(self.survey.point)
+                    self._move_reference_point(self.survey.point)
                 self.plan.n_found = len(self.search.matrix)
                 if self.plan.should_measure(bool(np.any(np.all(self.search.values < PENALTY, axis=1)))):
                     self.plan.costs = self._measure_costs()
@@ -161,7 +161,7 @@ class DirectSearch:
             SearchProgress(
                 evaluations=search.evaluations + evaluated,
                 seconds=self.searched,
-                hypervolume=search.hypervolume,
+                hypervolume=None if self.survey.is_open else search.hypervolume,
                 front_size=len(search.matrix),
                 budget=plan.budget,
                 seconds_left=max(0.0, plan.search_left),
@@ -275,7 +275,11 @@ class DirectSearch:
             if self.folder is not None:
                 self.folder.write_config(self.config)
         if point != self.survey.point:
-            self.search.move_reference_point(point)
+            self._move_reference_point(point)
+
+    def _move_reference_point(self, point: tuple[float, ...]) -> None:
+        """Bound the hypervolume by another point, what is known of the past included."""
+        self.search.move_reference_point(point, self.survey.history(point))
 
     def _reported_trials(self) -> tuple[list[FinishedTrial], dict[str, Any]]:
         """Return the designs that are reported as trials, and a record of their selection; those of a finished run."""

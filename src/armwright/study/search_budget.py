@@ -59,7 +59,7 @@ class SearchProgress:
     Attributes:
         evaluations: designs evaluated in all sessions.
         seconds: search time of all sessions [s].
-        hypervolume: hypervolume of the front.
+        hypervolume: hypervolume of the front; None while its reference point is provisional.
         front_size: designs on the front.
         budget: the budget of the search.
         seconds_left: search time that the budget leaves [s]; infinite without a limit.
@@ -70,7 +70,7 @@ class SearchProgress:
 
     evaluations: int
     seconds: float
-    hypervolume: float
+    hypervolume: float | None
     front_size: int
     budget: SearchBudget
     seconds_left: float = math.inf

@@ -375,7 +375,10 @@ function play(on) {
   playing = on;
   clearInterval(beat);
   beat = began = null;
-  onTheWay = false;
+  if (onTheWay) {
+    onTheWay = false;
+    describeTarget();
+  }
   $("play").setAttribute("aria-pressed", on);
   $("play").textContent = on ? "Stop" : "Play";
   if (!on) drawArm();
