@@ -12,7 +12,7 @@ import { $, colour, element, number, onTheme, shown } from "./format.js";
 const MOVE = 700; // [ms] from one posture to the next
 const REST = 500; // [ms] at a target while playing
 const VIEW = [0.55, -1, 0.42]; // initial direction of the camera
-const PICTURE = [480, 320], CLOSER = 1.24; // [px] of snapshots, and how much nearer they are than the whole frame
+const PICTURE = [480, 320], BORDER = 0.12, CLOSEST = 2; // [px] of snapshots, what they leave free, and their largest zoom
 const FILLS = 0.8; // an arm smaller than this share of the frame's radius gets a new frame
 const ARROW = 0.16; // length of arrows, as a share of the frame's radius
 const SLACK = 0.2; // share of the frame's radius by which an arm may leave it before it grows
@@ -79,8 +79,12 @@ export function snapshot(design) {
   stage.frame = null;
   renderer.setPixelRatio(1);
   renderer.setSize(width, height, false);
-  [camera.aspect, camera.zoom] = [width / height, CLOSER];
+  camera.aspect = width / height;
   drawArm();
+  const widest = Math.max(...extent().map((point) => new THREE.Vector3(...point).project(camera)).flatMap(({ x, y }) => [Math.abs(x), Math.abs(y)]));
+  camera.zoom = Math.min(CLOSEST, (1 - BORDER) / widest);
+  camera.updateProjectionMatrix();
+  stage.render();
   const picture = stage.canvas.toDataURL();
   camera.zoom = 1;
   Object.assign(state, kept);

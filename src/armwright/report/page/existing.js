@@ -56,7 +56,7 @@ function ofArm({ name, reach, payload_at_full_reach, quantities, values: minimis
 
 function bestOf({ name, more }, rows) {
   const values = rows.filter((row) => !row.violated?.length).map((row) => row.values[name]).filter(isKnown);
-  return values.length > 1 ? Math[more ? "max" : "min"](...values) : null;
+  return new Set(values).size > 1 ? Math[more ? "max" : "min"](...values) : null;
 }
 
 function tableRow({ name, values, design, violated, verdict }, columns, best) {
