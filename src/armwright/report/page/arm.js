@@ -419,8 +419,8 @@ function describeTarget() {
   if (i === null) return;
   const one = postures(i)[state.target], n = content.targets.length;
   $("arm-title").textContent = `#${i} ${content.joints(i)}`;
-  const verdict = one.missed ? `missed by ${describeMiss(one)}: ${why(content.arm(i), one)}` : "reached", which = `arget ${state.target + 1} of ${n}`;
-  $("target-note").textContent = onTheWay ? `To t${which}` : `T${which}: ${verdict}`;
+  const verdict = one.missed ? `missed by ${describeMiss(one)}: ${why(content.arm(i), one)}` : "reached", which = `${state.target + 1} of ${n}`;
+  $("target-note").textContent = onTheWay ? `To target ${which}` : `Target ${which}: ${verdict}`;
   $("target-note").className = one.missed ? "missed" : "";
   $("compare").setAttribute("aria-pressed", state.compared !== null);
   $("compare").textContent = state.compared === null ? "Compare" : `Beside #${state.compared} ✕`;

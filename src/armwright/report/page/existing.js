@@ -12,6 +12,7 @@ const ASKED = ["price", "mass", "cycle_time", "deflection", "backlash_error"]; /
 const ANY = 1e4; // [kg]; as much as is computed
 
 let content = null;
+let drawn = ""; // what the table shows, so that it is not drawn again under an open explanation
 
 export function openExisting(shownContent) {
   content = shownContent;
@@ -20,12 +21,13 @@ export function openExisting(shownContent) {
 }
 
 export function drawExisting() {
-  const { existing_arms: arms, quantities: explained } = content.head;
+  const { existing_arms: arms, quantities: explained, recommended } = content.head, asked = JSON.stringify([arms, recommended]);
   $("existing-box").hidden = !arms.length;
-  if (!arms.length) return;
+  if (!arms.length || asked === drawn) return;
+  drawn = asked;
   const objectives = content.objectives.map((one) => ({ ...one, ...explained[one.name] }));
   const others = ASKED.filter((name) => objectives.every((one) => one.name !== name)).map((name) => ({ name, ...explained[name] }));
-  const rows = [...content.head.recommended.map(ofDesign), ...arms.map(ofArm)];
+  const rows = [...recommended.map(ofDesign), ...arms.map(ofArm)];
   const columns = [...objectives, REACH, PAYLOAD, ...others].filter(({ name }) => rows.some((row) => isKnown(row.values[name])));
   const best = new Map(columns.map((column) => [column.name, bestOf(column, rows)]));
   const heads = columns.map(({ label, description }) => element("th", {}, label, why(label, description)));
@@ -34,9 +36,9 @@ export function drawExisting() {
     element("tbody", {}, ...rows.map((row) => tableRow(row, columns, best))));
   const note = ["Bold: the best value of a column, among the arms that violate nothing."];
   if (rows.some((row) => columns.some(({ name }) => !isKnown(row.values[name])))) note.push("–: not stated by the arm's file.");
-  if (content.head.recommended.length) note.push(`Masses and prices of designs do not include ${content.head.not_modelled}.`);
+  if (recommended.length) note.push(`Masses and prices of designs do not include ${content.head.not_modelled}.`);
   $("existing-note").textContent = note.join(" ");
-  $("existing-title").textContent = content.head.recommended.length ? "Existing arms beside the recommended designs" : "Existing arms";
+  $("existing-title").textContent = recommended.length ? "Existing arms beside the recommended designs" : "Existing arms";
   mark();
 }
 
