@@ -49,3 +49,10 @@ def test_no_hypervolume_is_reported_before_its_reference_point_is_chosen() -> No
     evaluations, volumes = np.array(short.summary["search"]["hypervolume_history"]).T
     assert len(volumes) > 3
     assert volumes[-1] == pytest.approx(short.summary["hypervolume"]["final"])
+
+
+def test_designs_that_violate_constraints_are_not_counted_as_a_front() -> None:
+    impossible = TASK.model_copy(update={"constraints": ("worst_error <= 1", "anisotropy <= 1e-9")})
+    sizes = list[int]()
+    aw.find_front(Problem(impossible), evaluations=1000, watch=lambda progress: sizes.append(progress.front_size))
+    assert set(sizes) == {0}

@@ -96,7 +96,7 @@ class DirectSearch:
                 if self.survey.close():
                     self._move_reference_point(self.survey.point)
                 self.plan.n_found = len(self.search.matrix)
-                if self.plan.should_measure(bool(np.any(np.all(self.search.values < PENALTY, axis=1)))):
+                if self.plan.should_measure(self._n_feasible > 0):
                     self.plan.costs = self._measure_costs()
                 state = self._state()
                 if time.monotonic() - saved >= SAVE_SECONDS:
@@ -152,6 +152,11 @@ class DirectSearch:
         screen = {} if self.screen is None else self.screen.state()
         return {**state, **self.survey.state(), **self.search.state(), **screen}
 
+    @property
+    def _n_feasible(self) -> int:
+        """Number of feasible designs on the front; the search keeps the nearest to one if there is none."""
+        return int(np.all(self.search.values < PENALTY, axis=1).sum())
+
     def _report(self, evaluated: int, is_ended: bool = False) -> None:
         """Report the progress; evaluated: designs of the generation that is being evaluated."""
         if self.watch is None:
@@ -162,7 +167,7 @@ class DirectSearch:
                 evaluations=search.evaluations + evaluated,
                 seconds=self.searched,
                 hypervolume=None if self.survey.is_open else search.hypervolume,
-                front_size=len(search.matrix),
+                front_size=self._n_feasible,
                 budget=plan.budget,
                 seconds_left=max(0.0, plan.search_left),
                 new_evaluations=search.evaluations + evaluated - self.resumed,
