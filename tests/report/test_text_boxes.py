@@ -14,10 +14,12 @@ from matplotlib.transforms import Bbox
 from playwright.sync_api import Browser
 
 import armwright as aw
+from armwright.experiments.compare_arms import compare_arms
 from armwright.report import drawing
 from armwright.report.figures import write_figures
 from armwright.report.page import write_report
 from tests.support.browser import Tab
+from tests.support.robots import robot
 from tests.support.text_boxes import TOUCHING, check_texts, overlap
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -38,7 +40,13 @@ def infeasible_run(folder: Path) -> None:
     aw.find_front(aw.Problem(task, aw.load_space("desk-sorting")), evaluations=100, out=folder)
 
 
-RUNS = {"three-objectives": price_run, "paper": paper_run, "infeasible": infeasible_run}
+def compared_run(folder: Path) -> None:
+    task, space = (EXAMPLES / f"7-compare-arms-{part}.yaml" for part in ("task", "space"))
+    aw.find_front(aw.Problem(aw.load_task(task), aw.load_space(space)), evaluations=1000, out=folder)
+    compare_arms(task, [robot("so101"), robot("ur3_robot")], folder, base=(0.0, 0.0, 0.0))
+
+
+RUNS = {"three-objectives": price_run, "paper": paper_run, "infeasible": infeasible_run, "compared": compared_run}
 
 
 @pytest.fixture(scope="module", params=RUNS)

@@ -11,7 +11,11 @@ from matplotlib.transforms import Bbox
 from armwright.arrays import Array
 
 DISTANCES = (14.0, 36.0, 60.0, 90.0, 120.0)  # of a label from its point [pt]
-DIRECTIONS = ((1, 1), (-1, 1), (1, 0), (-1, 0), (1, -1), (-1, -1), (0, 1), (0, -1))
+STEEP = 0.3  # of the horizontal part of a nearly vertical direction
+DIRECTIONS = (
+    *((1, 1), (-1, 1), (1, 0), (-1, 0), (1, -1), (-1, -1), (0, 1), (0, -1)),
+    *((STEEP, 1), (-STEEP, 1), (STEEP, -1), (-STEEP, -1)),
+)
 ALIGNMENTS = {-1: ("right", "top"), 0: ("center", "center"), 1: ("left", "bottom")}
 CORNERS = ("upper right", "lower left", "upper left", "lower right")
 BESIDE = 30.0  # from a legend: a point nearer than this has no room for its label [px]
@@ -95,7 +99,7 @@ def _candidates(axes: Any, label: PointLabel) -> Iterator[Any]:
                 label.at,
                 xytext=(distance * x, distance * y),
                 textcoords="offset points",
-                ha=ALIGNMENTS[x][0],
+                ha=ALIGNMENTS[int(np.sign(x))][0],
                 va=ALIGNMENTS[y][1],
                 fontsize=8,
                 zorder=5,
