@@ -53,8 +53,8 @@ def _describe(error: ErrorDetails, path: Sequence[str | int], schema: Any, data:
     if kind == "missing" and isinstance(error["loc"][-1], str):
         return f"expected {_expected(annotation, unit)}, but the key is missing"
     if kind == "extra_forbidden":
-        known = all_keys_of(type_at(schema, path[:-1]))
-        return f"unknown key.{did_you_mean(str(path[-1]), known)} Allowed: {', '.join(known)}"
+        known, key = all_keys_of(type_at(schema, path[:-1])), str(path[-1])
+        return f"unknown key.{did_you_mean(key, known)}{_owner(key, path[:-1], schema)} Allowed: {', '.join(known)}"
     if kind == "union_tag_invalid":
         limits = error.get("ctx", {})
         tags, key = re.findall(r"'([^']*)'", limits["expected_tags"]), limits["discriminator"].strip("'")
@@ -71,6 +71,15 @@ def _describe(error: ErrorDetails, path: Sequence[str | int], schema: Any, data:
     length = error.get("ctx", {}).get("actual_length") if kind in ("too_short", "too_long") else None
     got = show(given) if length is None else length
     return f"expected {expected}, got {got}" + (f"; try {hint}" if hint else "")
+
+
+def _owner(key: str, path: Sequence[str | int], schema: Any) -> str:
+    """Return which record around the one at a path has a key; empty if none has it."""
+    for end in reversed(range(len(path))):
+        if key in all_keys_of(type_at(schema, path[:end])):
+            names = [part for part in path[:end] if isinstance(part, str)]
+            return f" It is a key of {names[-1] if names else 'the file itself'}."
+    return ""
 
 
 def _limits(error: ErrorDetails, unit: str) -> str:

@@ -173,9 +173,20 @@ def test_payload_is_carried_between_pick_and_place(actions: Any, closed: bool, c
         (steps(1), "cycle.steps: a cycle needs at least two steps, got 1"),
         (steps(), "cycle.steps: a cycle needs at least two steps, got 0"),
         ("in-order", "cycle: expected in_order or a record with steps"),
-        (steps(1, 2, approch=0.1), 'cycle: unknown key "approch". Allowed: steps, closed, time, dwell, approach, '),
-        (steps({"to": 1, "doo": "pick"}, 2), 'unknown key "doo". Allowed: to, by, do, time. Did you mean "do"?'),
-        (steps(1, 2, tolerance={"angel": 1}), 'unknown key "angel". Allowed: path, angle. Did you mean "angle"?'),
+        (
+            steps(1, 2, approch=0.1),
+            'cycle.approch: unknown key. Did you mean "approach"? Allowed: steps, closed, time, ',
+        ),
+        (steps({"to": 1, "doo": "pick"}, 2), 'cycle.steps[0].doo: unknown key. Did you mean "do"? Allowed: to, by, do'),
+        (
+            steps({"to": 1, "dwell": 1}, 2),
+            "cycle.steps[0].dwell: unknown key. It is a key of cycle. Allowed: to, by, do",
+        ),
+        (steps({"to": 1, "payload": 1}, 2), "payload: unknown key. It is a key of the file itself. Allowed: to, by"),
+        (
+            steps(1, 2, tolerance={"angel": 1}),
+            'cycle.tolerance.angel: unknown key. Did you mean "angle"? Allowed: path',
+        ),
         (steps(1, 2, time="quick"), "cycle.time: expected seconds above 0, or fastest"),
         (steps(1, {"to": 2, "time": 0}), "cycle.steps[1].time: expected seconds above 0, or fastest"),
         (steps(1, {"to": 2.0}), "cycle.steps[1].to: expected the name of a target or its number, from 1"),

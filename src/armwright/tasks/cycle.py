@@ -42,15 +42,6 @@ Reference = Annotated[str | int, BeforeValidator(_check_reference)]
 class Strict(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A record of a task file."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _check_keys(cls, content: Any) -> Any:
-        for key in cast("dict[Any, Any]", content) if isinstance(content, dict) else ():
-            if key not in cls.model_fields:
-                allowed = ", ".join(cls.model_fields)
-                raise ValueError(f'unknown key "{key}". Allowed: {allowed}.{did_you_mean(str(key), cls.model_fields)}')
-        return cast("Any", content)
-
 
 class Step(Strict, frozen=True):
     """A motion to a target, and what happens there.
