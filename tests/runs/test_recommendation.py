@@ -172,7 +172,7 @@ def test_ends_of_the_front_have_the_least_objectives() -> None:
 
 
 def test_cheapest_and_stiffest_designs_are_roles_where_they_are_known() -> None:
-    """Position error and torque are none then: constraints see to both."""
+    """Errors and holding torque are none then: constraints see to them."""
     examples = Path(__file__).parents[2] / "examples"
     task = aw.load_task(examples / "6-price-task.yaml")
     space = aw.load_space(examples / "6-price-space.yaml")

@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.exceptions import MissingExtraError, SettingsError
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import DEFLECTION, POSITION_ERROR, PRICE, TORQUE
+from armwright.problem.objectives import DEFLECTION, ORIENTATION_ERROR, POSITION_ERROR, PRICE, TORQUE
 from armwright.runs.history import History
 from armwright.runs.ranking import knee_first
 from armwright.runs.simulated_run import Simulator
@@ -22,6 +22,7 @@ from armwright.runs.simulation import PASS
 from armwright.runs.survival import FACTORS, Survival, evaluate_survival
 
 MAX_TRIED = 10  # designs for each role
+BY_DEFAULT = (POSITION_ERROR.name, ORIENTATION_ERROR.name, TORQUE.name)  # objectives of tasks that state none
 VERIFIED, NOT_SIMULATED = "verified", "not simulated"
 BY_EVALUATOR = f"{NOT_SIMULATED}: a custom evaluator measured it"
 OUT_OF_TIME = f"{NOT_SIMULATED}: the time is up"
@@ -70,7 +71,7 @@ def candidates(history: History) -> dict[str, list[int]]:
     """Return the designs of the front by role, the best first.
 
     The roles are the knee, the least first and last objective, and the least price and deflection if the built-in
-    physics knows them for all designs. With both, position error and torque are no roles of their own: all these
+    physics knows them for all designs. With both, errors and holding torque are no roles of their own: all these
     designs are precise and strong enough, if the task has constraints.
     """
     if not history.front:
@@ -81,7 +82,7 @@ def candidates(history: History) -> dict[str, list[int]]:
     known = columns | _price_and_deflection(history, [member.number for member in order])
     roles = [objectives[0], objectives[-1]]
     if {PRICE.name, DEFLECTION.name} <= set(known) and history.problem.constraints:
-        roles = [name for name in roles if name not in (POSITION_ERROR.name, TORQUE.name)]
+        roles = [name for name in roles if name not in BY_DEFAULT]
     roles += [quantity.name for quantity in (PRICE, DEFLECTION) if quantity.name in known]
     return {
         "knee": [member.number for member in order],
