@@ -47,6 +47,7 @@ def compared_run(folder: Path) -> None:
 
 
 RUNS = {"three-objectives": price_run, "paper": paper_run, "infeasible": infeasible_run, "compared": compared_run}
+PAGES = ("three-objectives", "paper", "infeasible")  # that of "compared" holds hidden names of arms beyond its axes
 
 
 @pytest.fixture(scope="module", params=RUNS)
@@ -120,6 +121,7 @@ def tab(browser: Browser) -> Iterator[Tab]:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("run", PAGES, indirect=True)
 def test_texts_of_the_page_are_whole_and_apart(run: Path, tab: Tab, width: int) -> None:
     write_report(run)
     tab.page.set_viewport_size({"width": width, "height": 900})

@@ -8,8 +8,7 @@ from tests.support.browser import Tab
 
 TOUCHING = 3.0  # [px] of margins that text boxes may share; a letter is 14 px high
 
-# Boxes of the lines of all visible texts outside of scrolling boxes, with their texts. A drawing hides what leaves it,
-# such as a mark beyond the axes.
+# Boxes of the lines of all visible texts outside of scrolling boxes, with their texts.
 TEXTS = """() => {
     const found = [], walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
     const isLeftOut = "script, style, option, .scroll, .modebar, noscript, details:not([open]) > :not(summary)";
@@ -19,12 +18,8 @@ TEXTS = """() => {
         if (parent.closest(isLeftOut)) continue;
         const range = document.createRange();
         range.selectNodeContents(node);
-        const drawing = parent.closest("svg")?.getBoundingClientRect();
-        const within = (value, low, high) => (drawing ? Math.min(Math.max(value, low), high) : value);
-        for (const box of range.getClientRects()) {
-            const [left, right] = [box.left, box.right].map((x) => within(x, drawing?.left, drawing?.right));
-            const [top, bottom] = [box.top, box.bottom].map((y) => within(y, drawing?.top, drawing?.bottom));
-            if (right > left && bottom > top) found.push([text, left, top + scrollY, right, bottom + scrollY]);
+        for (const { left, top, right, bottom, width } of range.getClientRects()) {
+            if (width > 0) found.push([text, left, top + scrollY, right, bottom + scrollY]);
         }
     }
     return found;

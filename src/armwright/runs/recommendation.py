@@ -71,8 +71,8 @@ def candidates(history: History) -> dict[str, list[int]]:
     """Return the designs of the front by role, the best first.
 
     The roles are the knee, the least first and last objective, and the least price and deflection if the built-in
-    physics knows them for all designs. With both, errors and holding torque are no roles of their own: all these
-    designs are precise and strong enough, if the task has constraints.
+    physics knows them for all designs. If it knows both, and the task has a cycle, whose constraints see to errors and
+    torques, the least error or holding torque is no role.
     """
     if not history.front:
         return {}
@@ -81,7 +81,7 @@ def candidates(history: History) -> dict[str, list[int]]:
     columns = dict(zip(objectives, np.array([member.values for member in order]).T, strict=True))
     known = columns | _price_and_deflection(history, [member.number for member in order])
     roles = [objectives[0], objectives[-1]]
-    if {PRICE.name, DEFLECTION.name} <= set(known) and history.problem.constraints:
+    if {PRICE.name, DEFLECTION.name} <= set(known) and history.problem.task.cycle is not None:
         roles = [name for name in roles if name not in BY_DEFAULT]
     roles += [quantity.name for quantity in (PRICE, DEFLECTION) if quantity.name in known]
     return {
@@ -91,7 +91,7 @@ def candidates(history: History) -> dict[str, list[int]]:
 
 
 def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str, Array]:
-    """Return (N,) prices [USD] and deflections [m] by name, without objectives and what is not known of all designs."""
+    """Return by name the (N,) prices [USD] and deflections [m] that are no objectives and known of all designs."""
     if history.problem.evaluator is not None:
         return {}
 

@@ -1,9 +1,10 @@
 // Existing arms beside the recommended designs: what an arm that can be bought does better, and what worse.
 
+import { REACH } from "./recommended.js";
 import { listen, set, state } from "./state.js";
 import { $, element, plural, quantity, why } from "./format.js";
 
-const REACH = { name: "reach", label: "Reach", unit: "m", more: true, description: "The largest horizontal distance of the tip from the first joint." };
+const HORIZONTAL = { name: "reach", label: "Reach", unit: "m", more: true, description: REACH };
 const PAYLOAD = {
   name: "payload_at_full_reach", label: "Payload there", unit: "kg", more: true,
   description: "The mass that the actuators hold at that distance in every posture found, with the safety factor.",
@@ -28,13 +29,13 @@ export function drawExisting() {
   const objectives = content.objectives.map((one) => ({ ...one, ...explained[one.name] }));
   const others = ASKED.filter((name) => objectives.every((one) => one.name !== name)).map((name) => ({ name, ...explained[name] }));
   const rows = [...recommended.map(ofDesign), ...arms.map(ofArm)];
-  const columns = [...objectives, REACH, PAYLOAD, ...others].filter(({ name }) => rows.some((row) => isKnown(row.values[name])));
+  const columns = [...objectives, HORIZONTAL, PAYLOAD, ...others].filter(({ name }) => rows.some((row) => isKnown(row.values[name])));
   const best = new Map(columns.map((column) => [column.name, bestOf(column, rows)]));
   const heads = columns.map(({ label, description }) => element("th", {}, label, why(label, description)));
   $("existing").replaceChildren(
     element("thead", {}, element("tr", {}, element("th", { class: "text" }, "Arm"), ...heads, element("th", { class: "text" }, "On this task"))),
     element("tbody", {}, ...rows.map((row) => tableRow(row, columns, best))));
-  const note = ["Bold: the best value of a column, among the arms that violate nothing."];
+  const note = ["Bold: the best value of a column, among the arms that violate no constraint."];
   if (rows.some((row) => columns.some(({ name }) => !isKnown(row.values[name])))) note.push("–: not stated by the arm's file.");
   if (recommended.length) note.push(`Masses and prices of designs do not include ${content.head.not_modelled}.`);
   $("existing-note").textContent = note.join(" ");

@@ -8,7 +8,7 @@ import { $, element, onTheme, plural, quantity, why } from "./format.js";
 const ROLES = {
   knee: "Best compromise", "least price": "Cheapest", "least deflection": "Stiffest", "least cycle_time": "Fastest", "least mass": "Lightest",
 };
-const REACH = "The largest horizontal distance of the tip from the first joint.";
+export const REACH = "The largest horizontal distance of the tip from the first joint.";
 
 let content = null;
 
