@@ -27,13 +27,21 @@ def rounded(value: float) -> str:
     return f"{value:.3g}" if abs(value) < 1e3 else f"{value:,.0f}"
 
 
-_THOUGHTS = re.compile(r"<think(?:ing)?>.*?(?:</think(?:ing)?>|\Z)", re.DOTALL | re.IGNORECASE)
-_THOUGHTS_END = re.compile(r"</think(?:ing)?>", re.IGNORECASE)
+_THOUGHTS = re.compile(r"<(/?)think(?:ing)?>", re.IGNORECASE)
 
 
 def without_thoughts(text: str) -> str:
     """Return `text` without the <think> blocks of a model, including blocks that lack their start or end tag."""
-    return _THOUGHTS_END.split(_THOUGHTS.sub("", text))[-1]
+    kept: list[str] = []
+    end, is_thought = 0, False
+    for tag in _THOUGHTS.finditer(text):
+        if tag[1]:
+            kept = kept if is_thought else []  # what came before are thoughts without their start
+            end, is_thought = tag.end(), False
+        elif not is_thought:
+            kept.append(text[end : tag.start()])
+            is_thought = True
+    return "".join([*kept, "" if is_thought else text[end:]])
 
 
 def end_of(text: str, most: int) -> str:

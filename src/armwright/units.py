@@ -36,12 +36,15 @@ _KEYS = {
     "N m/rad": "joint_stiffness position_gain",
 }
 KEY_UNITS: Mapping[str, str] = {key: unit for unit, keys in _KEYS.items() for key in keys.split()}
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
+UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"  # a decimal number as people write it, for patterns
+NUMBER = rf"[-+]?{UNSIGNED}"
+_QUANTITY = re.compile(rf"({NUMBER})\s*([^\s\d.].*)?")
 
 
 def read_quantity(text: str, unit: str) -> float | None:
     """Return the number that a text such as `200 g` states in this unit; None if it states none."""
-    found = _QUANTITY.fullmatch(text.replace(",", ".", 1) if re.fullmatch(r"\s*[-+]?\d+,\d+\D*", text) else text)
+    text = text.strip()
+    found = _QUANTITY.fullmatch(text.replace(",", ".", 1) if re.fullmatch(r"[-+]?\d+,\d+\D*", text) else text)
     if found is None:
         return None
     measured, size = (unit, 1.0) if found[2] in (None, unit) else OTHER_UNITS.get(found[2], (None, 1.0))

@@ -10,10 +10,13 @@ import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from armwright.llm.redaction import redacted
+from armwright.llm.redaction import PART, redacted
 from armwright.problem.problem import Problem
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
@@ -195,6 +198,7 @@ KEY = "sk-proj-abcdefghijklmnopqrstuvwxyz0123"
         ("sk-proj-************0123.", "<MY_KEY>."),
         ("sk-p...0123", "<MY_KEY>"),
         ("sk-proj-abc…", "<MY_KEY>"),
+        ("sk-proj-***zz***z0123, sk-p****qrst...0123", "<MY_KEY>zz<MY_KEY>, <MY_KEY>qrst<MY_KEY>"),
         ("**bold**, 2**3, and so on...", "**bold**, 2**3, and so on..."),
         ("sk-other-*******9999", "sk-other-*******9999"),
         ("a short word: shortest", "a short word: shortest"),
@@ -204,6 +208,29 @@ def test_keys_are_redacted(monkeypatch: pytest.MonkeyPatch, text: str, shown: st
     monkeypatch.setenv("MY_KEY", KEY)
     monkeypatch.setenv("SHORT_KEY", "short")
     assert redacted(text) == shown
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.builds(lambda a, b: KEY[min(a, b) : max(a, b)], st.integers(0, len(KEY)), st.integers(0, len(KEY))),
+            st.sampled_from(["-", "***", "…", " ", "sk-", "\n"]),
+        )
+    )
+)
+def test_neither_a_beginning_nor_an_end_of_a_key_is_left(pieces: list[str]) -> None:
+    with patch.dict(os.environ, {"MY_KEY": KEY}):
+        shown = redacted("".join(pieces))
+    assert KEY[:PART] not in shown
+    assert KEY[-PART:] not in shown
+
+
+@pytest.mark.parametrize("unit", ["-", "a-", "*", "a*", "..", "…", "a…", KEY[:14], KEY[-14:], f"{KEY[:5]}***"])
+def test_redaction_of_long_texts_takes_linear_time(monkeypatch: pytest.MonkeyPatch, unit: str) -> None:
+    """Such an answer once stopped a run for good."""
+    monkeypatch.setenv("MY_KEY", KEY)
+    shown = redacted(unit * (2_000_000 // len(unit)))
+    assert KEY[:PART] not in shown
 
 
 @pytest.mark.parametrize(

@@ -247,7 +247,7 @@ _decoder = json.JSONDecoder(object_pairs_hook=_without_repeats)
 def _objects(text: str, names: set[str]) -> tuple[list[tuple[int, dict[str, Any]]], int]:
     """Return the outermost JSON objects that have one of `names`, and the position of an incomplete one or -1."""
     # Trailing commas and comments are common; blanks in their place keep the positions.
-    text = re.sub(r'//[^"\n]*$', lambda comment: " " * len(comment[0]), text, flags=re.MULTILINE)
+    text = "\n".join(map(_without_comment, text.split("\n")))
     text = re.sub(r",(?=\s*[}\]])", " ", text)
     braces = [match.start() for match in re.finditer(r'\{\s*"', text)][-MAX_OBJECTS:]
     objects: list[tuple[int, dict[str, Any]]] = []
@@ -265,3 +265,9 @@ def _objects(text: str, names: set[str]) -> tuple[list[tuple[int, dict[str, Any]
         if names & {str(name).lower() for name in content}:
             objects.append((position, content))
     return objects, incomplete
+
+
+def _without_comment(line: str) -> str:
+    """Replace a comment after the last quotation mark of a line by blanks."""
+    start = line.find("//", line.rfind('"') + 1)
+    return line if start < 0 else line[:start] + " " * (len(line) - start)

@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
+from armwright.units import UNSIGNED
 
 AXES = ("x", "y", "z")
 LISTS = {  # lists with a value per module, and the prefix of their parameters
@@ -23,15 +24,16 @@ NO_CUSTOM: Mapping[str, bool] = {}
 MAX_LINE_LENGTH = 2000  # characters; longer lines are ignored
 
 _MINUS = str.maketrans({"−": "-", "﹣": "-", "-": "-", "＋": "+"})
-_NUMBER = r"(?<![\w.])[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|(?:nan|inf(?:inity)?)(?![A-Za-z]))"
+_NUMBER = rf"(?<![\w.])[-+]?(?:{UNSIGNED}|(?:nan|inf(?:inity)?)(?![A-Za-z]))"
 _PLAIN = re.compile(_NUMBER, re.IGNORECASE)
 _ITEM = re.compile(rf"({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
-_NAMED = re.compile(rf"((?:origin|link|stroke|limit)_\w+)\s*[:=]\s*({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
+_NAMED = re.compile(rf"((?:origin|link|stroke|limit)_\w{{1,40}})\s*[:=]\s*({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
 _NAMES_ALONE = re.compile(
     r"\((?:(?:origin|link|joint|stroke|limit|direction|tube|motor)_\w++|\.\.\.|…|[,\s])++\)\s*[:=]", re.IGNORECASE
 )
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
+_HAS_NUMBER, _HAS_LETTER = re.compile(r"\d|nan|inf", re.IGNORECASE), re.compile(r"[A-Za-z]")
 _LEFT_OVER = re.compile(r"[\s,;|()\[\]{}$*_`~≈\"'.]*")  # allowed between values
 
 
@@ -145,7 +147,7 @@ def _values(name: str, text: str) -> dict[str, Any] | None:
         mounts = re.findall(r"[A-Za-z]+(?:[-+][xy])?", text)
         return {"mount": mounts[0].lower()} if len(mounts) == 1 else None
     if name in ("tube", "tubes"):
-        sizes = re.findall(r"(?<!\S)-(?!\S)|[\d.]+ ?[x×] ?[\d.]*\d", _spaced(re.sub(r"tube_\d+\s*[:=]", "", text)))
+        sizes = re.findall(r"(?<!\S)-(?!\S)|[\d.]{1,20} ?[x×] ?[\d.]*\d", _spaced(re.sub(r"tube_\d+\s*[:=]", "", text)))
         sizes = [size.replace("×", "x").replace(" ", "") for size in sizes]
         return _listed(name, sizes) if name == "tubes" else {"tube": sizes[0]} if len(sizes) == 1 else None
     if name == "motors":
@@ -162,11 +164,11 @@ def _values(name: str, text: str) -> dict[str, Any] | None:
     if named and name != "expected":
         rest = _LEFT_OVER.fullmatch(_NAMED.sub("", text))
         return {key.lower(): _with_unit(number, unit) for key, number, unit in named} if rest else None
-    text = _in_brackets(_NAMES_ALONE.sub("", text), r"\d|nan|inf")
+    text = _in_brackets(_NAMES_ALONE.sub("", text), _HAS_NUMBER)
     if name in ("strokes", "ranges"):
         text = re.sub(r"(?<!\S)-(?!\S)", "nan", _spaced(text))
     if name == "expected":
-        text = re.sub(r"[A-Za-z]\w*\s*[:=]", "", text)
+        text = re.sub(r"[A-Za-z]\w{0,40}\s*[:=]", "", text)
     items = _ITEM.findall(text)
     if not items or not _LEFT_OVER.fullmatch(_ITEM.sub("", text)):
         return None
@@ -191,7 +193,7 @@ def _joints(text: str) -> dict[str, Any] | None:
     kinds = {kind.lower(): kind for kind in JOINT_DESCRIPTIONS} | JOINT_NAMES
     text = re.sub(r"joint_\d+\s*[:=]", "", _NAMES_ALONE.sub("", text))
     text = re.sub(rf"\b([A-Za-z])\s*\((?:{'|'.join(kinds)})\)", r"\1", text, flags=re.IGNORECASE)  # Y (yaw)
-    text = _in_brackets(text, r"[A-Za-z]")
+    text = _in_brackets(text, _HAS_LETTER)
     types = re.findall(r"[A-Za-z]+", text)
     if len(types) == 1 and (types[0].isupper() or not set(types[0].lower()) - kinds.keys()):
         types = list(types[0])  # YPRP as one text
@@ -202,10 +204,10 @@ def _joints(text: str) -> dict[str, Any] | None:
     return {_parameter("joints", i): kinds.get(kind.lower(), kind) for i, kind in enumerate(types)}
 
 
-def _in_brackets(text: str, value: str) -> str:
+def _in_brackets(text: str, value: re.Pattern[str]) -> str:
     """Return the content of the only brackets with a value, or the text without brackets that hold none."""
     groups: list[str] = _BRACKETS.findall(text)
-    with_values = [group for group in groups if re.search(value, group, re.IGNORECASE)]
+    with_values = [group for group in groups if value.search(group)]
     if len(with_values) == 1:
         return with_values[0]
     return _BRACKETS.sub(lambda match: match[0] if match[1] in with_values else "", text)

@@ -164,11 +164,21 @@ def whole_template(name: str) -> str:
     template = load_prompt(name).template
     if name not in PROMPTS:
         return template
-    blocks = re.compile(r"{% block (\w+) %}\n.*?{% endblock %}\n", re.DOTALL)
-    own = {match[1]: match[0] for match in blocks.finditer(template)}
-    macros = blocks.sub("", template).partition('{% extends "proposal.md.j2" %}\n')[2].rstrip() + "\n"
-    whole = blocks.sub(lambda match: own.get(match[1], match[0]), builtin_template("proposal.md.j2"))
+    own = dict(_blocks(template))
+    between = "".join(text for name, text in _blocks(template) if not name)
+    macros = between.partition('{% extends "proposal.md.j2" %}\n')[2].rstrip() + "\n"
+    whole = "".join(own.get(name, text) if name else text for name, text in _blocks(builtin_template("proposal.md.j2")))
     return whole.replace("{% block role %}", macros.lstrip("\n") + "{% block role %}", 1)
+
+
+def _blocks(template: str) -> list[tuple[str, str]]:
+    """Return the blocks of a template with their names, and the texts between them with empty ones."""
+    first, *others = re.split(r"{% block (\w+) %}\n", template)
+    pieces = [("", first)]
+    for name, text in zip(others[::2], others[1::2], strict=True):
+        body, end, after = text.partition("{% endblock %}\n")
+        pieces += [(name, f"{{% block {name} %}}\n{body}{end}"), ("", after)]
+    return pieces
 
 
 def parameters_prompt(problem: Problem, answer: str, options: PromptOptions = DEFAULTS) -> str:
@@ -201,7 +211,7 @@ def estimated_tokens(text: str) -> int:
 
 def _tidy(text: str) -> str:
     """Remove blanks at line ends and repeated empty lines."""
-    return re.sub(r"\n{3,}", "\n\n", re.sub(r"[ \t]+\n", "\n", text)).strip() + "\n"
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(line.rstrip(" \t") for line in text.split("\n"))).strip() + "\n"
 
 
 def _exported(tree: nodes.Template) -> set[str]:

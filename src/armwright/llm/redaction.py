@@ -3,7 +3,7 @@
 import logging
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 _NAMES = re.compile(r"(^|_)(KEY|TOKEN|SECRET|PASSWORD)$")
 _SENT = re.compile(r"(^|_)API_(KEY|TOKEN)$")  # read and sent by vendors' clients
@@ -11,7 +11,9 @@ _MIXED = re.compile(r"[A-Za-z][0-9]|[0-9][A-Za-z]")
 SHORTEST = 8  # shorter values occur in ordinary text
 LONG = 20  # longer values are not words
 PART = 12  # a beginning or an end of this length identifies a key
-_MASKED = re.compile(r"([\w-]*)(?:\*{2,}|\.{3,}|…)([\w-]*)")  # sk-abcd****wxyz, as vendors show it
+# sk-abcd****wxyz, as vendors show it. It begins where a word does, and what follows the mask is only looked at, since
+# it may be followed by another one.
+_MASKED = re.compile(r"(?<![\w-])([\w-]*+)(?:\*{2,}+|\.{3,}+|…)(?=([\w-]*+))")
 
 
 class WithoutKeys(logging.Filter):
@@ -30,11 +32,47 @@ def redacted(text: str) -> str:
     for name, key in _keys():
         blot = f"<{name}>"
         text = text.replace(key, blot)
-        for shown in range(len(key) - 1, PART - 1, -1):
-            if key[:PART] in text or key[-PART:] in text:
-                text = text.replace(key[:shown], blot).replace(key[-shown:], blot)
-        text = _MASKED.sub(lambda masked, key=key, blot=blot: blot if _is_of(key, masked) else masked[0], text)
+        text = _without(_parts(key, text), blot, text)
+        text = _without(_masked(key, text), blot, text)
     return text
+
+
+def _parts(key: str, text: str) -> Iterator[tuple[int, int]]:
+    """Yield where beginnings and ends of a key are that identify it, in linear time."""
+    reversed_key, reversed_text = key[::-1], text[::-1]
+    spans = [(at, at + n) for at, n in _beginnings(key, text)]
+    spans += [(len(text) - at - n, len(text) - at) for at, n in _beginnings(reversed_key, reversed_text)]
+    yield from sorted(spans)
+
+
+def _beginnings(key: str, text: str) -> Iterator[tuple[int, int]]:
+    """Yield the position and the length of each beginning of a key that identifies it."""
+    at = text.find(key[:PART]) if len(key) > PART else -1
+    while at >= 0:
+        length = PART
+        while length < len(key) and text.startswith(key[length], at + length):
+            length += 1
+        yield at, length
+        at = text.find(key[:PART], at + length)
+
+
+def _masked(key: str, text: str) -> Iterator[tuple[int, int]]:
+    """Yield where forms of a key with a masked middle are: the mask, and what of the key is beside it."""
+    for found in _MASKED.finditer(text):
+        left, right = (len(word) for word in found.groups())
+        left, right = left * key.startswith(found[1]), right * key.endswith(found[2])
+        if left + right >= 4:
+            yield found.end(1) - left, found.start(2) + right
+
+
+def _without(spans: Iterable[tuple[int, int]], blot: str, text: str) -> str:
+    """Replace spans of a text, which may overlap, by `blot`; they are sorted by their starts."""
+    pieces, end = [], 0
+    for start, stop in spans:
+        if start >= end:
+            pieces += [text[end:start], blot]
+        end = max(end, stop)
+    return "".join([*pieces, text[end:]])
 
 
 def _keys() -> Iterator[tuple[str, str]]:
@@ -50,7 +88,3 @@ def _keys() -> Iterator[tuple[str, str]]:
 def _looks_secret(value: str) -> bool:
     """Return whether a value is not an ordinary word, as in SORT_KEY=position_error."""
     return len(value) >= LONG or bool(_MIXED.search(value))
-
-
-def _is_of(key: str, masked: re.Match[str]) -> bool:
-    return len(masked[1] + masked[2]) >= 4 and key.startswith(masked[1]) and key.endswith(masked[2])

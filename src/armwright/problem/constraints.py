@@ -16,13 +16,14 @@ from armwright.problem.objective import Objective
 from armwright.problem.objectives import CLEARANCES, QUANTITIES, RENAMED
 from armwright.tasks.cycle import Cycle
 from armwright.tasks.task import Task
+from armwright.units import NUMBER
 
 Relation = Literal["<=", ">="]
 
 DRIVE_QUANTITIES = ("dynamic_utilisation", "speed_utilisation", "thermal_utilisation", "voltages")
 MIN_SCALE = 1e-9  # bounds nearer to 0 count as 0
 _CONSTRAINT = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=)\s*(\S+)\s*")
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_NUMBER = re.compile(NUMBER)
 
 
 @dataclass(frozen=True)

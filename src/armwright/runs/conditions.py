@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.exceptions import SettingsError
-from armwright.units import OTHER_UNITS
+from armwright.units import NUMBER, OTHER_UNITS, UNSIGNED
 
-_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
-_BOUND = re.compile(rf"\s*(<=|>=|==|<|>)?\s*{_NUMBER}\s*([^\W\d][^<>=]*)?")
+_BOUND = re.compile(rf"\s*(?:(<=|>=|==|<|>)\s*)?({NUMBER})\s*([^\W\d][^<>=]*)?")
 _NAME = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>=].*)", re.DOTALL)
-_WEIGHT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
+_WEIGHT = re.compile(rf"\s*([A-Za-z_]\w*)\s*=\s*({UNSIGNED})\s*")
 _HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.greater, "==": np.equal}
 
 

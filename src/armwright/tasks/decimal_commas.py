@@ -7,7 +7,9 @@ from typing import Any, cast
 
 import yaml
 
-_WHOLE, _NUMBER = re.compile(r"[-+]?\d+"), re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+from armwright.units import NUMBER
+
+_WHOLE, _NUMBER = re.compile(r"[-+]?\d+"), re.compile(NUMBER)
 _Loader: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 
 

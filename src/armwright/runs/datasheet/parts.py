@@ -9,7 +9,7 @@ from armwright.robot.tubes import Tube
 from armwright.runs.datasheet.sheet import MassLine, Part
 from armwright.spaces.design_space import DesignSpace
 
-_SENTENCE = re.compile(r";\s*(?![^(]*\))")  # what separates the sentences of a note: no semicolon in parentheses
+_SENTENCE = re.compile(r"(?:[^;()]|\([^()]*+\)|[()])++")  # of a note: up to a semicolon outside parentheses
 NEGLIGIBLE = 1e-9  # [kg]
 
 
@@ -49,7 +49,7 @@ def price_source(record: ActuatorRecord) -> str:
     """Return what the note of an actuator says of its price; empty if it says nothing."""
     if record.price is None:
         return ""
-    return "; ".join(part for part in _SENTENCE.split(record.note) if "price" in part.lower())
+    return "; ".join(part.strip() for part in _SENTENCE.findall(record.note) if "price" in part.lower())
 
 
 def _tubes(arm: Arm, space: DesignSpace) -> Iterator[Part]:
