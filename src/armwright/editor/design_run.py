@@ -1,13 +1,13 @@
 """`armwright design` in a process of its own, started by the page."""
 
-import os
 import subprocess
-import sys
 import threading
 import time
 from collections import deque
 from pathlib import Path
 from typing import Any
+
+from armwright.child_process import start_module
 
 MAX_LINES = 200  # of output that are kept
 MAX_LINE = 2_000  # characters
@@ -30,12 +30,10 @@ class DesignRun:
         self._began = time.monotonic()
         self._lines: deque[str] = deque(maxlen=MAX_LINES)
         options = ["--space", str(space), "--budget", f"{seconds:g}s", "--out", str(folder)]
-        # -P: never import modules from the working directory.
-        command = [sys.executable, "-P", "-m", "armwright", "design", *options, "--", str(task)]
-        # A session of its own: Ctrl-C in the terminal reaches the editor, which then ends the search in order.
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            errors="replace", start_new_session=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        # Ctrl-C in the terminal reaches the editor, which then ends the search in order.
+        self._process = start_module(
+            "armwright", "design", *options, "--", task, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, text=True, errors="replace", env={"PYTHONUNBUFFERED": "1"},
         )  # fmt: skip
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()

@@ -16,6 +16,7 @@ import inspect
 import math
 import re
 import sys
+import sysconfig
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import chdir
@@ -257,11 +258,13 @@ class _Source(importlib.abc.SourceLoader):
 
 
 def _file_module(path: Path, source: bytes) -> ModuleType:
-    """Import a Python file as a module; it can import its neighbours, as a program can."""
+    """Import a Python file as a module; it can import its neighbours, but they hide no module of Python's own."""
     name = f"armwright_evaluator_{path.stem}"
     folder = str(path.resolve().parent)
     if folder not in sys.path:
-        sys.path.insert(0, folder)
+        own = Path(sysconfig.get_path("stdlib"))
+        last = max((n for n, place in enumerate(sys.path) if Path(place) in (own, own / "lib-dynload")), default=-1)
+        sys.path.insert(last + 1, folder)
     spec = importlib.util.spec_from_loader(name, _Source(path, source))
     assert spec is not None
     assert spec.loader is not None

@@ -9,13 +9,13 @@ import ipaddress
 import secrets
 import socket
 import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
 
+from armwright.child_process import start_module
 from armwright.exceptions import FailureError, SettingsError
 from armwright.extras import check_extra
 
@@ -147,10 +147,10 @@ def start_server(folder: Path) -> str:
     The server outlives the study while a page is open. If it crashes, the study goes on.
     """
     check_extra("live", "the live page")
-    # -P: never import modules from the working directory.
-    command = [sys.executable, "-P", "-m", "armwright", "live", str(folder.absolute()), "--follow"]
-    # A new session: after Ctrl-C the page still shows the results.
-    server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+    # In a session of its own: after Ctrl-C the page still shows the results.
+    server = start_module(
+        "armwright", "live", folder.absolute(), "--follow", stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
     assert server.stdout is not None
     address = server.stdout.readline().decode().strip()
     if not address.startswith("http://"):

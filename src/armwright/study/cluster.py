@@ -10,7 +10,6 @@ import os
 import queue
 import signal
 import subprocess
-import sys
 import traceback
 from collections import Counter
 from collections.abc import Callable, Generator, Hashable, Iterable
@@ -21,6 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, cast
 from uuid import uuid4
 
+from armwright.child_process import start_module
 from armwright.exceptions import ArmwrightError, ClusterError, FailureError, SettingsError
 from armwright.extras import check_extra
 
@@ -275,22 +275,14 @@ def _local_cluster(n_workers: int) -> Generator[tuple[str, dict[str, str]]]:
     Yields:
         The scheduler's address and the credentials to connect, which no other user of the machine knows.
     """
-    environment = {
-        **os.environ,
-        **dict.fromkeys(THREADS, "1"),
-        "DASK_LOGGING__DISTRIBUTED": "critical",
-        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-    }
+    environment = {**dict.fromkeys(THREADS, "1"), "DASK_LOGGING__DISTRIBUTED": "critical"}
     with (
         TemporaryDirectory(prefix="armwright-workers-") as folder,
-        subprocess.Popen(
-            [sys.executable, "-m", "armwright.study.local_cluster", str(n_workers), folder],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=environment,
-            start_new_session=True,
+        start_module(
+            "armwright.study.local_cluster", n_workers, folder,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment,
         ) as process,
-    ):
+    ):  # fmt: skip
         try:
             assert process.stdout is not None
             line = process.stdout.readline()

@@ -17,6 +17,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
+from armwright.child_process import start_module
 from armwright.exceptions import EvaluatorError, SettingsError
 from armwright.problem.evaluators import Measurement
 from armwright.problem.failure import Failure
@@ -120,15 +121,11 @@ class EvaluationProcess:
     def _start(self) -> None:
         self.close()
         self._connection, theirs = Pipe()
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "armwright.study.evaluation_process", str(theirs.fileno())],
-                stdin=subprocess.PIPE,
-                pass_fds=[theirs.fileno()],
-                env=environment,
-                start_new_session=True,
-            )
+            self._process = start_module(
+                "armwright.study.evaluation_process", theirs.fileno(),
+                stdin=subprocess.PIPE, pass_fds=[theirs.fileno()],
+            )  # fmt: skip
         try:
             self._connection.send((self.pickled, self.timeout))
             failure = self._connection.recv()

@@ -1,0 +1,23 @@
+"""Start processes that run modules of this package."""
+
+import os
+import subprocess
+import sys
+from typing import Any
+
+
+def start_module(module: str, *arguments: object, **options: Any) -> subprocess.Popen[Any]:
+    """Start `python -m MODULE` with the module path of this process, in a session of its own.
+
+    It imports nothing from the working folder, which may hold somebody else's files (`-P`), and Ctrl-C in the terminal
+    does not reach it.
+
+    Args:
+        module: The module.
+        *arguments: Its arguments.
+        **options: Of `subprocess.Popen`; `env` holds variables besides those of this process.
+    """
+    command = [sys.executable, "-P", "-m", module, *map(str, arguments)]
+    path = os.pathsep.join(filter(None, sys.path))
+    environment = {**os.environ, "PYTHONPATH": path, **options.pop("env", {})}
+    return subprocess.Popen(command, env=environment, start_new_session=True, **options)

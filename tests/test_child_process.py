@@ -1,0 +1,116 @@
+"""Processes that commands start import nothing from the working folder."""
+
+import ast
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import armwright
+from tests.support.command_line import PATIENCE
+from tests.support.editor import ServedEditor
+
+# Modules that the processes import: Python's own, other packages' and ours.
+PLANTED = (
+    "json", "queue", "pickle", "logging", "threading", "socket", "multiprocessing", "numpy", "warp", "optuna", "dask",
+    "distributed", "cloudpickle", "starlette", "uvicorn", "pydantic", "armwright", "sitecustomize", "usercustomize",
+)  # fmt: skip
+EVALUATOR = """
+import armwright
+
+@armwright.evaluator("reach [m]", "height [m]")
+def reach(arm, task):
+    return sum(link.length for link in arm.links), abs(arm.base[2])
+"""
+SHORT = ("--n-init", "3", "--n-step", "3", "--n-total", "3", "--no-figures", "--out", "run")
+PLAN = "name: small\ntasks: [target-1]\nmethods: {tpe: {label: TPE}, random: {label: R, sampler: random}}\nseeds: 2\n"
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "workers": ("optimize", "target-1", *SHORT, "--workers", "2"),
+    "timeout": ("optimize", "target-1", *SHORT, "--evaluator", "{there}/ev.py:reach", "--evaluation-timeout", "60"),
+    "workers with a timeout": (
+        "optimize", "target-1", *SHORT, "--evaluator", "{there}/ev.py:reach", "--evaluation-timeout", "60",
+        "--workers", "2",
+    ),
+    "live page": ("optimize", "target-1", *SHORT, "--live"),
+    "experiment": ("experiment", "{there}/plan.yaml", "--out", "run", "--workers", "2"),
+}  # fmt: skip
+
+
+def test_one_function_starts_all_processes() -> None:
+    root = Path(armwright.__file__).parent
+    starters = {
+        file.relative_to(root).as_posix()
+        for file in root.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) in ("subprocess.Popen", "subprocess.run", "os.system", "os.popen", "os.fork")
+    }
+    assert starters == {"child_process.py"}
+
+
+@pytest.fixture
+def planted(in_folder: Path) -> Path:
+    """A working folder with modules that leave a note when they are imported."""
+    for name in PLANTED:
+        (in_folder / f"{name}.py").write_text(
+            f'open("{in_folder}/note", "a").write("{name}\\n")\nraise SystemExit(3)\n'
+        )
+    return in_folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMMANDS)
+def test_planted_modules_are_not_imported(planted: Path, tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
+    there = tmp_path_factory.mktemp("there")
+    (there / "ev.py").write_text(EVALUATOR)
+    (there / "plan.yaml").write_text(PLAN + "n_init: 2\nn_total: 2\n")
+    arguments = [argument.format(there=there) for argument in COMMANDS[name]]
+    with started(*arguments) as process:
+        _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, errors
+    assert not (planted / "note").exists()
+
+
+@pytest.mark.slow
+def test_modules_beside_an_evaluator_hide_none_of_pythons_own(in_folder: Path) -> None:
+    (in_folder / "ev.py").write_text(f"import helper\n{EVALUATOR}")
+    (in_folder / "helper.py").write_text("")
+    for name in ("json", "queue", "pickle", "secrets", "statistics"):
+        (in_folder / f"{name}.py").write_text(f'open("{in_folder}/note", "a").write("{name}\\n")\n')
+    how = ("--evaluator", "ev.py:reach", "--evaluation-timeout", "60", "--workers", "2")
+    with started("optimize", "target-1", *SHORT, *how) as process:
+        _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, errors
+    assert not (in_folder / "note").exists()
+
+
+@pytest.mark.slow
+def test_search_of_the_editor_imports_no_planted_modules(planted: Path) -> None:
+    with started("edit", "cell.yaml") as editing:
+        assert editing.stdout is not None
+        editor = ServedEditor(editing.stdout.readline().strip(), planted / "cell.yaml")
+        opened = json.loads(editor.get("/opened")[1])
+        editor.post("/design", {"task": opened["task"], "space": opened["space"], "seconds": 600})
+        while not any("evaluations" in line for line in json.loads(editor.get("/job")[1])["lines"]):
+            assert json.loads(editor.get("/job")[1])["running"]
+        editing.send_signal(signal.SIGINT)
+        editing.communicate(timeout=PATIENCE)
+    assert not (planted / "note").exists()
+
+
+@contextmanager
+def started(*arguments: str) -> Iterator[subprocess.Popen[Any]]:
+    """A command as its console script begins, which does not look for modules in the working folder."""
+    heed: Callable[[], object] = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    command = [sys.executable, "-P", "-m", "armwright", *arguments]
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed
+    ) as process:
+        yield process
+        process.kill()
