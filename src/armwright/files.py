@@ -1,17 +1,21 @@
-"""Atomic replacement of files, CSV, and names that any file system accepts."""
+"""Atomic replacement of files that follows no links, CSV, and names that any file system accepts."""
 
 import csv
 import io
 import os
 import re
+import secrets
 import shutil
+import stat
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import ArmwrightError, RunFolderError
 
+_PART = re.compile(r"(\d{1,10})-[0-9a-f]{16}\.part$")  # of a process
 # Windows reserves device names, whatever their suffix, and drops a dot at the end.
 _NO_FILE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?|.*\.", re.IGNORECASE)
 
@@ -45,24 +49,80 @@ def read_text(path: Path, limit: int, error: type[Exception]) -> str:
         raise error(f"{path} is not a text file in UTF-8") from fault
 
 
-def replace_file(target: Path, content: bytes) -> None:
-    """Replace a file atomically: readers, and a crash, leave the old or the new content."""
-    part = target.with_name(target.name + ".part")
-    part.write_bytes(content)
-    os.replace(part, target)
+def replace_file(target: Path, content: bytes, mode: int = 0o666) -> None:
+    """Replace a file atomically: readers, and a crash, leave the old or the new content. A link is replaced itself.
+
+    Args:
+        target: The file.
+        content: Its new content.
+        mode: Its permissions, less those of the umask, from the moment when it is created.
+    """
+    part = new_part(target)
+    try:
+        with open(part, "xb", opener=lambda path, flags: os.open(path, flags, mode)) as file:
+            file.write(content)
+        os.replace(part, target)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def replace_folder(target: Path, part: Path | None = None) -> None:
     """Replace a folder by `part`, or remove it; a crash leaves the old folder, none or the new one."""
-    old = target.with_name(target.name + ".old")
-    if old.exists():
-        shutil.rmtree(old)
+    old = new_part(target)
     if target.exists():
         target.rename(old)  # atomic, unlike the removal of its files
     if part is not None:
         part.rename(target)
     if old.exists():
         shutil.rmtree(old)
+
+
+def new_part(target: Path) -> Path:
+    """Return a name beside a file or folder for its next content, which no other writer has.
+
+    What killed processes left there for the same file or folder is removed.
+    """
+    prefix = f".{target.name}."
+    for other in target.parent.iterdir():
+        found = _PART.fullmatch(other.name.removeprefix(prefix)) if other.name.startswith(prefix) else None
+        if found is not None and not _is_alive(int(found[1])):
+            shutil.rmtree(other) if other.is_dir() and not other.is_symlink() else other.unlink(missing_ok=True)
+    return target.with_name(f"{prefix}{os.getpid()}-{secrets.token_hex(8)}.part")
+
+
+def is_part(name: str) -> bool:
+    """Return whether `new_part` gave this name."""
+    return name.startswith(".") and _PART.search(name) is not None
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):  # another user's, or no number of a process
+        return True
+    return True
+
+
+def open_to_append(path: Path) -> FileIO:
+    """Open a file to append, without a buffer; OSError if it is a link."""
+    return open(path, "ab", buffering=0, opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW, 0o666))
+
+
+def check_no_links(folder: Path) -> None:
+    """Raise RunFolderError if a folder holds links, pipes or devices: what is unpacked may lead out of the folder."""
+    for place, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            path = os.path.join(place, name)
+            try:
+                mode = os.lstat(path).st_mode
+            except OSError:  # deleted meanwhile, or unreadable: whoever needs it says so
+                continue
+            if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+                kind = "a link" if stat.S_ISLNK(mode) else "no ordinary file"
+                raise RunFolderError(f"{path} is {kind}; remove it, or put the file itself in its place")
 
 
 def replace_surrogates(text: str) -> str:

@@ -50,8 +50,8 @@ def init(
         raise TaskError(f"{file} already exists; use another name, or delete it first")
     text = task_template(file) if points is None else task_template(file, read_points(points, unit, offset))
     task = parse_document(text, Task, TaskError, str(file))
-    with naming_write_errors(file, error=FailureError):
-        file.write_text(text, encoding="utf-8")
+    with naming_write_errors(file, error=FailureError), file.open("x", encoding="utf-8") as new:
+        new.write(text)
     print(
         f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
     )

@@ -11,7 +11,7 @@ from armwright.experiments.cells import Cell
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.run_summary import read_run_summary
-from armwright.files import naming_write_errors, replace_file
+from armwright.files import check_no_links, naming_write_errors, replace_file
 from armwright.runs.results import read_summary
 
 PLAN = "experiment.yaml"  # in the experiment's folder
@@ -57,6 +57,7 @@ def published(plan: ExperimentPlan) -> Published:
 def write_plan(plan: ExperimentPlan, out: Path) -> None:
     """Store the plan, with the models that were used, next to the results."""
     text = yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True), sort_keys=False, allow_unicode=True)
+    check_no_links(out)
     with naming_write_errors(out / PLAN):
         out.mkdir(parents=True, exist_ok=True)
         replace_file(out / PLAN, text.encode())

@@ -8,6 +8,7 @@ A. Kumar, K. J. Waldron: The workspaces of a mechanical manipulator, ASME J. Mec
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError
-from armwright.files import naming_write_errors
+from armwright.files import naming_write_errors, replace_file
 from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.reachable_poses import (
     FoundPoses,
@@ -111,15 +112,17 @@ class ReachMap:
             )
         }
         arrays |= {name: np.array(text) for name, text in texts.items()}
-        with naming_write_errors(Path(file)), Path(file).open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                points=self.points,
-                shape=np.array(self.shape),
-                spacing=np.array(self.spacing),
-                directions=self.directions,
-                **arrays,
-            )
+        content = BytesIO()
+        np.savez_compressed(
+            content,
+            points=self.points,
+            shape=np.array(self.shape),
+            spacing=np.array(self.spacing),
+            directions=self.directions,
+            **arrays,
+        )
+        with naming_write_errors(Path(file)):
+            replace_file(Path(file), content.getvalue())
 
 
 def reach_map(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from armwright.exceptions import AnswerPendingError, FailureError, UsageError
-from armwright.files import naming_write_errors
+from armwright.files import naming_write_errors, replace_file
 from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply, Turn
 
 LOOK_EVERY = 0.5  # [s]
@@ -123,4 +123,4 @@ class ManualBackend(LlmBackend):
     def _write(self, file: Path, text: str) -> None:
         with naming_write_errors(file, error=FailureError):
             self.folder.mkdir(parents=True, exist_ok=True)
-            file.write_text(text, encoding="utf-8")
+            replace_file(file, text.encode())

@@ -67,7 +67,8 @@ def _masked(key: str, text: str) -> Iterator[tuple[int, int]]:
 
 def _without(spans: Iterable[tuple[int, int]], blot: str, text: str) -> str:
     """Replace spans of a text, which may overlap, by `blot`; they are sorted by their starts."""
-    pieces, end = [], 0
+    pieces: list[str] = []
+    end = 0
     for start, stop in spans:
         if start >= end:
             pieces += [text[end:start], blot]

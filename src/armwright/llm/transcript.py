@@ -13,7 +13,7 @@ from typing import Annotated, Any, cast
 from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
 from armwright.exceptions import RunFolderError
-from armwright.files import naming_write_errors
+from armwright.files import naming_write_errors, open_to_append
 from armwright.llm.backend import Question, Reply
 from armwright.runs.control import Hint
 
@@ -63,7 +63,7 @@ class Transcript:
             self._calls.append(call)
             if self._path is None:
                 return
-            with naming_write_errors(self._path), open(self._path, "ab", buffering=0) as file:
+            with naming_write_errors(self._path), open_to_append(self._path) as file:
                 _append(file, (json.dumps(_record(call)) + "\n").encode())
 
     def answered(self, proposal: str, step: str) -> Call | None:

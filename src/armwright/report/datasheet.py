@@ -1,6 +1,7 @@
 """Write a data sheet: datasheet.html, datasheet.pdf and datasheet.json."""
 
 import json
+from io import BytesIO
 from pathlib import Path
 
 from pydantic_core import to_jsonable_python
@@ -17,9 +18,9 @@ def write_datasheet(sheet: DataSheet, folder: Path) -> list[Path]:
     """Write a data sheet into a folder, replacing an existing one, and return the files."""
     with naming_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        part = folder / f"{PDF}.part"
-        write_pdf(sheet, part)
-        part.replace(folder / PDF)
+        pdf = BytesIO()
+        write_pdf(sheet, pdf)
+        replace_file(folder / PDF, pdf.getvalue())
         replace_file(folder / HTML, to_html(sheet).encode())
         replace_file(folder / JSON, (json.dumps(sheet_record(sheet), indent=2, allow_nan=False) + "\n").encode())
     return [folder / name for name in (HTML, PDF, JSON)]

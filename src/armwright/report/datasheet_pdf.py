@@ -3,8 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import matplotlib
 from matplotlib import font_manager
@@ -166,9 +165,9 @@ def _advance(letter: str, bold: bool) -> float:
     return font.load_char(ord(letter)).linearHoriAdvance / 2**16
 
 
-def write_pdf(sheet: DataSheet, path: Path) -> None:
+def write_pdf(sheet: DataSheet, file: BinaryIO) -> None:
     """Write the data sheet as PDF; the same sheet gives the same file."""
-    with matplotlib.rc_context(RC), PdfPages(path, metadata={"CreationDate": None}) as pdf:
+    with matplotlib.rc_context(RC), PdfPages(file, metadata={"CreationDate": None}) as pdf:
         for page in draw_pages(sheet):
             pdf.savefig(page)
 

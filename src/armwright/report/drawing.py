@@ -1,7 +1,7 @@
 """Figures without a display, written as PNG and PDF; a folder of figures is replaced in one step."""
 
-import shutil
 from collections.abc import Iterable, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from armwright.arrays import Array
 from armwright.experiments.compare_runs import Comparison
-from armwright.files import naming_write_errors, replace_folder
+from armwright.files import naming_write_errors, new_part, replace_file, replace_folder
 from armwright.pareto import front_mask
 from armwright.problem.objectives import TORQUE
 from armwright.problem.problem import Problem
@@ -125,14 +125,19 @@ def legend_below(figure: Figure, handles: Sequence[Any]) -> None:
 
 def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:
     """Replace the folder `place` by these figures, as PNG and PDF, and return the PNG files."""
-    part = place.with_name(f"{place.name}.part")
+    part = new_part(place)
     with matplotlib.rc_context(RC), naming_write_errors(place, "; the trials are safe"):
-        if part.exists():
-            shutil.rmtree(part)
         part.mkdir(parents=True)
         names = [_save(figure, part / f"{name}.png") for name, figure in drawn]
         replace_folder(place, part)  # so that the folder never mixes figures of two states of a run
     return [place / name for name in names]
+
+
+def save_figure(figure: Figure, file: Path) -> None:
+    """Write a figure, in the format of the file's ending."""
+    content = BytesIO()
+    figure.savefig(content, format=file.suffix.removeprefix("."))
+    replace_file(file, content.getvalue())
 
 
 def _save(figure: Figure, png: Path) -> str:

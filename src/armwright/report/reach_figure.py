@@ -18,7 +18,7 @@ from armwright.arrays import Array
 from armwright.files import naming_write_errors
 from armwright.kinematics.forward import link_lines
 from armwright.kinematics.reach_map import PoseCoverage, ReachMap
-from armwright.report.drawing import legend_below, legend_mark, several_panels
+from armwright.report.drawing import legend_below, legend_mark, save_figure, several_panels
 from armwright.report.style import FRONT, JOINT, LINK, OBSTACLE, RC, TARGET
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import UrdfArm
@@ -79,7 +79,7 @@ def write_reach_figure(found: ReachMap, around: Surroundings, share: float, file
         file: The figure, by its ending.
     """
     with matplotlib.rc_context(RC), naming_write_errors(file):
-        _draw(found, around, share).savefig(file)
+        save_figure(_draw(found, around, share), file)
 
 
 def _draw(found: ReachMap, around: Surroundings, share: float) -> Figure:

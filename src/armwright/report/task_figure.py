@@ -16,7 +16,7 @@ from armwright.files import naming_write_errors
 from armwright.problem.checks.reach import base_box
 from armwright.problem.problem import Problem
 from armwright.report.arm_figures import EDGE, MOVE, frame
-from armwright.report.drawing import legend_mark
+from armwright.report.drawing import legend_mark, save_figure
 from armwright.report.solids import draw_obstacles
 from armwright.report.style import FRONT, OBSTACLE, RC, TARGET
 from armwright.tasks.obstacles import Ground
@@ -41,7 +41,7 @@ def write_task_figure(problem: Problem, file: Path) -> None:
     if file.suffix.lower() not in FORMATS:
         raise TaskError(f"--out {file}: expected a name that ends in {', '.join(FORMATS)}")
     with matplotlib.rc_context(RC), naming_write_errors(file):
-        draw_task(problem).savefig(file)
+        save_figure(draw_task(problem), file)
 
 
 def draw_task(problem: Problem) -> Figure:

@@ -23,7 +23,7 @@ from armwright.files import naming_write_errors, replace_file, replace_surrogate
 CONTROL = "control.json"
 STATUS = "status.json"
 LOCK = ".control.lock"  # held while control.json is changed; there may be several watchers
-CHANNEL_FILES = (CONTROL, f"{CONTROL}.part", STATUS, f"{STATUS}.part", LOCK)
+CHANNEL_FILES = (CONTROL, STATUS, LOCK)
 MAX_HINT_LENGTH = 2_000  # characters
 MAX_HINTS = 100  # of a run
 MAX_FILE_SIZE = 4 * 1024 * 1024  # [bytes]; the longest allowed hints, each letter escaped, take about 2.4 MB

@@ -16,14 +16,15 @@ import re
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self, cast
+from typing import Self
 
 from filelock import FileLock, Timeout
 
 from armwright.exceptions import RunConflictError, RunFolderError
-from armwright.files import naming_write_errors, replace_file
+from armwright.files import check_no_links, is_part, naming_write_errors, open_to_append, replace_file
 from armwright.problem.evaluators import Evaluator
 from armwright.runs.config import Method, RunConfig, check_same_run, versions
 from armwright.runs.control import CHANNEL_FILES
@@ -39,9 +40,7 @@ KEPT = ". What was written before is safe; free room or give another --out DIR, 
 PROPOSALS = "proposals"
 SEARCH = "search.npz"
 REACH_MAPS = "reach-maps"
-BEFORE_TRIALS = {
-    LOCK, CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
-}  # fmt: skip
+BEFORE_TRIALS = {LOCK, CONFIG, TRIALS, "transcripts.jsonl", *CHANNEL_FILES, PROPOSALS}
 
 
 class RunFolder:
@@ -51,11 +50,12 @@ class RunFolder:
         self.path = path
         self._lock = FileLock(path / LOCK)
         self._stat: os.stat_result | None = None
-        self._trials: BinaryIO | None = None
+        self._trials: FileIO | None = None
 
     def __enter__(self) -> Self:
         with naming_write_errors(self.path, KEPT):
             self.path.mkdir(parents=True, exist_ok=True)
+        check_no_links(self.path)
         with naming_write_errors(self.path / LOCK, KEPT):
             try:
                 self._lock.acquire(timeout=LOCK_SECONDS)
@@ -110,7 +110,7 @@ class RunFolder:
 
     def _check_free(self) -> None:
         """Raise RunConflictError if the folder holds other files than those of a run without trials."""
-        others = sorted({entry.name for entry in self.path.iterdir()} - BEFORE_TRIALS)
+        others = sorted({entry.name for entry in self.path.iterdir() if not is_part(entry.name)} - BEFORE_TRIALS)
         if (self.path / CONFIG).exists():
             read_config(self.path)
             if others:
@@ -132,7 +132,7 @@ class RunFolder:
         path = self.path / TRIALS
         trials, intact = read_trials(path, config)
         with naming_write_errors(path, KEPT):
-            self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
+            self._trials = open_to_append(path)
             if intact < self._trials.tell():  # otherwise the file keeps its modification time
                 self._trials.truncate(intact)
         return trials
@@ -196,6 +196,7 @@ def is_held(folder: Path) -> bool:
 def read_config(path: Path) -> RunConfig:
     """Read the configuration of a run folder."""
     file = path / CONFIG
+    check_no_links(path)
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as fault:
