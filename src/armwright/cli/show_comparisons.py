@@ -16,6 +16,7 @@ from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
 from armwright.experiments.runner import CellOutcome
 from armwright.extras import install_command, missing_packages
+from armwright.llm.servers import describe_server
 from armwright.problem.objectives import TORQUE_SCALE
 from armwright.report.table_cells import remarks_on
 from armwright.report.tables import markdown, sections
@@ -39,7 +40,10 @@ def show_plan(
     with_model = [cell for cell in due if cell.plan.needs_a_model and cell.replay is None]
     if with_model:
         proposals = sum(-(-cell.n_total // cell.plan.n_step) for cell in with_model)
-        models = ", ".join(sorted({str(cell.plan.model_options.model) for cell in with_model}))
+        asked = {
+            f"{options.model}{describe_server(options)}" for cell in with_model for options in [cell.plan.model_options]
+        }
+        models = "; ".join(sorted(asked))
         console.print(f"{len(with_model)} of them ask {models} for about {proposals:,} proposals in total")
 
 

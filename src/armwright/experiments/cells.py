@@ -13,6 +13,7 @@ from armwright.experiments.plan import ExperimentPlan, MethodPlan
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import BUILTIN_PROMPTS
 from armwright.llm.recording_file import shipped_recordings
+from armwright.llm.servers import SERVER_KEY
 from armwright.llm.transcript import TRANSCRIPTS
 from armwright.tasks.catalogue import load_task
 
@@ -47,7 +48,9 @@ class Cell:
     @property
     def command(self) -> str:
         """The shell command of the same run."""
-        return shlex.join([*_program(), *(self._design_options() if self.plan.design else self._study_options())])
+        without_key = ["env", "-u", SERVER_KEY] if self.plan.model_options.keyless else []
+        options = self._design_options() if self.plan.design else self._study_options()
+        return shlex.join([*without_key, *_program(), *options])
 
     def _study_options(self) -> list[str]:
         plan, options = self.plan, self.plan.model_options

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.files import check_name
-from armwright.llm.configuration import configured_model
+from armwright.llm.configuration import configured_model, own_addresses
 from armwright.llm.model_options import ModelOptions
 from armwright.proposers.factory import PROPOSERS, Choice, choose_proposer
 from armwright.spaces.design_space import builtin_spaces
@@ -187,7 +187,12 @@ def load_experiment(name_or_path: str) -> tuple[ExperimentPlan, Path]:
     path = Path(name_or_path)
     if not path.is_file():
         raise SettingsError(_unknown(name_or_path))
-    return read_document(path, ExperimentPlan, SettingsError), path.resolve().parent
+    plan = read_document(path, ExperimentPlan, SettingsError)
+    methods = {
+        key: method.model_copy(update={"model_options": method.model_options.named_in(path.name)})
+        for key, method in plan.methods.items()
+    }
+    return plan.model_copy(update={"methods": methods}), path.resolve().parent
 
 
 def _unknown(name: str) -> str:
@@ -204,7 +209,9 @@ def with_model(plan: ExperimentPlan, options: ModelOptions) -> ExperimentPlan:
     The options of a method take precedence.
     """
     methods: dict[str, MethodPlan] = {}
+    addresses = (*own_addresses(), None if options.keyless else options.base_url)
     for key, method in plan.methods.items():
+        method = method.model_copy(update={"model_options": method.model_options.approved(addresses)})
         if method.needs_a_model and method.model_options.model is None:
             configured = configured_model(method.model_options.with_defaults(options))
             if configured is not None:

@@ -9,6 +9,7 @@ from platformdirs import user_config_path
 
 from armwright.exceptions import SettingsError
 from armwright.llm.model_options import ModelOptions
+from armwright.llm.servers import describe_server
 from armwright.yaml_documents import check_document, parse_document, read_document
 
 
@@ -22,7 +23,7 @@ class ConfiguredModel:
     @property
     def place(self) -> str:
         """The server as a phrase; empty for the vendor's."""
-        return f" at {self.options.base_url}" if self.options.base_url else ""
+        return describe_server(self.options)
 
     def __str__(self) -> str:
         """Return the model, its server and who named it, in one phrase."""
@@ -51,8 +52,13 @@ def load_model_options(source: str | None = None, **direct: Any) -> ModelOptions
     if source.lstrip().startswith("{"):
         stated = parse_document(source, ModelOptions, SettingsError, "--model-options")
     else:
-        stated = read_document(Path(source), ModelOptions, SettingsError)
+        stated = read_document(Path(source), ModelOptions, SettingsError).named_in(source).approved(own_addresses())
     return options.with_defaults(stated)
+
+
+def own_addresses() -> tuple[str | None, ...]:
+    """Return the addresses that the environment and the user's configuration file name: those may receive a key."""
+    return os.environ.get("ARMWRIGHT_BASE_URL"), _defaults().base_url
 
 
 def configured_model(options: ModelOptions | None = None) -> ConfiguredModel | None:
@@ -64,8 +70,7 @@ def configured_model(options: ModelOptions | None = None) -> ConfiguredModel | N
     every model.
     """
     given = options or ModelOptions()
-    path = configuration_path()
-    defaults = read_document(path, ModelOptions, SettingsError) if os.path.isfile(path) else ModelOptions()
+    path, defaults = configuration_path(), _defaults()
     named = {"--model": given.model, "ARMWRIGHT_MODEL": os.environ.get("ARMWRIGHT_MODEL"), str(path): defaults.model}
     named_by = next((place for place, model in named.items() if model), None)
     if named_by is None:
@@ -75,3 +80,9 @@ def configured_model(options: ModelOptions | None = None) -> ConfiguredModel | N
         base_url = base_url or defaults.base_url
     found = {"model": named[named_by], "base_url": base_url}
     return ConfiguredModel(given.with_defaults(defaults).model_copy(update=found), named_by)
+
+
+def _defaults() -> ModelOptions:
+    """Return the options in the user's configuration file; empty if there is none."""
+    path = configuration_path()
+    return read_document(path, ModelOptions, SettingsError) if os.path.isfile(path) else ModelOptions()

@@ -4,10 +4,10 @@ The same model validates `--model-options`, the user's config.yaml, the methods 
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Self, cast
 
-from pydantic import BaseModel, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from armwright.exceptions import did_you_mean
 
@@ -121,6 +121,21 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
     origin: str = "model"
     replay_strict: bool = False
     wait: bool = True
+    _named_in: str = PrivateAttr(default="")  # the file that names base_url, if it may be somebody else's
+
+    @property
+    def keyless(self) -> str:
+        """The file that names base_url, which therefore receives no key; empty if the user names it."""
+        return self._named_in
+
+    def named_in(self, file: str) -> Self:
+        """Return the options as those of a file that may be somebody else's."""
+        return self._copy({}, file if self.base_url else "")
+
+    def approved(self, addresses: Iterable[str | None]) -> Self:
+        """Return the options as the user's own if base_url is among these addresses."""
+        same = (self.base_url or "").rstrip("/") in {address.rstrip("/") for address in addresses if address}
+        return self.named_in("") if same else self
 
     @property
     def source(self) -> str:
@@ -136,7 +151,12 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
 
     def with_defaults(self, defaults: Self) -> Self:
         """Return these options, with `defaults` for the fields that are not set here."""
-        return defaults.model_copy(update=self.given)
+        return defaults._copy(self.given, self._named_in if self.base_url else defaults._named_in)
+
+    def _copy(self, update: Mapping[str, Any], file: str) -> Self:
+        copy = self.model_copy(update=update)
+        copy._named_in = file  # pyright: ignore[reportAttributeAccessIssue] (frozen are only the fields)
+        return copy
 
     def command_options(self) -> dict[str, str]:
         """Return the command-line options that state the fields that were set, by name."""

@@ -25,7 +25,7 @@ class Server:
     Attributes:
         address: Its base URL.
         model: Its name for the model.
-        key_variable: Environment variable of its key.
+        key_variable: Environment variable of its key; empty if none is sent.
     """
 
     address: str
@@ -59,11 +59,28 @@ def server_of(options: ModelOptions) -> Server | None:
     model = options.model or ""
     vendor, _, bare = model.partition(":")
     if options.base_url:
-        return Server(options.base_url, model.removeprefix("openai-chat:"), SERVER_KEY)
+        return Server(options.base_url, model.removeprefix("openai-chat:"), "" if options.keyless else SERVER_KEY)
     if vendor in _LOCAL:
         default, address, key = _LOCAL[vendor]
-        return Server(os.environ.get(address) or default, bare, key if os.environ.get(key) else SERVER_KEY)
+        # Nobody named the default address, where another program of this machine may listen.
+        named = SERVER_KEY if os.environ.get(address) else ""
+        return Server(os.environ.get(address) or default, bare, key if os.environ.get(key) else named)
     return None
+
+
+def describe_server(options: ModelOptions) -> str:
+    """Return the address of a model's server and what key it receives, as a phrase; empty for the vendor's own."""
+    server = server_of(options)
+    if server is None:
+        return ""
+    if not os.environ.get(server.key_variable):
+        if not (options.keyless and os.environ.get(SERVER_KEY)):
+            return f" at {server.address}"
+        return (
+            f" at {server.address}, which {options.keyless} names and which does not receive {SERVER_KEY} "
+            f"(set ARMWRIGHT_BASE_URL={server.address} to send it)"
+        )
+    return f" at {server.address}, with {server.key_variable}"
 
 
 def _is_url(text: str) -> bool:
