@@ -1,19 +1,39 @@
-"""End commands in order on Ctrl-C and SIGTERM."""
+"""End commands on Ctrl-C and SIGTERM: in order, or at once if that takes too long or on a second signal."""
 
+import ctypes
 import os
+import select
 import signal
 import sys
 import threading
+from functools import cache
+from types import FrameType
 
 INTERRUPTED = 130  # exit code of a shell for Ctrl-C
+REPORT_SECONDS = 2.0  # after which a command that has not ended says what it waits for
+END_SECONDS = 10.0  # after which it ends
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SHOW_CURSOR = "\x1b[?25h"  # progress lines hide it
+
+# What a command may wait for, by the module that waits.
+_WAITS = {
+    "armwright.problem.evaluators": "the evaluator",
+    "armwright.study.cluster": "the workers",
+    "armwright.study.evaluation_process": "the process of the evaluator",
+    "armwright.llm": "the language model",
+    "warp": "the kernels",
+    "optuna": "the sampler",
+    "matplotlib": "the figures",
+}
 
 
 def install_handlers() -> None:
     """Turn SIGINT and SIGTERM into KeyboardInterrupt, unless the shell ignores them for background jobs."""
+    signal.set_wakeup_fd(_watch_signals(), warn_on_full_buffer=False)
     for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
+            _reset_on_delivery(number)
     sys.unraisablehook = _repeat_dropped_interrupt
 
 
@@ -31,6 +51,76 @@ def _interrupt(*_: object) -> None:
     for number in _SIGNALS:
         signal.signal(number, signal.SIG_DFL)
     raise KeyboardInterrupt
+
+
+def _reset_on_delivery(number: int) -> None:
+    """Let the system itself end the process on a second signal: code in C may keep Python from handling the first."""
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, "sysv_signal"):
+        libc.signal.restype = ctypes.c_void_p
+        libc.sysv_signal.argtypes = (ctypes.c_int, ctypes.c_void_p)
+        libc.sysv_signal(number, libc.signal(number, ctypes.c_void_p(int(signal.SIG_IGN))))
+
+
+@cache
+def _watch_signals() -> int:
+    """Start the thread that ends commands which do not end in order; return where Python writes signals for it."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    threading.Thread(target=_end_late, args=(reader,), name="armwright-signals", daemon=True).start()
+    return writer
+
+
+def _end_late(reader: int) -> None:
+    while True:
+        if os.read(reader, 1)[0] not in _SIGNALS:
+            continue
+        for stream in (1, 2):
+            if os.isatty(stream):
+                _write(stream, _SHOW_CURSOR)
+        if _stays_quiet(reader, REPORT_SECONDS):
+            _write(2, f"\narmwright: waiting for {_what_is_awaited()}; Ctrl-C again ends at once\n")
+            if _stays_quiet(reader, END_SECONDS - REPORT_SECONDS):
+                _write(2, f"armwright: ended without {_what_is_awaited()}\n")
+        if _is_ending():
+            os._exit(INTERRUPTED)
+
+
+def _stays_quiet(reader: int, seconds: float) -> bool:
+    """Wait; return whether no other signal came meanwhile and the command has still to end."""
+    return not select.select([reader], [], [], seconds)[0] and _is_ending()
+
+
+def _is_ending() -> bool:
+    """Return whether the signals are still this module's, so that nobody else called the program and goes on."""
+    return signal.getsignal(signal.SIGINT) in (_interrupt, signal.SIG_DFL, signal.SIG_IGN)
+
+
+def _what_is_awaited() -> str:
+    """Return what the main thread is doing, in words."""
+    frames = sys._current_frames()  # pyright: ignore[reportPrivateUsage] (documented)
+    frame = frames.get(threading.main_thread().ident or 0)
+    modules: list[str] = []
+    while frame is not None:
+        modules.append(_module(frame))
+        frame = frame.f_back
+    waits = (words for module in reversed(modules) for name, words in _WAITS.items() if _is_in(module, name))
+    return next(waits, modules[0] if modules else "the end of the program")
+
+
+def _module(frame: FrameType) -> str:
+    return str(frame.f_globals.get("__name__", frame.f_code.co_filename))
+
+
+def _is_in(module: str, package: str) -> bool:
+    return module == package or module.startswith(f"{package}.")
+
+
+def _write(stream: int, text: str) -> None:
+    try:
+        os.write(stream, text.encode())
+    except OSError:  # closed, or nobody reads it
+        return
 
 
 def _repeat_dropped_interrupt(unraisable: "sys.UnraisableHookArgs") -> None:

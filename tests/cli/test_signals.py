@@ -1,0 +1,148 @@
+"""Ctrl-C ends a command in order, says what it waits for, and ends it in any case; the resumed run is the same."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request
+from tests.support.command_line import PATIENCE, armwright
+from tests.support.wire_formats import model_options
+from tests.torture.lives import is_same_run
+
+STUDY = ("optimize", "target-1", "--n-init", "3", "--n-step", "3", "--n-total", "6", "--no-figures", "--out")
+
+# It misbehaves at its fourth design, until there is a file `good`.
+EVALUATOR = """
+import pathlib, time
+import armwright
+
+n_calls = 0
+
+@armwright.evaluator("reach [m]", "height [m]")
+def measure(arm, task):
+    global n_calls
+    n_calls += 1
+    if n_calls == 4 and not pathlib.Path("good").exists():
+        pathlib.Path("begun").touch()
+        {bad}
+    return sum(link.length for link in arm.links), abs(arm.base[2])
+"""
+STUBBORN = "while True:\n            try: time.sleep(1)\n            except BaseException: pass"
+HOLDS_LOCK = "sum(range(10**15))"  # C code that neither lets other threads run nor looks for signals
+
+
+@contextmanager
+def begun(*arguments: object, until: str, **environment: str) -> Iterator[subprocess.Popen[str]]:
+    """A command in its own process that has reached a line of its output, or made a file of this name."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "armwright", *map(str, arguments)], stdin=subprocess.DEVNULL, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, "PYTHONUNBUFFERED": "1", **environment},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        if until.endswith(":"):
+            assert any(until[:-1] in line for line in process.stdout)
+        else:
+            while not Path(until).exists():
+                assert process.poll() is None, process.stdout.read()
+        yield process
+        process.kill()
+
+
+def is_resumed(folder: Path, *options: str) -> bool:
+    """Whether the interrupted run and one that was left alone end alike."""
+    whole = folder.with_name("whole")
+    for each in (folder, whole):
+        done = armwright(*STUDY, each, *options)
+        assert done.returncode == 0, done.stderr
+    is_same_run(folder, whole)
+    return True
+
+
+@pytest.fixture
+def evaluator(in_folder: Path, request: pytest.FixtureRequest) -> tuple[str, ...]:
+    (in_folder / "ev.py").write_text(EVALUATOR.format(bad=request.param))
+    return "--evaluator", "ev.py:measure"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("evaluator", ["time.sleep(1000)"], indirect=True)
+def test_first_interrupt_ends_an_evaluator_in_order(in_folder: Path, evaluator: tuple[str, ...]) -> None:
+    with begun(*STUDY, in_folder / "run", *evaluator, until="begun") as process:
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert "stopped; every finished trial is in" in output
+    assert "waiting for" not in output
+    (in_folder / "good").touch()
+    assert is_resumed(in_folder / "run", *evaluator)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("evaluator", [STUBBORN], indirect=True)
+def test_evaluator_that_swallows_interrupts_is_named_and_ended(in_folder: Path, evaluator: tuple[str, ...]) -> None:
+    with begun(*STUDY, in_folder / "run", *evaluator, until="begun") as process:
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=PATIENCE)  # after ten seconds
+    assert process.returncode == 130
+    assert "armwright: waiting for the evaluator; Ctrl-C again ends at once\n" in output
+    assert "armwright: ended without the evaluator\n" in output
+    (in_folder / "good").touch()
+    assert is_resumed(in_folder / "run", *evaluator)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("evaluator", [STUBBORN, HOLDS_LOCK], indirect=True)
+def test_second_interrupt_ends_an_evaluator_at_once(in_folder: Path, evaluator: tuple[str, ...]) -> None:
+    with begun(*STUDY, in_folder / "run", *evaluator, until="begun") as process:
+        process.send_signal(signal.SIGINT)
+        while True:  # until the first one was delivered; two at once are one
+            process.send_signal(signal.SIGINT)
+            try:
+                process.communicate(timeout=1.0)
+                break
+            except subprocess.TimeoutExpired:
+                continue
+    assert process.returncode in (130, -signal.SIGINT)  # both are 130 for a shell
+    (in_folder / "good").touch()
+    assert is_resumed(in_folder / "run", *evaluator)
+
+
+@pytest.mark.slow
+def test_compilation_is_interrupted(in_folder: Path) -> None:
+    cache = {"WARP_CACHE_PATH": str(in_folder / "kernels")}
+    with begun(*STUDY, in_folder / "run", until="compil:", **cache) as process:
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert "Traceback" not in output
+    assert is_resumed(in_folder / "run")
+
+
+@pytest.mark.slow
+def test_hostile_answer_is_interrupted(chat_server: ChatServer, in_folder: Path) -> None:
+    """It once kept the program from ending, and from everything else."""
+    hostile = 40_000 * "-" + 40_000 * "a-" + 20_000 * "***"
+    is_hostile = True
+
+    def answer(_: Request) -> Answer:
+        (in_folder / "begun").touch()
+        return hostile if is_hostile else json.dumps(GOOD_DESIGN)
+
+    chat_server.answer = answer
+    how = ("--model", "m", *model_options(base_url=chat_server.url, answer="one-step", on_failure="continue"))
+    with begun(*STUDY, in_folder / "run", *how, until="begun", MY_API_KEY="abcdefgh12345678") as process:
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, output
+    assert "Traceback" not in output
+    is_hostile = False
+    chat_server.answer = answer
+    assert is_resumed(in_folder / "run", *how)
