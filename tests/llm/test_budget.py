@@ -11,11 +11,11 @@ from pydantic_ai.messages import ModelResponse
 from pydantic_ai.usage import RequestUsage
 
 from armwright.exceptions import ModelError, ProposalError
-from armwright.llm import client as chat
 from armwright.llm.backend import CHECK, LlmBackend, OutputFormat, Question, Reply, Turn
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prices import ExpectedTokens, describe_cost
+from armwright.llm.responses import cost_of
 from armwright.llm.servers import server_of
 from armwright.llm.session import LlmSession
 from armwright.problem.problem import Problem
@@ -62,7 +62,7 @@ class Greedy(LlmBackend):
 
     def begin(self) -> None: ...
 
-    def check(self, output_mode: str = "") -> Reply:
+    def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
         return self.ask(CHECK)
 
     def ask(
@@ -190,7 +190,7 @@ def test_price_depends_on_the_host(model: str, address: str | None, words: str) 
     if server is not None:
         usage = RequestUsage(input_tokens=10**6, output_tokens=10**6)
         response = ModelResponse([], usage=usage, model_name=server.model, provider_url=address)
-        assert chat._cost(response, server) == (12.5 if "12.50" in words else None)
+        assert cost_of(response, server) == (12.5 if "12.50" in words else None)
 
 
 def test_forecast_of_a_resumed_run_uses_its_past_calls(chat_server: ChatServer, tmp_path: Path) -> None:

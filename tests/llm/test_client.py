@@ -1,10 +1,11 @@
 """The language model proposer over HTTP, against a local server."""
 
 import json
-import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pydantic_ai.models.openai import OpenAIChatModel
 
 from armwright.exceptions import ModelError, SettingsError
 from armwright.llm import client as chat
@@ -14,15 +15,14 @@ from armwright.proposers.llm import LlmProposer
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
-from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer, wants_design
-from tests.support.command_line import PATIENCE
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, designer, wants_design
 from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
 
 
-def run(server: ChatServer, out: Path | None = None, n_total: int = 6, prompt: str = "plus") -> StudyResult:
-    proposer = llm_proposer(server.url, prompt=prompt)
+def run(server: ChatServer, out: Path | None = None, n_total: int = 6, **options: Any) -> StudyResult:
+    proposer = llm_proposer(server.url, **options)
     return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=0, out=out, verify=False)
 
 
@@ -158,18 +158,29 @@ def test_unreachable_server_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None
         optimize(PROBLEM, proposer=proposer, n_total=1)
 
 
-def test_hanging_server_is_an_error(chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    released = threading.Event()
+def test_hanging_server_is_an_error(chat_server: ChatServer) -> None:
+    chat_server.answer = lambda request: Response(pace="never")
+    with pytest.raises(ModelError, match=r"test-model: .*0\.2"):
+        run(chat_server, timeout=0.2)
 
-    def answer(request: Request) -> Answer:
-        released.wait(PATIENCE)
-        return designer(request)
 
-    chat_server.answer = answer
-    monkeypatch.setattr(chat, "CHECK_SECONDS", 0.2)
-    with pytest.raises(ModelError, match="test-model"):
-        run(chat_server)
-    released.set()
+@pytest.mark.parametrize("timeout", [20.0, 300.0, 5000.0])
+def test_every_request_has_the_timeout_of_the_user(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, timeout: float
+) -> None:
+    """The check included, in which a local server loads its model; neither client nor library cut it short."""
+    limits: list[tuple[float, float]] = []
+    request = OpenAIChatModel.request
+
+    async def noted(self: OpenAIChatModel, messages: Any, settings: Any, parameters: Any) -> Any:
+        assert self.provider is not None
+        limits.append((settings["request_timeout"], self.provider.client.timeout.read))
+        return await request(self, messages, settings, parameters)
+
+    monkeypatch.setattr(OpenAIChatModel, "request", noted)
+    run(chat_server, n_total=1, timeout=timeout)
+    assert [seconds for seconds, _ in limits] == [timeout] * 3
+    assert all(read >= seconds for seconds, read in limits)
 
 
 def test_paid_answers_are_not_requested_again(chat_server: ChatServer, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
-"""The fallback of `output: auto`, against servers that refuse tools or JSON schemas."""
+"""The fallback of `output: auto`, against servers that refuse or ignore tools or JSON schemas."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,16 +9,17 @@ import pytest
 
 from armwright.exceptions import ModelError
 from armwright.llm import client as chat
-from armwright.llm.backend import Question
+from armwright.llm.backend import CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.replay import ReplayProposer
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
-from tests.support.chat_server import Answer, ChatServer, Request, designer
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer, is_check
+from tests.support.command_line import armwright
 from tests.support.model_faults import FAULTS, anthropic_error, openai_error
-from tests.support.wire_formats import llm_proposer, proposer
+from tests.support.wire_formats import llm_proposer, model_options, proposer
 
 PROBLEM = Problem(load_task("target-1"))
 STRUCTURED = ("tools", "response_format", "output_config")  # the parts of a request that ask for structured output
@@ -45,6 +47,11 @@ def refusing(*parts: str, with_: Answer = REFUSALS["either protocol"]) -> Callab
     return lambda request: with_ if request.keys() & set(parts) else designer(request)
 
 
+def ignoring(*parts: str) -> Callable[[Request], Answer]:
+    """Answer in prose if a request has one of these parts: the server accepts them and does nothing."""
+    return lambda request: "Here you are: base at zero." if request.keys() & set(parts) else designer(request)
+
+
 def run(asked: Any, out: Path | None, n_total: int = 4, seen: list[Progress] | None = None) -> StudyResult:
     watch = None if seen is None else seen.append
     return optimize(PROBLEM, proposer=asked, n_init=4, n_step=3, n_total=n_total, out=out, watch=watch, verify=False)
@@ -56,8 +63,8 @@ def test_plain_server_gets_the_schema_in_the_prompt(chat_server: ChatServer, tmp
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url), tmp_path / "run", seen=seen)
     assert [trial.source for trial in result.trials[4:]] == ["llm", "bbo", "bbo", "llm"]
-    told = [progress.note for progress in seen if "refuses output" in progress.note]
-    assert told == ["test-model refuses output native and tool; this run uses output prompted"]
+    told = [progress.note for progress in seen if "does not support output" in progress.note]
+    assert told == ["test-model does not support output native and tool; this run uses output prompted"]
     accepted = [request for request in chat_server.requests if not request.keys() & set(STRUCTURED)]
     assert len(accepted) == 1 + 2 * 2  # the check, two for each proposal: nothing else was refused
     assert chat_server.requests[-4:] == accepted[-4:]
@@ -89,6 +96,73 @@ def test_first_accepted_mode_is_used(
     assert result.summary["proposer"]["output_mode"] == used
 
 
+@pytest.mark.parametrize(
+    ("wire", "ignored", "used"),
+    [
+        ("own server", ("response_format",), "tool"),
+        ("own server", ("response_format", "tools"), "prompted"),
+        ("openai", ("tools",), "native"),
+        ("anthropic", ("tools", "output_config"), "prompted"),
+    ],
+)
+def test_mode_that_the_server_ignores_is_not_used(
+    chat_server: ChatServer,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    wire: str,
+    ignored: tuple[str, ...],
+    used: str,
+) -> None:
+    chat_server.answer = ignoring(*ignored)
+    asked = proposer(wire, chat_server, monkeypatch)
+    seen: list[Progress] = []
+    result = run(asked, tmp_path / "run", seen=seen)
+    assert [trial.source for trial in result.trials[4:]] == ["llm", "bbo", "bbo", "llm"]
+    assert result.summary["proposer"]["output_mode"] == used
+    assert [progress.note for progress in seen if f"this run uses output {used}" in progress.note] != []
+    check, *others = Transcript(tmp_path / "run" / "transcripts.jsonl").calls
+    assert (check.output_mode, check.requests) == (used, 1 + len(ignored))  # the ignored ones cost something, too
+    assert check.input_tokens == 100 * check.requests
+    assert [call.requests for call in others] == [1] * 4
+
+
+def test_check_stays_within_the_budget(chat_server: ChatServer) -> None:
+    chat_server.answer = ignoring(*STRUCTURED)
+    result = run(llm_proposer(chat_server.url, max_calls=2), None, n_total=1)
+    assert result.trials[4].fault == "budget"
+    assert len(chat_server.requests) == 2
+
+
+@pytest.mark.parametrize("output", ["auto", "native", "tool", "prompted"])
+def test_model_without_json_in_the_check_is_used_and_reported(
+    chat_server: ChatServer, tmp_path: Path, output: str
+) -> None:
+    chat_server.answer = lambda request: "ready" if is_check(request) else designer(request)
+    seen: list[Progress] = []
+    result = run(llm_proposer(chat_server.url, output=output), tmp_path / "run", n_total=1, seen=seen)
+    used = "prompted" if output == "auto" else output
+    told = (
+        "test-model answered the check in another form than its JSON schema; its proposals may fail; "
+        f"this run uses output {used}"
+    )
+    assert told in [progress.note for progress in seen]
+    assert (result.trials[4].source, result.summary["proposer"]["output_mode"]) == ("llm", used)
+    assert len(chat_server.requests) == (3 if output == "auto" else 1) + 2
+
+
+def test_doctor_states_the_mode_that_works(chat_server: ChatServer) -> None:
+    options = model_options(base_url=chat_server.url)
+    answers = {
+        "m does not support output native and tool; this run uses output prompted": ignoring(*STRUCTURED),
+        "m answered the check in another form than its JSON schema": lambda request: "ready",
+    }
+    for words, chat_server.answer in answers.items():
+        done = armwright("doctor", "--call", "--model", "m", *options)
+        assert done.returncode == 0
+        assert "(output prompted)" in done.stdout
+        assert words in done.stdout
+
+
 def test_resumed_run_keeps_its_mode(chat_server: ChatServer, tmp_path: Path) -> None:
     chat_server.answer = refusing(*STRUCTURED)
     run(llm_proposer(chat_server.url), tmp_path / "run", n_total=1)
@@ -98,7 +172,7 @@ def test_resumed_run_keeps_its_mode(chat_server: ChatServer, tmp_path: Path) -> 
     again = run(llm_proposer(chat_server.url), tmp_path / "run", seen=seen)
     assert again.trials[7].source == "llm"
     assert not any(request.keys() & set(STRUCTURED) for request in chat_server.requests)
-    assert not any("refuses output" in progress.note for progress in seen)
+    assert not any("does not support output" in progress.note for progress in seen)
 
 
 def test_replay_states_the_recorded_mode(chat_server: ChatServer, tmp_path: Path) -> None:
@@ -144,3 +218,31 @@ def test_question_without_a_check_finds_the_mode_once(chat_server: ChatServer) -
         reply = asked.backend.ask(Question(f"llm-{number:04d}", "answer", "Which?"), asked.output_format(PROBLEM))
         assert (reply.output_mode, reply.requests) == ("prompted", 1)
     assert len(chat_server.requests) == 3 + 1
+
+
+@pytest.mark.parametrize("most_requests", [None, 3])
+def test_question_without_a_check_leaves_an_ignored_mode(chat_server: ChatServer, most_requests: int | None) -> None:
+    """Within the requests of a question, if need be over several of them."""
+    chat_server.answer = ignoring(*STRUCTURED)
+    asked = llm_proposer(chat_server.url)
+    question, form = Question("llm-0004", "answer", "Which?"), asked.output_format(PROBLEM)
+    spent: list[int] = []
+    while not chat_server.requests or chat_server.requests[-1].keys() & set(STRUCTURED):
+        try:
+            reply = asked.backend.ask(question, form, most_requests)
+        except CallError as fault:
+            reply = fault.reply
+        spent.append(reply.requests)
+    assert spent == ([7] if most_requests is None else [3, 3, 1])  # an answer is asked for three times in a mode
+    assert reply.output_mode == "prompted"
+    assert asked.backend.ask(question, form, most_requests).requests == 1
+
+
+@pytest.mark.parametrize("wrong", ["link_1", "joint_1"])
+def test_invalid_design_is_no_reason_to_leave_a_mode(chat_server: ChatServer, wrong: str) -> None:
+    chat_server.answer = lambda request: json.dumps({**GOOD_DESIGN, wrong: "7"})
+    asked = llm_proposer(chat_server.url)
+    with pytest.raises(CallError, match=wrong):
+        asked.backend.ask(Question("llm-0004", "answer", "Which?"), asked.output_format(PROBLEM))
+    assert all("response_format" in request for request in chat_server.requests)
+    assert len(chat_server.requests) == 3

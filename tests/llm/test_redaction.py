@@ -22,7 +22,7 @@ from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.text import map_text
 from tests.support import wire_formats as wires
-from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, wants_design
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, is_check, wants_design
 from tests.support.command_line import armwright
 from tests.support.wire_formats import ANTHROPIC_KEY, OPENAI_KEY, SERVER_KEY, WIRES, proposer
 
@@ -79,7 +79,8 @@ def parrot(server: ChatServer) -> Callable[[Request], Answer]:
         key, kind = sent_key(server), next(answers)
         if kind == "text":
             assert not wants_design(request)
-            return f"Your key is {key}, in short {key[:14]}, or {key[:8]}****{key[-4:]}."
+            words = f"Your key is {key}, in short {key[:14]}, or {key[:8]}****{key[-4:]}."
+            return json.dumps({"answer": words}) if is_check(request) else words
         if kind == "design":
             return json.dumps({**GOOD_DESIGN, "reason": f"{key} told me, that is {key[-14:]}"})
         if kind == "value":

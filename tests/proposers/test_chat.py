@@ -43,7 +43,7 @@ TOO_LONG: dict[str, Answer] = {
 def thinker(request: Request) -> Answer:
     """Have one idea for each state of a conversation, and take the design from the idea."""
     if is_check(request):
-        return "ready"
+        return json.dumps({"answer": "ready"})
     messages = request["messages"]
     if not wants_design(request):
         return f"<think>Hm.</think>It is idea {len(messages)}."

@@ -96,7 +96,7 @@ def test_late_answers_are_replayed_when_they_arrived(chat_server: ChatServer, tm
         if len(chat_server.requests) > 1:
             late.wait(PATIENCE)
         answered = [{**next(designs).params, "expected_position_error": 1, "expected_torque": 2} for _ in range(2)]
-        return json.dumps({"designs": answered}) if "response_format" in request else "ready"
+        return json.dumps({"designs": answered} if "response_format" in request else {"answer": "ready"})
 
     def watch(progress: Progress) -> None:
         if progress.doing == "finished" and progress.number == 8:

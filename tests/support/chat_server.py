@@ -1,6 +1,7 @@
 """A local model server with scripted answers.
 
-It speaks OpenAI's chat completions (…/chat/completions) and Anthropic's messages (…/v1/messages).
+It speaks OpenAI's chat completions (…/chat/completions) and Anthropic's messages (…/v1/messages). As with the chat
+templates of Qwen, Gemma and Mistral, a system message must be the first, and the other roles alternate.
 """
 
 import json
@@ -29,15 +30,15 @@ GOOD_DESIGN = {
 class Response:
     """A response to the byte.
 
-    pace: whole; never: not one byte comes; drip: a byte now and then, without an end; cut, gone: the connection ends
-        after half of it, or before its first byte.
+    pace: whole; never: not one byte comes; drip: a byte now and then, without an end; flood: the body again and again,
+        without an end; cut, gone: the connection ends after half of it, or before its first byte.
     """
 
     body: str | bytes = ""
     status: int = 200
     headers: Mapping[str, str] = field(default_factory=dict)
     content_type: str = "application/json"
-    pace: Literal["whole", "never", "drip", "cut", "gone"] = "whole"
+    pace: Literal["whole", "never", "drip", "flood", "cut", "gone"] = "whole"
 
 
 Answer = (
@@ -46,6 +47,18 @@ Answer = (
     | Response
     | Mapping[str, Response]  # by wire format: openai, anthropic
 )
+
+
+OTHER_ROLES = json.dumps(
+    {"error": {"message": "After the optional system message, conversation roles must alternate", "code": 400}}
+)
+
+
+def breaks_template(request: Request) -> bool:
+    """Return whether a strict chat template refuses the roles of a request."""
+    roles = ["user" if message["role"] == "tool" else message["role"] for message in request.get("messages", ())]
+    roles = roles[1:] if roles[:1] == ["system"] else roles
+    return roles != (["user", "assistant"] * len(roles))[: len(roles)]
 
 
 def is_check(request: Request) -> bool:
@@ -120,7 +133,8 @@ class ChatServer:
                 server.headers.append({name.lower(): value for name, value in self.headers.items()})
                 wire = "anthropic" if self.path.endswith("/messages") else "openai"
                 with suppress(OSError):  # the client went away
-                    self._send(_response(server.answer(request), request, wire))
+                    answer = (400, OTHER_ROLES) if breaks_template(request) else server.answer(request)
+                    self._send(_response(answer, request, wire))
 
             def _send(self, response: Response) -> None:
                 if response.pace == "never":
@@ -134,9 +148,13 @@ class ChatServer:
                     "Content-Length": str(10**6 if response.pace == "drip" else len(data)),
                     **response.headers,
                 }
+                if response.pace == "flood":
+                    del headers["Content-Length"]
                 for name, value in headers.items():
                     self.send_header(name, value)
                 self.end_headers()
+                while response.pace == "flood":
+                    self.wfile.write(data)
                 if response.pace == "drip":
                     while not server._released.wait(0.02):
                         self.wfile.write(b" ")

@@ -58,8 +58,9 @@ def try_model(options: ModelOptions | None = None) -> str:
         raise ModelError("no model is configured; give --model, or set ARMWRIGHT_MODEL")
     from armwright.llm.client import ModelClient
 
+    client = ModelClient(configured.options)
     try:
-        reply = ModelClient(configured.options).check()
+        reply = client.check()
     except CallError as fault:
         raise ModelError(f"{fault} ({fault.kind})") from fault
     cost = "price unknown" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
@@ -67,6 +68,7 @@ def try_model(options: ModelOptions | None = None) -> str:
         f'{OK} call: {configured.options.model} answered "{_answer(reply)}" in {reply.seconds:.1f} s '
         f"(output {reply.output_mode}), "
         f"{reply.input_tokens} tokens in, {reply.output_tokens} out, {cost}"
+        f"{client.note and f'; {client.note}'}"
     )
 
 

@@ -1,7 +1,7 @@
 """What answers questions: a model (client.py), a recording of one (replay_backend.py) or a person (manual.py)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Protocol
 
 from pydantic import Field
@@ -69,6 +69,18 @@ class Reply:
     seconds: Amount = 0.0
     output_mode: str = ""
 
+    def plus(self, other: "Reply") -> "Reply":
+        """Return another reply with the cost of both."""
+        costs = [reply.cost_usd for reply in (self, other) if reply.requests]
+        return replace(
+            other,
+            requests=self.requests + other.requests,
+            input_tokens=self.input_tokens + other.input_tokens,
+            output_tokens=self.output_tokens + other.output_tokens,
+            cost_usd=sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
+            seconds=round(self.seconds + other.seconds, 3),
+        )
+
 
 @dataclass(frozen=True)
 class OutputFormat:
@@ -117,11 +129,12 @@ class LlmBackend(Protocol):
     def begin(self) -> None:
         """Start a session; an earlier cancellation no longer counts. Does nothing by default."""
 
-    def check(self, output_mode: str = "") -> Reply:
+    def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
         """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default.
 
         Args:
             output_mode: Mode in which an earlier session of the run asked; empty to choose one.
+            most_requests: Limit of requests; None for no limit.
         """
         return Reply()
 

@@ -1,9 +1,7 @@
-"""Calls to a language model. Only this file and errors.py import pydantic-ai."""
+"""Calls to a language model. Only this file, connections.py, errors.py and responses.py import pydantic-ai."""
 
 import asyncio
 import logging
-import os
-import re
 import sys
 import threading
 import time
@@ -14,10 +12,10 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import Any, TypeVar
 
-from armwright.exceptions import MissingExtraError, SettingsError, UsageError
+from armwright.exceptions import SettingsError, UsageError
 from armwright.extras import requires_extra
 from armwright.files import replace_surrogates
-from armwright.llm.answer import last_json_object, object_schema
+from armwright.llm.answer import object_schema
 from armwright.llm.backend import (
     CHECK,
     MAX_REQUESTS,
@@ -31,29 +29,32 @@ from armwright.llm.backend import (
 )
 from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
 from armwright.llm.redaction import WithoutKeys, redacted
-from armwright.llm.servers import Server, server_of
+from armwright.llm.servers import server_of
 from armwright.text import map_text, one_line
 
 with requires_extra("llm", "a language model"):
-    from genai_prices import Usage, calc_price
-    from openai import AsyncOpenAI, Omit
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
-    from pydantic_ai.messages import ModelMessage, ModelRequest, ModelResponse, TextPart, ToolCallPart, UserPromptPart
-    from pydantic_ai.models import Model, ModelRequestParameters, infer_model
-    from pydantic_ai.models.openai import OpenAIChatModel
+    from pydantic_ai.messages import (
+        ModelMessage,
+        ModelRequest,
+        ModelResponse,
+        TextPart,
+        UserPromptPart,
+    )
+    from pydantic_ai.models import ModelRequestParameters
     from pydantic_ai.models.wrapper import WrapperModel
     from pydantic_ai.output import StructuredDict
-    from pydantic_ai.providers.openai_compatible import OpenAICompatibleProvider
     from pydantic_ai.settings import ModelSettings
     from pydantic_ai.usage import UsageLimits
 
-    from armwright.llm.errors import CALL_FAULTS, PASSING, describe_fault, kind_of_fault, may_refuse_output
+    from armwright.llm.connections import model_on, vendor_model
+    from armwright.llm.errors import CALL_FAULTS, PASSING, describe_fault, kind_of_fault, may_pass, may_refuse_output
+    from armwright.llm.responses import cost_of, json_alone, not_empty, only_reasoning, text_of
 
 # Forecasts and the budget report unknown prices.
 warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)
 
-CHECK_SECONDS = 60.0  # timeout of a check; a local server may have to load the model first
 REASKS = MAX_REQUESTS - 1  # after an invalid answer
 RETRIES = 2  # after a fault that may pass
 RETRY_SECONDS = 0.5  # before the first retry, unless the server states it; doubled before the next
@@ -66,8 +67,6 @@ _CHECK_SCHEMA = object_schema({"answer": {"type": "string"}})
 # With OPENAI_LOG=debug and the like, libraries log requests and responses.
 for _logger in ("openai._base_client", "anthropic._base_client", "httpx2", "httpcore2.http11"):
     logging.getLogger(_logger).addFilter(WithoutKeys())
-
-_WRITTEN = "armwright: written"  # key of the full text in the metadata of a response reduced to its JSON
 
 Result = TypeVar("Result")
 
@@ -85,26 +84,31 @@ class _RetryingModel(WrapperModel):
         model_settings: ModelSettings | None,
         model_request_parameters: ModelRequestParameters,
     ) -> ModelResponse:
+        messages = [not_empty(message) for message in messages]
         deadline = time.monotonic() + (model_settings or {}).get("request_timeout", MODEL_SECONDS)
         retries = 0
         while True:
             try:
                 response = await super().request(messages, model_settings, model_request_parameters)
                 in_text = model_request_parameters.output_mode in ("native", "prompted")
-                return _json_alone(response) if in_text else response
+                return json_alone(response) if in_text else response
             except PASSING as fault:
                 pause = RETRY_SECONDS * 2**retries if fault.retry_after is None else fault.retry_after
-                if retries == RETRIES or time.monotonic() + pause >= deadline:
+                if retries == RETRIES or time.monotonic() + pause >= deadline or not may_pass(fault):
                     raise
             retries += 1
             await asyncio.sleep(pause)
+
+
+class _FormError(CallError):
+    """An answer without the JSON that was asked for: the server may accept an output mode and ignore it."""
 
 
 class ModelClient(LlmBackend):
     """Call one model.
 
     With `output: auto`, hosted models receive the schema as a tool and other servers as a native response format. If
-    the server refuses that, the first question tries the other modes; the one that it accepts is kept.
+    the server refuses or ignores that, the first question tries the other modes; the one that works is kept.
 
     Args:
         options: The model and how it is called.
@@ -120,7 +124,9 @@ class ModelClient(LlmBackend):
         self.origin = options.origin
         self.timeout = options.timeout
         self._server = server_of(options)
-        self._model = _RetryingModel(_vendor_model(model) if self._server is None else _model_on(self._server))
+        seconds = options.timeout
+        called = vendor_model(model, seconds) if self._server is None else model_on(self._server, seconds)
+        self._model = _RetryingModel(called)
         automatic = HOSTED_MODES if self._server is None else SERVER_MODES
         self._modes = automatic if options.output == "auto" else (options.output,)  # one, once it is known
         self._settings = options.model_dump(include={"temperature", "seed"}, exclude_none=True)
@@ -136,43 +142,62 @@ class ModelClient(LlmBackend):
         """Start a session."""
         self._cancelled = False
 
-    def check(self, output_mode: str = "") -> Reply:
+    def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
         """Ask one tiny question, so that a wrong name, key or address is reported before any work is done.
 
-        It is asked for a structured answer, which shows the output modes that the server accepts.
+        It is asked for a structured answer, which shows the output modes that the server supports.
         """
         if output_mode in self._modes:
             self._modes = (output_mode,)
-        modes = self._modes
-        reply = self._in_accepted_mode(self._check)
-        refused = modes[: modes.index(reply.output_mode)]
-        if refused:
-            self.note = f"{self.model} refuses output {' and '.join(refused)}; this run uses output {reply.output_mode}"
+        modes, note = self._modes, ""
+        try:
+            reply = self._in_supported_mode(lambda mode, _: self._check(mode), most_requests)
+        except _FormError as fault:
+            if not fault.reply.answer.strip():
+                raise
+            reply = replace(fault.reply, output_mode=self._modes[-1])  # the model is there
+            note = f"{self.model} answered the check in another form than its JSON schema; its proposals may fail"
+        self._modes = (reply.output_mode,)
+        unsupported = modes[: modes.index(reply.output_mode)]
+        if unsupported and not note:
+            note = f"{self.model} does not support output {' and '.join(unsupported)}"
+        self.note = f"{note}; this run uses output {reply.output_mode}" if note else ""
         return reply
 
     def _check(self, mode: str) -> Reply:
         agent: Agent[None, Any] = Agent(self._model, output_type=_output_type(mode, _CHECK_SCHEMA), retries=0)
         try:
-            return self._run(agent, CHECK, CHECK_SECONDS)
+            return self._run(agent, CHECK, self.timeout)
         except CallError as fault:
-            if fault.kind == "answer" and fault.reply.answer.strip():  # of another form, but the model is there
-                return fault.reply
+            if fault.kind == "answer" and fault.reply.requests:
+                raise _FormError(fault.kind, str(fault), fault.reply) from fault
             raise
 
-    def _in_accepted_mode(self, ask: Callable[[str], Reply]) -> Reply:
-        """Ask in the first output mode that the server accepts, which is used from then on."""
-        *preferred, mode = self._modes
-        for preference in preferred:
+    def _in_supported_mode(self, ask: Callable[[str, int | None], Reply], most_requests: int | None) -> Reply:
+        """Ask in the first output mode that the server accepts and respects, which is used from then on.
+
+        Args:
+            ask: Asks in a mode, with at most this number of requests.
+            most_requests: Limit of the requests in all modes; None for no limit.
+        """
+        spent, modes = Reply(), self._modes
+        for mode in modes:
+            left = None if most_requests is None else most_requests - spent.requests
             try:
-                reply, mode = ask(preference), preference
-                break
-            except CallError as fault:
-                if fault.reply.requests or not may_refuse_output(fault.kind, str(fault)):
+                reply = ask(mode, left)
+            except (CallError, Interrupted) as fault:
+                fault.reply = spent = spent.plus(fault.reply)
+                others = modes[modes.index(mode) + 1 :]
+                if others and isinstance(fault, _FormError):
+                    self._modes = others  # also for the next question, if this one has no requests left
+                elif not others or fault.reply.requests or not may_refuse_output(fault.kind, str(fault)):
                     raise
-        else:
-            reply = ask(mode)
-        self._modes = (mode,)
-        return replace(reply, output_mode=mode)
+                if most_requests is not None and spent.requests >= most_requests:
+                    raise
+            else:
+                self._modes = (mode,)
+                return replace(spent.plus(reply), output_mode=mode)
+        raise AssertionError("there is at least one mode")
 
     def ask(
         self,
@@ -182,10 +207,12 @@ class ModelClient(LlmBackend):
         earlier: Sequence[Turn] | None = None,
     ) -> Reply:
         """Return the answer to a prompt; refusals of its output format are sent back to the model."""
-        run = partial(self._run, question=question, seconds=self.timeout, most_requests=most_requests, earlier=earlier)
+        run = partial(self._run, question=question, seconds=self.timeout, earlier=earlier)
         if output is not None:
-            return self._in_accepted_mode(lambda mode: self._ask_for(output, mode, run))
-        reply = run(Agent(self._model, retries=REASKS))
+            return self._in_supported_mode(
+                lambda mode, left: self._ask_for(output, mode, partial(run, most_requests=left)), most_requests
+            )
+        reply = run(Agent(self._model, retries=REASKS), most_requests=most_requests)
         if not reply.answer.strip():
             raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
@@ -208,6 +235,8 @@ class ModelClient(LlmBackend):
         try:
             reply = run(agent)
         except CallError as fault:
+            if fault.kind in ("answer", "limit") and fault.reply.requests and not refusals:
+                raise _FormError(fault.kind, str(fault), fault.reply) from fault
             if fault.kind != "limit" or not refusals:
                 raise
             message = f"{self.model}: max_calls leaves no request after an invalid answer ({_one_line(refusals[-1])})"
@@ -241,15 +270,16 @@ class ModelClient(LlmBackend):
             except KeyboardInterrupt as fault:
                 raise Interrupted(self._reply(messages[len(past) :], started)) from fault
             except CALL_FAULTS as fault:
-                message = f"{self.model}: {_one_line(describe_fault(fault))}"
+                reason = only_reasoning(messages) if isinstance(fault, faults.UnexpectedModelBehavior) else ""
+                message = f"{self.model}: {_one_line(reason or describe_fault(fault))}"
                 raise CallError(kind_of_fault(fault), message, self._reply(messages[len(past) :], started)) from fault
         return self._reply(messages[len(past) :], started)
 
     def _reply(self, messages: Sequence[ModelMessage], started: float) -> Reply:
         responses = [message for message in messages if isinstance(message, ModelResponse)]
-        costs = [_cost(response, self._server) for response in responses]
+        costs = [cost_of(response, self._server) for response in responses]
         return Reply(
-            answer=_text(responses[-1]) if responses else "",
+            answer=text_of(responses[-1]) if responses else "",
             requests=len(responses),
             input_tokens=sum(response.usage.input_tokens for response in responses),
             output_tokens=sum(response.usage.output_tokens for response in responses),
@@ -276,33 +306,6 @@ class ModelClient(LlmBackend):
             self._pending.discard(future)
 
 
-def _vendor_model(name: str) -> Model:
-    """Return a vendor's model; raises SettingsError if its name is unknown or its key is not set."""
-    if ":" not in name:
-        raise SettingsError(f'model "{name}": expected a vendor before it, such as openai-chat:{name}; or set base_url')
-    try:
-        return infer_model(name)
-    except faults.UserError as fault:
-        key = re.search(r"\b[A-Z_]+_(?:API_KEY|ENDPOINT)\b", str(fault))
-        reason = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {_one_line(fault)}"
-        raise SettingsError(f"model {name} {reason}") from fault
-    except ImportError as fault:
-        raise MissingExtraError(f"model {name} needs another package: {_one_line(fault)}") from fault
-
-
-def _model_on(server: Server) -> Model:
-    """Return a model behind an OpenAI-compatible server, which never receives a vendor's key."""
-    server.check_address()
-    client = AsyncOpenAI(
-        base_url=server.address,
-        api_key=os.environ.get(server.key_variable) or "no-key",
-        default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
-    )
-    provider = OpenAICompatibleProvider("openai-compatible", openai_client=client)
-    # `prompted` asks the server for nothing, not even for its JSON mode.
-    return OpenAIChatModel(server.model, provider=provider, profile={"supports_json_object_output": False})
-
-
 def _output_type(mode: str, schema: Mapping[str, Any]) -> Any:
     return _OUTPUTS[mode](StructuredDict(dict(schema)))
 
@@ -317,37 +320,6 @@ def _messages(turns: Sequence[Turn]) -> list[ModelMessage]:
             ModelResponse([TextPart(turn.answer)]),
         )
     ]
-
-
-def _json_alone(response: ModelResponse) -> ModelResponse:
-    """Return the response without the text around its JSON; `_text` reads that from its metadata."""
-    parts = [replace(p, content=last_json_object(p.content)) if isinstance(p, TextPart) else p for p in response.parts]
-    return replace(response, parts=parts, metadata={**(response.metadata or {}), _WRITTEN: _text(response)})
-
-
-def _text(response: ModelResponse) -> str:
-    """Return all text of the model, tool-call arguments included, so that a refused answer can be inspected."""
-    if response.metadata and _WRITTEN in response.metadata:
-        return response.metadata[_WRITTEN]
-    written = [
-        str(part.content or "") for part in response.parts if isinstance(part, TextPart)
-    ]  # some servers send null
-    calls = [part for part in response.parts if isinstance(part, ToolCallPart)]
-    written += [call.args if isinstance(call.args, str) else call.args_as_json_str() for call in calls]
-    return redacted(replace_surrogates("\n".join(written)))
-
-
-def _cost(response: ModelResponse, server: Server | None) -> float | None:
-    """Return the cost of a response [USD]; None if the price is unknown."""
-    name: Any = response.model_name  # stated by the server: may be anything
-    if name is not None and not isinstance(name, str):
-        return None
-    try:
-        if server is not None:  # refuses a price by the model's name alone, wherever it runs
-            calc_price(Usage(), model_ref=response.model_name or server.model, provider_api_url=server.address)
-        return float(response.cost().total_price)
-    except (LookupError, ValueError, AssertionError):
-        return None
 
 
 def _one_line(text: object) -> str:

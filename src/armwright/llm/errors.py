@@ -7,6 +7,8 @@ from typing import Any, cast
 import httpx2
 from pydantic_ai import exceptions as faults
 
+from armwright.llm.transport import ResponseError
+
 # Kind of fault by exception; subclasses first.
 _KINDS: tuple[tuple[type[Exception], str], ...] = (
     (faults.ModelAuthenticationError, "key"),
@@ -64,10 +66,15 @@ def kind_of_fault(fault: Exception) -> str:
     """Classify a failed call in one word, such as key, quota, rate_limit, server, timeout, context or answer."""
     if _key_cannot_be_sent(fault):
         return "key"
-    if isinstance(fault, _MALFORMED):
+    if isinstance(fault, _MALFORMED) or _response_error(fault):
         return "answer"
     kind = next((kind for cls, kind in _KINDS if isinstance(fault, cls)), "settings")
     return "context" if kind == "rejected" and _is_about_length(fault) else kind
+
+
+def may_pass(fault: Exception) -> bool:
+    """Return whether the same request may succeed a little later."""
+    return isinstance(fault, PASSING) and _response_error(fault) is None
 
 
 def may_refuse_output(kind: str, message: str) -> bool:
@@ -83,6 +90,8 @@ def describe_fault(fault: Exception) -> str:
     """Describe an error by the server's own message, or else by its cause."""
     if _key_cannot_be_sent(fault):
         return "its key cannot be sent: it contains a line break or a character outside ASCII"
+    if (unusable := _response_error(fault)) is not None:
+        return str(unusable)
     if isinstance(fault, CancelledError):
         return "the call was cancelled"
     if isinstance(fault, faults.ModelHTTPError):
@@ -122,6 +131,11 @@ def _key_cannot_be_sent(fault: BaseException) -> bool:
         or str(cause).startswith("Illegal header value")
         for cause in _causes(fault)
     )
+
+
+def _response_error(fault: BaseException) -> ResponseError | None:
+    """Return the error of a response that held no answer; Anthropic's client calls each a failed connection."""
+    return next((cause for cause in _causes(fault) if isinstance(cause, ResponseError)), None)
 
 
 def _causes(fault: BaseException) -> list[BaseException]:

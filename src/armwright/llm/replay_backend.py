@@ -30,7 +30,7 @@ class ReplayBackend(LlmBackend):
         self.differing: list[str] = []
         self._asked: Counter[tuple[str, str]] = Counter()  # how often each step of a proposal was asked for
 
-    def check(self, output_mode: str = "") -> Reply:
+    def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
         """Return the first recorded check."""
         return self._play(next(call for call in self.calls if call.step == "check"))
 

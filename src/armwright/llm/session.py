@@ -86,7 +86,7 @@ class LlmSession:
         """
         mode = output_mode_of(self._transcript.calls)
         try:
-            self._call(CHECK, lambda _: self.backend.check(mode), self._over)
+            self._call(CHECK, partial(self.backend.check, mode), self._over)
         except ProposalError as fault:
             if fault.kind == "budget":
                 return ""

@@ -1,7 +1,7 @@
 """Optuna's conformance suite for samplers, applied to studies with proposals."""
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import pytest
 from optuna.distributions import IntDistribution
 from optuna.samplers import (
     BaseSampler,
+    GridSampler,
     NSGAIIISampler,
     NSGAIISampler,
     PartialFixedSampler,
@@ -24,6 +25,7 @@ from optuna.testing.pytest_samplers import BasicSamplerTestCase
 from optuna.trial import FrozenTrial, TrialState
 
 import armwright as aw
+from armwright.exceptions import SettingsError
 from tests.proposers.for_optuna.test_callback import quiet as quiet
 
 pytestmark = pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
@@ -101,6 +103,67 @@ def test_every_sampler_accepts_proposals_of_every_parameter_kind(
             distribution = trial.distributions[name]
             assert distribution._contains(distribution.to_internal_repr(value))
             assert not isinstance(value, np.generic)
+
+
+def finite(trial: optuna.Trial) -> float:
+    """Forty points."""
+    value = trial.suggest_float("x", 0.0, 1.0, step=0.25) + trial.suggest_int("y", 1, 4)
+    return value + len(trial.suggest_categorical("kind", ["a", "bb"]))
+
+
+GRID = {"x": [0.0, 0.25, 0.5, 0.75, 1.0], "y": [1, 2, 3, 4], "kind": ["a", "bb"]}
+ABSTRACT = ("BaseSampler", "BaseGASampler", "nsgaii")  # the last is a module
+EVERY_SAMPLER = {name: getattr(optuna.samplers, name) for name in optuna.samplers.__all__ if name not in ABSTRACT}
+NEEDS = {"CmaEsSampler": "cmaes", "GPSampler": "torch"}  # packages that Optuna leaves to its users
+ARGUMENTS: dict[str, Callable[[], tuple[Any, ...]]] = {
+    "GridSampler": lambda: (GRID, 0),
+    "PartialFixedSampler": lambda: ({"y": 2}, TPESampler(seed=0)),
+}
+
+
+class Partial(aw.StudyProposer):
+    """Propose random values of some parameters."""
+
+    name = "rules"
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.names = names
+
+    def propose(self, study: optuna.Study, seed: int, number: int) -> aw.StudyProposal:
+        draw = np.random.default_rng(seed)
+        values = {name: GRID[name][draw.integers(len(GRID[name]))] for name in self.names}
+        return aw.StudyProposal(values, f"rules-{number:04d}")
+
+
+@pytest.mark.parametrize("names", [("x", "y", "kind"), ("x",), ()], ids=len)
+@pytest.mark.parametrize("sampler", EVERY_SAMPLER)
+@pytest.mark.fast_cases(3)
+def test_every_sampler_of_optuna_accepts_proposals_or_is_refused(sampler: str, names: Sequence[str]) -> None:
+    if sampler in NEEDS:
+        pytest.importorskip(NEEDS[sampler])
+    made = EVERY_SAMPLER[sampler](*ARGUMENTS[sampler]()) if sampler in ARGUMENTS else EVERY_SAMPLER[sampler](seed=0)
+    study = optuna.create_study(sampler=made)
+    callback = aw.ProposalCallback(Partial(names), every=3)
+    if sampler == "GridSampler":
+        with pytest.raises(SettingsError, match="sampler GridSampler: expected one that accepts proposals"):
+            study.optimize(finite, n_trials=40, callbacks=[callback])
+        assert len(study.trials) == 1  # at its first call, not when the first proposal is due
+        return
+    study.optimize(finite, n_trials=40, callbacks=[callback])
+    assert {trial.state for trial in study.trials} <= {TrialState.COMPLETE, TrialState.WAITING}
+    assert (callback.proposed, callback.faults) == (13, {})
+    assert [trial.number for trial in of_rules(study)] == list(range(2, 40, 3))
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_custom_and_wrapped_grid_samplers_are_refused(wrapped: bool) -> None:
+    class Lattice(GridSampler):
+        """A custom sampler that inherits the counting of cells."""
+
+    sampler = Lattice(GRID, seed=0)
+    study = optuna.create_study(sampler=PartialFixedSampler({"y": 2}, sampler) if wrapped else sampler)
+    with pytest.raises(SettingsError, match="sampler Lattice: expected one that accepts proposals"):
+        study.optimize(finite, n_trials=40, callbacks=[rules()])
 
 
 @pytest.fixture(params=["memory", pytest.param("sqlite", marks=pytest.mark.slow), "journal"])

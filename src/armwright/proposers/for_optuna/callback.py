@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import optuna
+from optuna.samplers import BaseSampler, GridSampler
 from optuna.storages import InMemoryStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
@@ -73,6 +74,7 @@ class ProposalCallback:
 
     def __call__(self, study: optuna.Study, trial: FrozenTrial) -> None:
         """Ask for a proposal if one is due; Optuna calls this after each trial, in the trial's thread."""
+        check_sampler(study.sampler)
         offset = trial.number - (self.first - 1)
         if offset < 0 or offset % self.every:
             return
@@ -104,6 +106,19 @@ class ProposalCallback:
         if not reported:
             outcome = "no more proposals are requested" if error.final else "the study continues without this proposal"
             _logger.warning(f"{error}; {outcome}")
+
+
+def check_sampler(sampler: BaseSampler) -> None:
+    """Raise SettingsError if a sampler cannot work with enqueued trials.
+
+    GridSampler counts only the cells that it assigned itself: a proposal in the last trials ends the study with a
+    KeyError, and one that leaves a parameter out with a ValueError.
+    """
+    base = getattr(sampler, "_base_sampler", sampler)  # of a PartialFixedSampler
+    if isinstance(base, GridSampler):
+        raise SettingsError(
+            f"sampler {type(base).__name__}: expected one that accepts proposals; BruteForceSampler searches a grid too"
+        )
 
 
 def enqueue(study: optuna.Study, params: Mapping[str, Any], attributes: Mapping[str, Any]) -> None:
