@@ -27,8 +27,13 @@ _WAITS = {
 }
 
 
+_installed = 0  # how often handlers were installed in this process: once, but in tests
+
+
 def install_handlers() -> None:
     """Turn SIGINT and SIGTERM into KeyboardInterrupt, unless the shell ignores them for background jobs."""
+    global _installed
+    _installed += 1
     signal.set_wakeup_fd(_watch_signals(), warn_on_full_buffer=False)
     for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -75,25 +80,27 @@ def _end_late(reader: int) -> None:
     while True:
         if os.read(reader, 1)[0] not in _SIGNALS:
             continue
+        installed = _installed
         for stream in (1, 2):
             if os.isatty(stream):
                 _write(stream, _SHOW_CURSOR)
-        if _stays_quiet(reader, REPORT_SECONDS):
+        if _stays_quiet(reader, REPORT_SECONDS) and _is_ending(installed):
             _write(2, f"\narmwright: waiting for {_what_is_awaited()}; Ctrl-C again ends at once\n")
-            if _stays_quiet(reader, END_SECONDS - REPORT_SECONDS):
+            if _stays_quiet(reader, END_SECONDS - REPORT_SECONDS) and _is_ending(installed):
                 _write(2, f"armwright: ended without {_what_is_awaited()}\n")
-        if _is_ending():
+        if _is_ending(installed):
             os._exit(INTERRUPTED)
 
 
 def _stays_quiet(reader: int, seconds: float) -> bool:
-    """Wait; return whether no other signal came meanwhile and the command has still to end."""
-    return not select.select([reader], [], [], seconds)[0] and _is_ending()
+    """Wait for another signal; return whether there was none."""
+    return not select.select([reader], [], [], seconds)[0]
 
 
-def _is_ending() -> bool:
-    """Return whether the signals are still this module's, so that nobody else called the program and goes on."""
-    return signal.getsignal(signal.SIGINT) in (_interrupt, signal.SIG_DFL, signal.SIG_IGN)
+def _is_ending(installed: int) -> bool:
+    """Return whether the program that was interrupted has still to end: nobody else has taken its signals since."""
+    handler = signal.getsignal(signal.SIGINT)
+    return installed == _installed and handler in (_interrupt, signal.SIG_DFL, signal.SIG_IGN)
 
 
 def _what_is_awaited() -> str:
