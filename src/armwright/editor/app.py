@@ -172,7 +172,10 @@ class Editor:
     async def opened(self, request: Request) -> Response:
         names = {"task": self._files.task.name, "space": self._files.space.name}
         texts = asdict(self._files.texts())
-        return _json({"files": names, **texts, "exist": self._files.exist, "choices": choices()})
+        files = self._files
+        return _json(
+            {"files": names, **texts, "exist": files.exist, "notes": asdict(files.notes), "choices": choices()}
+        )
 
     async def job(self, request: Request) -> Response:
         return _json(None if self._job is None else self._job.status())
