@@ -1,5 +1,6 @@
 """Rotation matrices, their columns being the rotated axes."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,6 +18,30 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
             [-sp, cp * sr, cp * cr],
         ]
     )
+
+
+def rotation_from_quaternion(x: float, y: float, z: float, w: float) -> Array:
+    """Return the (3, 3) rotation of a quaternion x i + y j + z k + w of any length but 0."""
+    x, y, z, w = np.array([x, y, z, w]) / math.hypot(x, y, z, w)
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
+
+
+def rpy_from_rotation(rotation: Array) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw [rad] of a (3, 3) rotation, the inverse of `rotation_from_rpy`.
+
+    In gimbal lock (x straight up or down) roll and yaw rotate about the same line: all of it is yaw.
+    """
+    x, y, z = rotation.T
+    level = math.hypot(x[0], x[1])
+    pitch = math.atan2(-x[2], level)
+    roll, yaw = (math.atan2(y[2], z[2]), math.atan2(x[1], x[0])) if level > 1e-9 else (0.0, math.atan2(-y[0], y[1]))
+    return (roll + 0.0, pitch + 0.0, yaw + 0.0)  # no -0.0
 
 
 def rotation_to_axis(axis: Sequence[float] | Array) -> Array:

@@ -114,9 +114,10 @@ def test_json_output_is_alone_on_stdout(in_folder: Path) -> None:
 
 
 def test_optimize_accepts_task_and_space_files(in_folder: Path) -> None:
-    (in_folder / "points.csv").write_text("x;y;z\n450;0;100\n450;200;300\n")
+    (in_folder / "points.csv").write_text("id;z;y;x\n7;100;0;450\n8;300;200;450\n")
     made = armwright("init", "shelf.yaml", "--from", "points.csv", "--unit", "mm", "--offset", "0", "0", "0.5")
     assert made.returncode == 0, made.stderr
+    assert made.stdout.startswith("note: points.csv: columns not used: 'id'\n")
     assert yaml.safe_load((in_folder / "shelf.yaml").read_text())["targets"] == [[0.45, 0.0, 0.6], [0.45, 0.2, 0.8]]
     (in_folder / "space.yaml").write_text("joints: 3\nmass: {kind: per_link, kg: 0.002}\n")
     done = armwright("optimize", "shelf.yaml", "--space", "space.yaml", "--sampler", "random", *SHORT)

@@ -1,9 +1,15 @@
 """The files that the editor opens and writes."""
 
+import codecs
+import errno
+import os
 import stat
+import tempfile
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import armwright as aw
 from armwright.editor.edited_files import MAX_BYTES, ChangedOnDiskError, EditedFiles, Texts, default_space_file
@@ -59,6 +65,92 @@ def test_links_and_modes_stay(tmp_path: Path) -> None:
     assert (tmp_path / "link.yaml").is_symlink()
     assert (tmp_path / "real.yaml").read_text() == "name: two\n"
     assert stat.S_IMODE((tmp_path / "real.yaml").stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize("is_linked", [False, True])
+def test_hard_links_stay(tmp_path: Path, is_linked: bool) -> None:
+    """Also if a link is reached by a symbolic one."""
+    real, other, link = tmp_path / "real.yaml", tmp_path / "other.yaml", tmp_path / "link.yaml"
+    real.write_text("name: one, and much longer than what replaces it\n")
+    real.chmod(0o640)
+    other.hardlink_to(real)
+    link.symlink_to(real)
+    files = EditedFiles(link if is_linked else real)
+    files.save(Texts("name: two\n", files.texts().space))
+    assert real.samefile(other)
+    assert link.is_symlink()
+    assert other.read_text() == "name: two\n"
+    assert stat.S_IMODE(other.stat().st_mode) == 0o640
+    space = files.space.name
+    assert {file.name for file in tmp_path.iterdir()} == {"real.yaml", "other.yaml", "link.yaml", space}
+
+
+def test_a_failed_write_through_hard_links_says_where_the_text_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "real.yaml").write_text("name: one\n")
+    (tmp_path / "other.yaml").hardlink_to(tmp_path / "real.yaml")
+    files = EditedFiles(tmp_path / "real.yaml")
+    synced: list[int] = []
+
+    def full(descriptor: int) -> None:
+        synced.append(descriptor)
+        if len(synced) > 1:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(
+        FailureError, match=r"No space left on device; the whole text is in .*real\.yaml\..*\.new"
+    ) as told:
+        files.save(Texts("name: two\n", files.texts().space))
+    assert Path(str(told.value).rpartition(" is in ")[2]).read_text() == "name: two\n"
+
+
+lines = st.text(st.characters(codec="utf-8", exclude_characters="\r\n", exclude_categories=["Cs"]), max_size=20)
+
+
+@given(st.lists(lines, min_size=1), st.sampled_from(("\n", "\r\n", "\r")), st.booleans(), st.data())
+def test_line_ends_and_the_mark_stay(written: list[str], end: str, has_mark: bool, data: st.DataObject) -> None:
+    """The page shows LF, as text fields do, and no mark; a change of a line changes the bytes of this line."""
+    mark = codecs.BOM_UTF8 if has_mark else b""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "task.yaml"
+        before = mark + f"# first{end}{end.join(written)}".encode()
+        file.write_bytes(before)
+        files = EditedFiles(file)
+        texts = files.texts()
+        assert texts.task == "\n".join(["# first", *written])
+        assert files.notes == Texts("", "")
+        files.save(texts)
+        assert file.read_bytes() == before
+        changed = data.draw(st.integers(0, len(written) - 1))
+        written[changed] = data.draw(lines)
+        files.save(Texts("\n".join(["# first", *written]), texts.space))
+        assert file.read_bytes() == mark + f"# first{end}{end.join(written)}".encode()
+        assert EditedFiles(file).texts().task == "\n".join(["# first", *written])
+
+
+def test_mixed_line_ends_are_announced_before_they_are_changed(tmp_path: Path) -> None:
+    file = tmp_path / "task.yaml"
+    mixed = b"name: one\r\n# a\r\n# b\n"
+    file.write_bytes(mixed)
+    files = EditedFiles(file)
+    note = "task.yaml mixes line ends (CRLF and LF); saving a change writes CRLF in all lines."
+    assert files.notes == Texts(note, "")
+    files.save(files.texts())
+    assert file.read_bytes() == mixed
+    files.save(Texts(files.texts().task.replace("one", "two"), files.texts().space))
+    assert file.read_bytes() == b"name: two\r\n# a\r\n# b\r\n"
+    assert files.notes == Texts("", "")
+
+
+def test_a_change_of_line_ends_on_disk_is_a_change(tmp_path: Path) -> None:
+    file = tmp_path / "task.yaml"
+    file.write_bytes(b"name: one\n")
+    files = EditedFiles(file)
+    file.write_bytes(b"name: one\r\n")
+    with pytest.raises(ChangedOnDiskError):
+        files.save(Texts("name: two\n", files.texts().space))
 
 
 @pytest.mark.parametrize("name", ["task.txt", "task", "nowhere/task.yaml"])

@@ -74,9 +74,15 @@ def test_a_file_that_changed_on_disk_is_a_conflict(editor: ServedEditor) -> None
 
 
 def test_pasted_points_are_converted(editor: ServedEditor) -> None:
-    assert json.loads(editor.post("/points", {"text": "x;y;z\n100;20;-3\n", "unit": "mm"})[1]) == {
-        "points": [[0.1, 0.02, -0.003]]
+    text = "id;y;x;z;name;ax;ay;az\n7;20;100;-3,5;left;0;0;-1\n8;20;100;0;;0;0;1\n"
+    assert json.loads(editor.post("/points", {"text": text, "unit": "mm"})[1]) == {
+        "targets": [
+            {"name": "left", "position": [0.1, 0.02, -0.0035], "axis": [0.0, 0.0, -1.0]},
+            {"position": [0.1, 0.02, 0.0], "axis": [0.0, 0.0, 1.0]},
+        ],
+        "notes": ["columns not used: 'id'", "numbers have decimal commas: -3,5 is read as -3.5"],
     }
+    assert json.loads(editor.post("/points", {"text": "1 2 3"})[1]) == {"targets": [[1.0, 2.0, 3.0]], "notes": []}
     status, reason = editor.post("/points", {"text": "1, 2\n"})
     assert (status, b"line 1" in reason) == (400, True)
 

@@ -97,6 +97,31 @@ def test_targets_are_edited_in_millimetres(tab: Tab) -> None:
     expect(tab.page.get_by_label("x of target 1", exact=True)).to_have_value("0.3125")
 
 
+def test_saving_changes_only_the_bytes_of_a_value(browser: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "cell.yaml"
+    before = b"\xef\xbb\xbf" + TASK.replace("0.3, 0.2", "0.30,  0.2").replace("\n", "\r\n").encode()
+    file.write_bytes(before)
+    space = tmp_path / "cell-space.yaml"
+    space.write_bytes(b"# ours\r\njoints: 4\n")
+    with served_editor(file) as served:
+        opened = Tab(browser)
+        opened.page.goto(served.address)
+        opened.page.locator("#loading").wait_for(state="hidden")
+        note = opened.page.locator("#file-note")
+        announced = "cell-space.yaml mixes line ends (CRLF and LF); saving a change writes CRLF in all lines."
+        expect(note).to_have_text(announced)
+        fill(opened, "y of target 1", "250")
+        press(opened, "Save")
+        assert file.read_bytes() == before.replace(b"0.30,  0.2,", b"0.30,  0.25,")
+        assert space.read_bytes() == b"# ours\r\njoints: 4\n"
+        expect(note).to_have_text(announced)
+        fill(opened, "Largest number of joints", "5")
+        press(opened, "Save")
+        expect(note).to_be_empty()
+        assert space.read_bytes().count(b"\r\n") == space.read_bytes().count(b"\n")
+        opened.close()
+
+
 def test_a_field_that_is_no_number_changes_nothing(tab: Tab) -> None:
     before = text(tab)
     fill(tab, "x of target 1", "three")
@@ -117,6 +142,19 @@ def test_points_are_pasted_with_a_direction(tab: Tab) -> None:
         {"position": [-0.1, 0.2, 0.05], "axis": [0, 0, -1]},
     ]
     press(tab, "Paste points")
+    tab.page.locator("#paste-text").fill("id;name;z;y;x;ax;ay;az\n1;left;0,05;0,2;0,1;0;1;0\n")
+    tab.page.locator("#paste-unit").select_option("m")
+    tab.page.get_by_role("button", name="Replace all targets").click()
+    expect(tab.page.locator("#fault")).to_contain_text("states tool directions")
+    tab.page.locator("#paste-way").select_option("any")
+    tab.page.get_by_role("button", name="Replace all targets").click()
+    expect(tab.page.locator("#paste")).to_be_hidden()
+    settle(tab)
+    assert content(tab)["targets"] == [{"name": "left", "position": [0.1, 0.2, 0.05], "axis": [0.0, 1.0, 0.0]}]
+    expect(tab.page.locator("#paste-note")).to_contain_text("columns not used: 'id'")
+    expect(tab.page.locator("#paste-note")).to_contain_text("0,1 is read as 0.1")
+    press(tab, "Paste points")
+    expect(tab.page.locator("#paste-note")).to_be_empty()
     tab.page.locator("#paste-text").fill("1, 2")
     tab.page.get_by_role("button", name="Append").click()
     expect(tab.page.locator("#fault")).to_contain_text("line 1")

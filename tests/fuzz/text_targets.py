@@ -4,7 +4,7 @@ from pathlib import Path
 
 import armwright as aw
 from armwright.tasks.task import Task
-from tests.fuzz.target import any_of, file_of
+from tests.fuzz.target import DefectError, any_of, file_of
 
 
 def urdf_seeds() -> list[bytes]:
@@ -39,12 +39,19 @@ def run_points(data: bytes) -> None:
     from armwright.tasks.task_template import task_template
     from armwright.yaml_documents import parse_document
 
-    points = read_points(file_of(data, "points.csv"), "mm", (0.0, 1.0, 0.0))
-    parse_document(task_template(Path("x y.yaml"), points), Task, TaskError, "x y.yaml")
+    found = read_points(file_of(data, "points.csv"), None, (0.0, 1.0, 0.0))
+    if not all(map(str.isprintable, found.notes)):
+        raise DefectError(f"notes that are no line: {found.notes!r}")
+    parse_document(task_template(Path("x y.yaml"), found.targets), Task, TaskError, "x y.yaml")
 
 
 def point_seeds() -> list[bytes]:
-    return [b"x,y,z\n100,200,300\n# so\n\n1,2,3\n", b"1;2;3\r\n4;5;6\r\n", b"0.1\t2\t3\t4\n", b"\xef\xbb\xbf1 2 3\n"]
+    return [
+        b"x,y,z\n100,200,300\n# so\n\n1,2,3\n", b"1;2;3\r\n4;5;6\r\n", b"\tx\ty\tz\n0\t0.1\t2\t3\n",
+        b"\xef\xbb\xbf1 2 3\n", b"# timestamp tx ty tz qx qy qz qw\n0.5 0.3 0.0 0.2 0 0 0 1\n",
+        b"name;x [mm];y [mm];z [mm];roll [deg];pitch [deg];yaw [deg]\n\"left one\";100,5;0;0,5;180;0;90\n",
+        b"ax,ay,az,x,y,z\n0,0,-1,1,2,3\n",
+    ]  # fmt: skip
 
 
 def run_words(data: bytes) -> None:

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from armwright.exceptions import TaskError
 from armwright.tasks.catalogue import builtin_tasks, load_task, random_task
-from armwright.tasks.points_file import read_points
 from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
 from armwright.yaml_documents import parse_document
@@ -108,45 +107,6 @@ def test_unknown_task_names_get_suggestions(tmp_path: Path) -> None:
 def test_arbitrary_text_is_read_or_refused(text: str) -> None:
     with contextlib.suppress(TaskError):
         assert isinstance(parse_document(text, Task, TaskError, "it"), Task)
-
-
-@pytest.mark.parametrize(
-    ("text", "unit", "expected"),
-    [
-        ("0.1,0.2,0.3\n", "m", [(0.1, 0.2, 1.3)]),
-        ("x,y,z,name\n100,200,300,a\n\n# note\n-1e2, 0, 5,b\n", "mm", [(0.1, 0.2, 1.3), (-0.1, 0.0, 1.005)]),
-        ("\ufeffx;y;z\n1;2;3\n", "m", [(1, 2, 4)]),
-        ("1\t2\t3\r\n", "m", [(1, 2, 4)]),
-        ("1 2  3\n", "m", [(1, 2, 4)]),
-    ],
-)
-def test_targets_are_read_from_csv(tmp_path: Path, text: str, unit: str, expected: list[tuple[float, ...]]) -> None:
-    file = tmp_path / "points.csv"
-    file.write_text(text, encoding="utf-8", newline="")
-    assert np.array(read_points(file, unit, (0.0, 0.0, 1.0))) == pytest.approx(np.array(expected))
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("x,y,z\n", "no points"),
-        ("1,2\n3,4\n", "line 1"),
-        ("1,2,3\n4,five,6\n", "line 2"),
-        ("1,2,nan\n", "finite"),
-        ("a,b,c\nd,e,f\n", "line 2"),
-        ("O.1,0.2,0.3\n0.1,0.2,0.3\n", "line 1"),
-    ],
-)
-def test_invalid_csv_is_refused_by_line(tmp_path: Path, text: str, words: str) -> None:
-    file = tmp_path / "points.csv"
-    file.write_text(text)
-    with pytest.raises(TaskError, match=words):
-        read_points(file)
-
-
-def test_unknown_unit_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(TaskError, match='unit: expected m or mm, got "inch"'):
-        read_points(tmp_path / "points.csv", "inch")
 
 
 def test_task_template_is_a_valid_task() -> None:

@@ -28,9 +28,12 @@ from armwright.exceptions import FailureError, TaskError
 def init(
     file: Annotated[Path, typer.Argument(help="The task file to write, such as my-task.yaml.")],
     points: Annotated[
-        Path | None, typer.Option("--from", help="CSV file with x, y, z in its first three columns.")
+        Path | None,
+        typer.Option("--from", help="CSV or text file of points, with columns named x, y, z in its header."),
     ] = None,
-    unit: Annotated[str, typer.Option(help="Unit of the CSV file: m or mm.")] = "m",
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of x, y, z: m or mm.", show_default="as in the header, else m")
+    ] = None,
     offset: Annotated[tuple[float, float, float], typer.Option(help=r"Offset X Y Z added to every point \[m].")] = (
         0,
         0,
@@ -48,10 +51,13 @@ def init(
         raise TaskError(f"{file}: expected a name that ends in .yaml, such as {file.stem}.yaml")
     if os.path.lexists(file):
         raise TaskError(f"{file} already exists; use another name, or delete it first")
-    text = task_template(file) if points is None else task_template(file, read_points(points, unit, offset))
+    found = None if points is None else read_points(points, unit, offset)
+    text = task_template(file) if found is None else task_template(file, found.targets)
     task = parse_document(text, Task, TaskError, str(file))
     with naming_write_errors(file, error=FailureError), file.open("x", encoding="utf-8") as new:
         new.write(text)
+    for note in found.notes if found is not None else ():
+        print(f"note: {points}: {note}")
     print(
         f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
     )

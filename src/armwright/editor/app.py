@@ -3,7 +3,7 @@
 /           the page; ?key=KEY: the address that the terminal shows
 /opened     the texts of both files, and the lists to choose from
 /assess     POST: texts and edits; the new texts and what they mean
-/points     POST: pasted points; as positions
+/points     POST: pasted points; as targets of a task file, and notes on how they were read
 /save       POST: write both files
 /design     POST: write both files and search designs
 /stop       POST: end the search
@@ -172,7 +172,10 @@ class Editor:
     async def opened(self, request: Request) -> Response:
         names = {"task": self._files.task.name, "space": self._files.space.name}
         texts = asdict(self._files.texts())
-        return _json({"files": names, **texts, "exist": self._files.exist, "choices": choices()})
+        files = self._files
+        return _json(
+            {"files": names, **texts, "exist": files.exist, "notes": asdict(files.notes), "choices": choices()}
+        )
 
     async def job(self, request: Request) -> Response:
         return _json(None if self._job is None else self._job.status())
@@ -186,7 +189,7 @@ class Editor:
         return _json(await asyncio.to_thread(self._assess, body))
 
     async def points(self, body: PointsBody) -> Response:
-        return _json({"points": parse_points(body.text, body.unit, "pasted text")})
+        return _json(await asyncio.to_thread(parse_points, body.text, body.unit, "pasted text"))
 
     async def save(self, body: TextsBody) -> Response:
         await asyncio.to_thread(self._files.save, body.texts, body.overwrite)

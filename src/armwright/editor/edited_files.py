@@ -1,17 +1,29 @@
-"""The two files that the editor writes: a task and its design space."""
+"""The two files that the editor writes: a task and its design space.
 
+The page has their texts with LF line ends and no byte order mark, like any text field of a browser. `save` writes the
+line ends, the mark, and the hard and symbolic links that it found.
+"""
+
+import codecs
 import os
+import re
+import stat
+import tempfile
+from collections import Counter
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from string import Template
+from typing import BinaryIO
 
 from armwright.exceptions import FailureError, TaskError, UsageError
-from armwright.files import naming_write_errors, read_text, replace_file
+from armwright.files import naming_write_errors, read_bytes, replace_file
 from armwright.tasks.task_template import safe_name, task_template
 
 MAX_BYTES = 256 * 1024  # a task of 3,000 targets; forms for more would be slow
 SUFFIXES = (".yaml", ".yml")
+_LINE_END = re.compile(rb"\r\n|\r|\n")
+_LINE_END_NAMES = {b"\r\n": "CRLF", b"\r": "CR", b"\n": "LF"}
 
 
 class ChangedOnDiskError(UsageError):
@@ -20,7 +32,7 @@ class ChangedOnDiskError(UsageError):
 
 @dataclass(frozen=True)
 class Texts:
-    """The text of a task file and of a space file."""
+    """The text of a task file and of a space file, or about them."""
 
     task: str
     space: str
@@ -45,7 +57,7 @@ class EditedFiles:
                 raise TaskError(f"{file}: expected a name that ends in .yaml, such as {file.stem}.yaml")
             if not file.parent.is_dir():
                 raise TaskError(f"{file}: there is no folder {file.parent}")
-        self._seen = {file: _read(file) for file in (self.task, self.space)}
+        self._seen: dict[Path, bytes | None] = {file: _read(file) for file in (self.task, self.space)}
 
     @property
     def exist(self) -> bool:
@@ -56,8 +68,14 @@ class EditedFiles:
         """Return the files as they were last read or written, or the templates."""
         task, space = self._seen[self.task], self._seen[self.space]
         return Texts(
-            task_template(self.task) if task is None else task, space_template(self.space) if space is None else space
+            task_template(self.task) if task is None else _decode(task, self.task),
+            space_template(self.space) if space is None else _decode(space, self.space),
         )
+
+    @property
+    def notes(self) -> Texts:
+        """What saving a change of each file will change besides; empty for nothing."""
+        return Texts(_note(self.task, self._seen[self.task]), _note(self.space, self._seen[self.space]))
 
     def save(self, texts: Texts, overwrite: bool = False) -> None:
         """Write both files.
@@ -76,9 +94,11 @@ class EditedFiles:
                 if _read(file) != self._seen[file]:
                     raise ChangedOnDiskError(f"{file} has changed on disk since it was opened")
         for file, text in given.items():
-            if text != self._seen[file] or overwrite:
-                _write(file, text)
-                self._seen[file] = text
+            former = self._seen[file]
+            if overwrite or former is None or text != _decode(former, file):
+                content = _encode(text, former)
+                _write(file, content)
+                self._seen[file] = content
 
 
 def default_space_file(task: Path) -> Path:
@@ -92,15 +112,77 @@ def space_template(file: Path) -> str:
     return Template(text).substitute(name=safe_name(file.stem))
 
 
-def _read(file: Path) -> str | None:
-    """Return the text of a file; None if it does not exist."""
-    return read_text(file, MAX_BYTES, TaskError) if os.path.lexists(file) else None
+def _read(file: Path) -> bytes | None:
+    """Return the content of a file of text; None if it does not exist."""
+    if not os.path.lexists(file):
+        return None
+    content = read_bytes(file, MAX_BYTES, TaskError)
+    _decode(content, file)
+    return content
 
 
-def _write(file: Path, text: str) -> None:
+def _decode(content: bytes, file: Path) -> str:
+    """Return the text of a file as the page shows it."""
+    try:
+        return _LINE_END.sub(b"\n", content.removeprefix(codecs.BOM_UTF8)).decode()
+    except UnicodeDecodeError as fault:
+        raise TaskError(f"{file} is not a text file in UTF-8") from fault
+
+
+def _encode(text: str, former: bytes | None) -> bytes:
+    """Return a text as bytes, with the byte order mark and the most frequent line end of the former content."""
+    mark = codecs.BOM_UTF8 if former is not None and former.startswith(codecs.BOM_UTF8) else b""
+    end = next(iter(_line_ends(former)), b"\n")
+    return mark + _LINE_END.sub(lambda _: end, text.encode())
+
+
+def _line_ends(content: bytes | None) -> list[bytes]:
+    """Return the kinds of line ends, the most frequent one first."""
+    return [end for end, _ in Counter(_LINE_END.findall(content or b"")).most_common()]
+
+
+def _note(file: Path, content: bytes | None) -> str:
+    ends = [_LINE_END_NAMES[end] for end in _line_ends(content)]
+    if len(ends) < 2:
+        return ""
+    return f"{file.name} mixes line ends ({' and '.join(ends)}); saving a change writes {ends[0]} in all lines."
+
+
+def _write(file: Path, content: bytes) -> None:
     target = file.resolve()  # a link stays one
     with naming_write_errors(file, error=FailureError):
-        mode = target.stat().st_mode if target.exists() else None
-        replace_file(target, text.encode())
-        if mode is not None:
-            target.chmod(mode)
+        found = target.stat() if target.exists() else None
+        if found is not None and found.st_nlink > 1:
+            _write_in_place(target, content)
+            return
+        mode = 0o666 if found is None else stat.S_IMODE(found.st_mode)
+        replace_file(target, content, mode)
+        if found is not None:
+            target.chmod(mode)  # of which the umask took something
+
+
+def _write_in_place(target: Path, content: bytes) -> None:
+    """Write into a file, so that its hard links stay.
+
+    Until all is written, a file beside it holds the content, too: unlike a replacement, this may stop halfway.
+    """
+    with target.open("r+b") as file:
+        descriptor, copy = tempfile.mkstemp(prefix=f"{target.name}.", suffix=".new", dir=target.parent)
+        try:
+            with os.fdopen(descriptor, "wb") as spare:
+                _fill(spare, content)
+        except OSError:
+            os.unlink(copy)
+            raise
+        try:
+            _fill(file, content)
+        except OSError as fault:
+            raise FailureError(f"cannot write {target}: {fault.strerror}; the whole text is in {copy}") from fault
+    os.unlink(copy)
+
+
+def _fill(file: BinaryIO, content: bytes) -> None:
+    file.write(content)
+    file.truncate()
+    file.flush()
+    os.fsync(file.fileno())

@@ -3,6 +3,7 @@
 import copy
 import io
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, cast
 
 import yaml
@@ -17,6 +18,7 @@ from armwright.exceptions import TaskError
 from armwright.yaml_documents import load_document
 
 MAX_DEPTH = 12
+_TEXT_TAG = "tag:yaml.org,2002:str"
 
 
 class Edit(BaseModel, frozen=True, extra="forbid"):
@@ -54,9 +56,15 @@ def edit_text(text: str, edits: Sequence[Edit], where: str) -> str:
 
 
 def _edited(text: str, edit: Edit, where: str) -> str:
+    root = cast("Any", yaml).compose(text, Loader=yaml.SafeLoader)
+    if root is not None and (not isinstance(root, yaml.MappingNode) or root.flow_style):
+        raise TaskError(f"{where}: expected keys and values, one a line")
+    value = _value_on_a_line(root, edit)
+    if value is not None:
+        return text[: value.start_mark.index] + _flow(edit.value) + text[value.end_mark.index :]
     lines = text.splitlines(keepends=True)
     key = edit.path[0]
-    first, end = _extents(text, where).get(str(key), (len(lines), len(lines)))
+    first, end = _extents(root, text).get(str(key), (len(lines), len(lines)))
     before = lines[:first]
     if before and not before[-1].endswith("\n"):
         before[-1] += "\n"
@@ -66,23 +74,45 @@ def _edited(text: str, edit: Edit, where: str) -> str:
 def _edited_key(text: str, edit: Edit, where: str) -> str:
     """Return the text of one key of the root, and its value, with an edit applied."""
     try:
-        content: Any = _yaml().load(text) if text else CommentedMap()
+        content: Any = _yaml(text).load(text) if text else CommentedMap()
         _apply(content, edit, where, _styled)
         out = io.StringIO()
         if content:
-            _yaml().dump(content, out)
+            _yaml(text).dump(content, out)
     except (YAMLError, ValueError, TypeError, AttributeError, AssertionError) as fault:  # of the library, too
         raise TaskError(f"{where}: cannot change {_name(edit.path)} here; change it in the text") from fault
     return out.getvalue()
 
 
-def _extents(text: str, where: str) -> dict[str, tuple[int, int]]:
+def _value_on_a_line(root: Any, edit: Edit) -> Any:
+    """Return the node of an existing value if it and the new one are plain, quoted or in brackets; else None."""
+    node = root
+    for step in edit.path:
+        if isinstance(node, yaml.MappingNode) and isinstance(step, str):
+            pairs = cast("list[tuple[Any, Any]]", node.value)
+            node = next((value for key, value in pairs if key.tag == _TEXT_TAG and key.value == step), None)
+        elif isinstance(node, yaml.SequenceNode) and isinstance(step, int) and 0 <= step < len(node.value):
+            node = cast("list[Any]", node.value)[step]
+        else:
+            return None
+    if node is None or edit.remove or not _fits_a_line(edit.value):
+        return None
+    is_flow = node.style not in ("|", ">") if isinstance(node, yaml.ScalarNode) else node.flow_style
+    return node if is_flow and node.start_mark.index < node.end_mark.index else None
+
+
+def _flow(value: Any) -> str:
+    """Return a value on one line, as it may stand in brackets."""
+    style = '"' if isinstance(value, str) and _reads_as(value) != value else None
+    flow: Any = {"default_flow_style": True, "default_style": style, "allow_unicode": True, "sort_keys": False}
+    text: str = cast("Any", yaml).dump([value], Dumper=yaml.SafeDumper, width=2**20, **flow)
+    return text.strip()[1:-1]
+
+
+def _extents(root: Any, text: str) -> dict[str, tuple[int, int]]:
     """Return the first line of each key of the root, and the line after its value; comments below it are not its."""
-    root = cast("Any", yaml).compose(text, Loader=yaml.SafeLoader)
     if root is None:
         return {}
-    if not isinstance(root, yaml.MappingNode) or root.flow_style:
-        raise TaskError(f"{where}: expected keys and values, one a line")
     lines = text.splitlines()
     starts = [(str(key.value), int(key.start_mark.line)) for key, _ in cast("list[tuple[Any, Any]]", root.value)]
     ends = [line for _, line in starts[1:]] + [len(lines)]
@@ -138,17 +168,23 @@ def _styled(value: Any) -> Any:
     if isinstance(value, Mapping):
         given = cast("Mapping[str, Any]", value)
         record = CommentedMap((key, _styled(item)) for key, item in given.items())
-        if all(map(_is_short, given.values())):
+        if _fits_a_line(value):
             record.fa.set_flow_style()
         return record
     if isinstance(value, list):
         items = CommentedSeq(map(_styled, cast("list[Any]", value)))
-        if _is_short(value):
+        if _fits_a_line(value):
             items.fa.set_flow_style()
         return items
     if isinstance(value, str) and _reads_as(value) != value:
         return DoubleQuotedScalarString(value)
     return value
+
+
+def _fits_a_line(value: Any) -> bool:
+    """Return True for a value that task files state on one line: one without records or lists of lists in it."""
+    parts = cast("Mapping[str, Any]", value).values() if isinstance(value, Mapping) else [value]
+    return all(map(_is_short, parts))
 
 
 def _is_short(item: Any) -> bool:
@@ -180,10 +216,24 @@ def _represent_float(representer: Any, value: float) -> Any:
 _Representer.add_representer(float, _represent_float)
 
 
-def _yaml() -> YAML:
+def _yaml(text: str) -> YAML:
+    """Return a reader and writer of YAML with the indentation of a text."""
+    mapping, offset = _indents(text)
     made = YAML()
     made.Representer = _Representer
     made.preserve_quotes = True
     made.width = 2**20  # never folds a line
-    made.indent(mapping=2, sequence=4, offset=2)
+    made.indent(mapping=mapping, sequence=offset + 2, offset=offset)
     return made
+
+
+def _indents(text: str) -> tuple[int, int]:
+    """Return by how much the first record and the first list are indented below their keys; by default 2."""
+    found: dict[bool, int] = {}
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    for above, below in pairwise(lines):
+        step = (len(below) - len(below.lstrip())) - (len(above) - len(above.lstrip()))
+        is_list = below.lstrip().startswith("- ")
+        if above.partition(" #")[0].rstrip().endswith(":") and above.lstrip()[0] != "-" and step >= (not is_list):
+            found.setdefault(is_list, step)
+    return found.get(False, 2), found.get(True, 2)

@@ -10,6 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.robot.arm import AXES, Arm, Column, Joint, Link, Vector
 from armwright.robot.motor_body import MotorBody
+from armwright.rotations import rpy_from_rotation
 
 AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 COLOURS = {
@@ -137,12 +138,7 @@ def tip_rpy(arm: Arm) -> Vector:
     z = np.array(arm.tool.axis) / np.linalg.norm(arm.tool.axis)
     y = np.cross(z, arm.tool.side)
     y = y / np.linalg.norm(y)
-    x = np.cross(y, z)
-    level = math.hypot(x[0], x[1])
-    pitch = math.atan2(-x[2], level)
-    # In gimbal lock (x straight up or down) roll and yaw rotate about the same line: all of it is yaw.
-    roll, yaw = (math.atan2(y[2], z[2]), math.atan2(x[1], x[0])) if level > 1e-9 else (0.0, math.atan2(-y[0], y[1]))
-    return (roll + 0.0, pitch + 0.0, yaw + 0.0)  # no -0.0
+    return rpy_from_rotation(np.column_stack([np.cross(y, z), y, z]))
 
 
 def tool_moments(arm: Arm) -> dict[str, str]:

@@ -27,6 +27,7 @@ Point = tuple[float, float, float]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]  # [m]
 Position = tuple[Coordinate, Coordinate, Coordinate]
 
+TARGET_NAME = r"^([A-Za-z][A-Za-z0-9 ._-]{0,39})?$"  # empty for none
 REACHED = 1e-3  # [m]; a target nearer than this counts as reached
 ALIGNED = math.radians(1.0)  # [rad]; likewise for a target's axis or orientation
 AXIS, ORIENTATION = 2, 3  # number of angles that count at a target; 0 for a point
@@ -84,7 +85,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         weight: Factor of its share of a sum of errors.
     """
 
-    name: str = Field(default="", pattern=r"^([A-Za-z][A-Za-z0-9 ._-]{0,39})?$")
+    name: str = Field(default="", pattern=TARGET_NAME)
     position: Point
     axis: Point | None = None
     orientation: Point | None = None

@@ -21,6 +21,8 @@ export function choose(index) {
 }
 
 const entries = () => list(opened.assessed.task?.targets);
+const asRecord = (entry) => Array.isArray(entry) ? { position: entry } : entry;
+const hasDirection = (entry) => wayOf(entry) !== "any";
 const positionOf = (entry) => list(Array.isArray(entry) ? entry : record(entry).position);
 
 // Returns the edits that move a target.
@@ -58,6 +60,7 @@ export function openTargets({ units }) {
   $("paste-way").replaceChildren(...WAYS.map(([key, text]) => element("option", { value: key }, text)));
   $("open-paste").addEventListener("click", () => {
     $("paste").hidden = false;
+    $("paste-note").textContent = "";
     $("paste-unit").value = unitName();
     $("paste-text").focus();
   });
@@ -76,12 +79,14 @@ async function paste(event) {
   event.preventDefault();
   const isReplacing = event.submitter?.value !== "append", way = $("paste-way").value;
   try {
-    const { points } = await ask("points", { text: $("paste-text").value, unit: $("paste-unit").value });
-    const given = way === "any" ? points : points.map((position) => ({ position, axis: way.split(",").map(Number) }));
+    const { targets, notes } = await ask("points", { text: $("paste-text").value, unit: $("paste-unit").value });
+    if (way !== "any" && targets.some(hasDirection)) throw new Error("The pasted text states tool directions; choose any as the tool.");
+    const given = way === "any" ? targets : targets.map((entry) => ({ ...asRecord(entry), axis: way.split(",").map(Number) }));
     const known = isReplacing ? [] : entries();
     await change({ task: [...(isReplacing && opened.assessed.task?.cycle !== undefined ? [set(["cycle"], null)] : []), set(["targets"], [...known, ...given])] });
     $("paste").hidden = true;
     $("paste-text").value = "";
+    $("paste-note").textContent = notes.map((note) => `Pasted text: ${note}.`).join(" ");
   } catch (fault) {
     complain(fault.message);
   }
