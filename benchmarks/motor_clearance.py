@@ -1,4 +1,4 @@
-"""Clearance of motor bodies by Coal and Pinocchio, which read the exported URDF and SRDF."""
+"""Clearance of motor bodies by Coal and Pinocchio, which read the exported URDF."""
 
 import coal
 import numpy as np
@@ -6,7 +6,7 @@ import pinocchio
 
 from armwright.arrays import Array
 from armwright.robot.arm import Arm
-from armwright.robot.srdf import to_srdf
+from armwright.robot.collision_pairs import joined_by_column, joined_by_motors
 from armwright.robot.urdf_writer import to_urdf
 from armwright.tasks.obstacles import Obstacle
 
@@ -26,9 +26,16 @@ def motor_clearance(arm: Arm, q: Array, obstacles: tuple[Obstacle, ...]) -> floa
     model = pinocchio.buildModelFromXML(urdf)
     solids = pinocchio.buildGeomFromUrdfString(model, urdf, pinocchio.GeometryType.COLLISION)
     solids.addAllCollisionPairs()
-    pinocchio.removeCollisionPairsFromXML(model, solids, to_srdf(arm))
-    motors = [i for i, solid in enumerate(solids.geometryObjects) if solid.name.startswith("motor_")]
-    pairs = [pair for pair in solids.collisionPairs if pair.first in motors or pair.second in motors]
+    names = [solid.name.removesuffix("_0") for solid in solids.geometryObjects]
+    motors = [i for i, name in enumerate(names) if name.startswith("motor_")]
+    touching = {frozenset((f"motor_{j + 1}", f"link_{n + 1}")) for j, n in joined_by_motors(arm)}
+    touching |= {frozenset(("column", f"motor_{j + 1}")) for j in joined_by_column(arm)[0]}
+    pairs = [
+        pair
+        for pair in solids.collisionPairs
+        if (pair.first in motors or pair.second in motors)
+        and frozenset((names[pair.first], names[pair.second])) not in touching
+    ]
     data, placed = model.createData(), solids.createData()
     found = [np.inf]
     for posture in q[::EVERY]:

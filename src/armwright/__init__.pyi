@@ -33,11 +33,8 @@ from .report.figures import write_figures as write_figures
 from .report.page import write_report as write_report
 from .robot.arm import Arm as Arm, Joint as Joint, Link as Link, uniform_link as uniform_link
 from .robot.ros2_control import to_ros2_control as to_ros2_control
-from .robot.sdf import to_sdf as to_sdf
-from .robot.srdf import to_srdf as to_srdf
 from .robot.urdf_reader import UrdfArm as UrdfArm, read_urdf as read_urdf
 from .robot.urdf_writer import to_urdf as to_urdf
-from .robot.xacro import to_xacro as to_xacro
 from .runs.cycle_export import CycleModel as CycleModel, cycle_model as cycle_model
 from .runs.folder import read_run as read_run
 from .runs.history import FrontMember as FrontMember, History as History

@@ -34,7 +34,7 @@ def argument_seeds() -> list[bytes]:
         ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"], ["runs", run, "--json"],
         ["compare-arms", "target-1", "arm.urdf", "--base", "0,0,0.5", "--tip", "tip", "--base-link", "base"],
         ["pick", run, "--where", "torque<=9", "--by", "mass", "-n", "2"], ["pick", run, "--weights", "torque=1"],
-        ["export", run, "--design", "2", "--format", "sdf", "--out", "x/y.sdf"], ["report", run],
+        ["export", run, "--design", "2", "--format", "mjcf", "--out", "x/y.xml"], ["report", run],
         ["actuators"], ["doctor", "--model", "openai-chat:x"], ["check", "target-1", "--json"], ["refine", run],
         ["draft", "words", "--print-prompt"], ["init", "new.yaml", "--from", "points.csv", "--unit", "mm"],
         ["init", "new.yaml", "--offset", "0", "0", "1"], ["--version"], ["--help"],

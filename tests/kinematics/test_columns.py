@@ -14,12 +14,10 @@ from armwright.kinematics.arm_arrays import Precision, stack_arms
 from armwright.kinematics.clearance import clearances, straight_motor_clearance
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Column, Joint, uniform_link
+from armwright.robot.collision_pairs import joined_by_column
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
-from armwright.robot.sdf import to_sdf
-from armwright.robot.srdf import to_srdf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.robot.xacro import to_xacro
 from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
@@ -29,8 +27,6 @@ from armwright.tasks.targets import position_targets
 from armwright.tasks.task import Task
 from tests.kinematics.test_clearance import agree
 from tests.kinematics.test_motor_bodies import Exported, postures
-from tests.robot.test_sdf import Loaded
-from tests.support.exported_arms import processed
 
 CONTENT: Mapping[str, Any] = {
     "name": "columns",
@@ -147,11 +143,8 @@ def test_parts_at_rest_do_not_count() -> None:
     assert own == pytest.approx(-0.04, abs=1e-3), "the second link starts on the axis of the column and is not excluded"
     lying = replace(arm, joints=(fixed, fixed, turning), links=(down, out, out))
     assert clearances(stack_arms([lying], "float64"), zeros)[0] > 0.1
-    pairs = ElementTree.fromstring(to_srdf(lying)).findall("disable_collisions")
-    standing = {pair.get("link2") for pair in pairs if pair.get("link1") == "column"}
-    assert standing == {"link_1", "link_2", "motor_3"}
-    pairs = ElementTree.fromstring(to_srdf(arm)).findall("disable_collisions")
-    assert {pair.get("link2") for pair in pairs if pair.get("link1") == "column"} == {"link_1", "motor_2"}
+    assert joined_by_column(lying) == ([2], [0, 1])
+    assert joined_by_column(arm) == ([1], [0])
 
 
 def test_column_does_not_change_the_room_between_motors() -> None:
@@ -176,28 +169,6 @@ def test_column_implies_that_nothing_collides() -> None:
     assert [constraint.description for constraint in problem.constraints] == ["self_clearance >= 0.01"]
     folded = space.clipped((0.0, 0.0, 0.5), "PP", (0.1, 0.3))  # its tip is inside the column at the target
     assert problem.evaluate([folded]).violations[0, 0] > 0.01
-
-
-def test_xacro_and_sdf_have_the_column_of_the_urdf() -> None:
-    arms = [arm for arm in map(SPACE.arm, SPACE.sample(4, 9)) if arm.column is not None]
-    assert len(arms) > 2
-    for arm in arms:
-        assert arm.column is not None
-        urdf = ElementTree.fromstring(to_urdf(arm))
-        element = ElementTree.fromstring(to_sdf(arm)).find("model/link[@name='column']")
-        solid = urdf.find("link[@name='column']/collision")
-        origin, (shape,) = solid.find("origin").attrib, solid.find("geometry")
-        assert element.findtext("collision/pose") == f"{origin['xyz']} {origin['rpy']}"
-        assert {one.tag: one.text for one in element.find("collision/geometry/cylinder")} == shape.attrib
-        Loaded(arm)
-        same = ElementTree.fromstring(processed(to_xacro(arm)))
-        assert cylinder_of(same) == pytest.approx(cylinder_of(urdf), abs=1e-9)
-        raised = ElementTree.fromstring(processed(to_xacro(arm), base_z=str(arm.base[2] + 0.2)))
-        length, _, middle = cylinder_of(raised)
-        assert length == pytest.approx(arm.column.length + 0.2)
-        assert middle == pytest.approx(-length / 2)
-        lowered = ElementTree.fromstring(processed(to_xacro(arm), base_z="0.05"))
-        assert lowered.find("link[@name='column']") is None
 
 
 def cylinder_of(urdf: ElementTree.Element) -> tuple[float, float, float]:

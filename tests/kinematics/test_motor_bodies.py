@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
-from xml.etree import ElementTree
 
 import coal
 import mujoco
@@ -21,12 +20,10 @@ from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.build_sheet import sheet_markdown, sheet_rows
+from armwright.robot.collision_pairs import joined_by_motors
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
-from armwright.robot.sdf import to_sdf
-from armwright.robot.srdf import to_srdf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.robot.xacro import to_xacro
 from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
@@ -35,7 +32,6 @@ from armwright.tasks.payload import POINT_LOAD
 from armwright.tasks.targets import position_targets
 from armwright.tasks.task import Task
 from tests.kinematics.test_clearance import SHAPES, agree, apart, capsule, coal_shape, random_obstacle
-from tests.support.exported_arms import processed
 
 Array = NDArray[np.float64]
 CONTENT: Mapping[str, Any] = {
@@ -223,44 +219,13 @@ def test_motors_need_longer_links_and_a_higher_base() -> None:
     assert clear[3] > 0.05, "a motor at rest may be close"
 
 
-def test_xacro_and_sdf_have_the_bodies_of_the_urdf() -> None:
-    for design in SPACE.sample(8, 11):
-        arm = SPACE.arm(design)
-        urdf = ElementTree.fromstring(to_urdf(arm))
-        from_xacro, sdf = ElementTree.fromstring(processed(to_xacro(arm))), ElementTree.fromstring(to_sdf(arm))
-        for joint in urdf.findall("joint"):
-            name = joint.get("name", "")
-            if not name.startswith("motor_"):
-                continue
-            motor = name.removesuffix("_joint")
-            place, carrier = (one.attrib for one in (joint.find("origin"), joint.find("parent")) if one is not None)
-            other = from_xacro.find(f"joint[@name='{name}']")
-            assert other.find("parent").attrib == carrier
-            xyz = [float(value) for value in place["xyz"].split()]
-            assert [float(value) for value in other.find("origin").get("xyz").split()] == pytest.approx(xyz, abs=1e-9)
-            solid = urdf.find(f"link[@name='{motor}']/collision")
-            same = from_xacro.find(f"link[@name='{motor}']/collision")
-            assert [(one.tag, one.attrib) for one in same.iter()] == [(one.tag, one.attrib) for one in solid.iter()]
-            element = sdf.find(f"model/link[@name='{motor}']")
-            assert element.find("pose").get("relative_to") == carrier["link"]
-            assert element.findtext("pose") == f"{place['xyz']} 0 0 0"
-            origin, (shape,) = solid.find("origin").attrib, solid.find("geometry")
-            assert element.findtext("collision/pose") == f"{origin['xyz']} {origin['rpy']}"
-            assert {one.tag: one.text for one in element.find(f"collision/geometry/{shape.tag}")} == shape.attrib
-
-
-def test_srdf_disables_motors_and_the_links_that_they_join() -> None:
+def test_motors_touch_the_links_that_they_join() -> None:
     """A hook of a link and a fixed one, between two that turn."""
     body = MotorBody("box", "y", (0.04, 0.04, 0.04))
     turning, fixed = Joint("revolute", "y", -3.0, 3.0, body=body), Joint("fixed", "z")
     link = uniform_link((0.0, 0.0, 0.1), 0.1, 0.01)
     arm = Arm((0.0, 0.0, 0.0), (turning, turning, fixed, turning), (link,) * 4)
-    pairs = ElementTree.fromstring(to_srdf(arm)).findall("disable_collisions")
-    motors = {(pair.get("link1"), pair.get("link2")) for pair in pairs if "motor" in pair.get("link1", "")}
-    assert motors == {
-        ("motor_1", "link_1"), ("motor_2", "link_1"), ("motor_2", "link_2"), ("motor_4", "link_3"),
-        ("motor_4", "link_2"), ("motor_4", "link_4"),
-    }  # fmt: skip
+    assert set(joined_by_motors(arm)) == {(0, 0), (1, 0), (1, 1), (3, 2), (3, 1), (3, 3)}
 
 
 def test_motors_may_not_overlap_in_the_straight_posture() -> None:

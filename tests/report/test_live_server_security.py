@@ -140,7 +140,7 @@ PATHS = (
     "/file/../config.yaml",
     "/file?design=..%2f..%2fconfig.yaml&format=urdf", "/file?design=0&format=..%2fconfig.yaml",
     "/file?design=0&format=",
-    "/file?design=-1&format=urdf", "/file?design=1e3&format=sdf", "/file?design=%D9%A1&format=__class__", "/.lock",
+    "/file?design=-1&format=urdf", "/file?design=1e3&format=mjcf", "/file?design=%D9%A1&format=__class__", "/.lock",
     "/file?design=99999999999999999999&format=json",
 )  # fmt: skip
 

@@ -7,15 +7,11 @@ from itertools import permutations, product
 import mujoco
 import numpy as np
 import pytest
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
 
 from armwright.kinematics.forward import joint_positions
 from armwright.robot.arm import Arm, Joint, MountedTool
 from armwright.robot.mjcf import to_mjcf
-from armwright.robot.sdf import to_sdf
-from armwright.robot.xacro import to_xacro
-from tests.support.exported_arms import ARMS, Peer, full, peer_of, postures, processed
+from tests.support.exported_arms import ARMS, full, peer_of, postures
 from tests.support.reference_kinematics import Array
 
 
@@ -29,20 +25,9 @@ def in_mujoco(arm: Arm, q: Array) -> Array:
     return pose
 
 
-def in_drake(arm: Arm, q: Array) -> Array:
-    plant = MultibodyPlant(0.0)
-    Parser(plant).AddModelsFromString(to_sdf(arm), "sdf")
-    plant.Finalize()
-    context = plant.CreateDefaultContext()
-    plant.SetPositions(context, q)
-    return plant.GetFrameByName("tip").CalcPoseInWorld(context).GetAsMatrix4()
-
-
 FORMATS: dict[str, Callable[[Arm, Array], Array]] = {
     "urdf": lambda arm, q: peer_of(arm).tip(q),
-    "xacro": lambda arm, q: Peer(processed(to_xacro(arm))).tip(q),
     "mjcf": in_mujoco,
-    "sdf": in_drake,
 }
 EVERY_FORMAT = pytest.mark.parametrize("tip", FORMATS.values(), ids=FORMATS)
 

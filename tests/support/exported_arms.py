@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio
-import xacro
 
 from armwright.robot.arm import Actuator, Arm, Joint, Link, MountedTool, uniform_link
 from armwright.robot.urdf_writer import to_urdf
@@ -121,10 +120,3 @@ class Peer:
 
 def peer_of(arm: Arm) -> Peer:
     return Peer(to_urdf(arm))
-
-
-def processed(text: str, **arguments: object) -> str:
-    """The URDF that xacro makes of it."""
-    document = xacro.parse(text)
-    xacro.process_doc(document, mappings={name: str(value) for name, value in arguments.items()})
-    return document.toxml()

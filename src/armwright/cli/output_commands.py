@@ -76,8 +76,7 @@ def export(
         str,
         typer.Option(
             "--format",
-            help="urdf, xacro, srdf, ros2_control, sdf, mjcf, sheet (Markdown) or sheet-csv; "
-            "optuna: the whole run as a study.",
+            help="urdf, ros2_control, mjcf, sheet (Markdown) or sheet-csv; optuna: the whole run as a study.",
         ),
     ] = "urdf",
     out: Annotated[

@@ -12,19 +12,14 @@ from armwright.problem.unreached_reason import unreached_reason
 from armwright.robot.build_sheet import SheetRow, sheet_markdown, sheet_rows
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.ros2_control import to_ros2_control
-from armwright.robot.sdf import to_sdf
-from armwright.robot.srdf import to_srdf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.robot.xacro import to_xacro
 from armwright.runs.assumptions import assumed_values, describe_assumed
 from armwright.runs.compliance_notes import compliance_notes
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.selection import pick
 from armwright.runs.supply_record import supply_of
-from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
-from armwright.spaces.parameters import Design
 
 OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
 SHEET_VALUES = ("backlash", "joint_stiffness")  # of actuators, which a sheet depends on whatever the objectives
@@ -80,22 +75,9 @@ def _sheet_csv(history: History, member: FrontMember) -> str:
     return to_csv(rows)
 
 
-def mass_per_metre(space: DesignSpace, design: Design) -> list[float]:
-    """Return by how much each link gets heavier with its length [kg/m]; every mass model is a straight line over it."""
-    tubes = [space.tube_of(design, module) for module in design.module_of_joint]
-    return [float(space.link_mass(1.0, tube) - space.link_mass(0.0, tube)) for tube in tubes]
-
-
-def _xacro(history: History, member: FrontMember) -> str:
-    return to_xacro(member.arm, _name(history, member), mass_per_metre(history.problem.space, member.design))
-
-
 FORMATS: dict[str, Callable[[History, FrontMember], str]] = {
     "urdf": lambda history, member: to_urdf(member.arm, _name(history, member)),
     "mjcf": lambda history, member: to_mjcf(member.arm, _name(history, member)),
-    "sdf": lambda history, member: to_sdf(member.arm, _name(history, member)),
-    "xacro": _xacro,
-    "srdf": lambda history, member: to_srdf(member.arm, _name(history, member)),
     "ros2_control": lambda history, member: to_ros2_control(member.arm, _name(history, member)),
     "sheet": _sheet,
     "sheet-csv": _sheet_csv,
