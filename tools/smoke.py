@@ -74,7 +74,7 @@ NEEDS = (
     ("gp", "experiment", "gp.yaml"),
     ("arms", "compare-arms", "target-1", "ur5e"),
 )
-FORMATS = ("urdf", "ros2_control", "mjcf", "sheet", "sheet-csv")
+FORMATS = ("urdf", "ros2_control", "mjcf")
 
 
 def python(*args: str, code: int = 0, **environment: str) -> subprocess.CompletedProcess[str]:

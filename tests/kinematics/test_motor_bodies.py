@@ -19,11 +19,11 @@ from armwright.kinematics.motor_bodies import MotorBodies
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
-from armwright.robot.build_sheet import sheet_markdown, sheet_rows
 from armwright.robot.collision_pairs import joined_by_motors
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
 from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.datasheet.joint_lines import joint_lines
 from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
@@ -261,14 +261,12 @@ def test_bodies_do_not_change_dynamics_in_mujoco() -> None:
             assert forces[0] == pytest.approx(forces[1], rel=1e-6, abs=1e-6)
 
 
-def test_build_sheet_says_where_motors_are() -> None:
-    design = PITCH.clipped((0.0, 0.0, 0.1), "PPP", (0.2, 0.2, 0.2))
-    arm, zeros = PITCH.arm(design), np.zeros((1, 3))
-    sheet = sheet_markdown("x", arm, sheet_rows(arm, zeros, zeros), [])
-    for n in (1, 2, 3):
-        assert f"- joint {n}: box of 33.5 x 44 x 58.5 mm, shaft along y, middle at (0, 0, -12.5) mm" in sheet
+def test_data_sheet_says_where_motors_are() -> None:
+    arm = PITCH.arm(PITCH.clipped((0.0, 0.0, 0.1), "PPP", (0.2, 0.2, 0.2)))
+    where = "box of 33.5 x 44 x 58.5 mm along x, y and z, shaft along y, middle at (0, 0, -12.5) mm"
+    assert [line.body for line in joint_lines(arm)] == [where] * 3
     plain = replace(arm, joints=tuple(replace(joint, body=None) for joint in arm.joints))
-    assert "Bodies" not in sheet_markdown("x", plain, sheet_rows(plain, zeros, zeros), [])
+    assert [line.body for line in joint_lines(plain)] == [""] * 3
 
 
 def test_motor_bodies_may_not_collide() -> None:

@@ -254,7 +254,7 @@ def test_command_lists_the_sources_of_an_actuator() -> None:
 
 
 def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:
-    """Follow actuators through space file, run, rules, prompt, page, URDF, build sheet and command."""
+    """Follow actuators through space file, run, rules, prompt, page, URDF, data sheet and command."""
     task = TASK.model_copy(update={"objectives": ("worst_error", "torque_utilisation", "price")})
     run = optimize(Problem(task, SPACE), proposer="rules", n_init=6, n_step=3, n_total=18, out=tmp_path / "run")
     config, history = read_run(tmp_path / "run")
@@ -272,12 +272,10 @@ def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:
     prompt = runner.invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
     assert "- mid: 0.082 kg, 4.1 N m, 250 USD" in prompt
     assert f"MOTORS: ({', '.join(member.design.motors)})" in prompt or "MOTORS: (" in prompt
-    sheet = runner.invoke(app, ["export", str(tmp_path / "run"), "--design", str(member.number), "--format", "sheet"])
-    price = sum(joint.actuator.price for joint in member.arm.joints)
-    assert (
-        f"4 actuators of {1e3 * sum(j.actuator.mass for j in member.arm.joints):.4g} g, {price:,.0f} USD"
-        in sheet.output
-    )
+    sheet = runner.invoke(app, ["datasheet", str(tmp_path / "run"), "--design", str(member.number), "--json"])
+    motors = [part for part in json.loads(sheet.output)["parts"] if ", peak " in part["detail"]]
+    assert sum(motor["count"] for motor in motors) == 4
+    assert sum(motor["price"] for motor in motors) == sum(joint.actuator.price for joint in member.arm.joints)
     picked = runner.invoke(app, ["pick", str(tmp_path / "run"), "--by", "price", "--json"])
     assert json.loads(picked.output)[0]["price"] == min(m.values[2] for m in run.front)
     listed = runner.invoke(app, ["actuators"]).output

@@ -69,7 +69,7 @@ def test_files_state_assumed_values(run: Path) -> None:
 
 def test_commands_state_assumed_values(run: Path) -> None:
     assert "assumed values of actuators: 6 of XM540-W270" in armwright("pick", run).stdout
-    sheet = armwright("export", run, "--format", "sheet").stdout
-    assert (
-        "Assumed values of actuators, defaults of their kind or estimates: XM540-W270: rated torque 2.65 N m" in sheet
+    sheet = json.loads(armwright("datasheet", run, "--design", 0, "--json").stdout)
+    assert sheet["assumptions"]["actuators"].startswith(
+        "defaults of their kind or estimates: XM540-W270: rated torque 2.65 N m"
     )

@@ -1,4 +1,4 @@
-"""What build sheets and picks say of compliance, backlash and payload."""
+"""Picks by compliance and backlash, and the values that they assume."""
 
 from pathlib import Path
 
@@ -6,17 +6,13 @@ import pytest
 
 import armwright as aw
 from armwright.exceptions import SettingsError
-from armwright.kinematics.payload_limits import payloads_over_reach
-from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
+from armwright.problem.objectives import BACKLASH_ERROR
 from armwright.runs.assumptions import assumed_values
-from armwright.runs.compliance_notes import compliance_notes
 from armwright.runs.conditions import read_condition
 from armwright.runs.folder import read_run
 from armwright.runs.selection import pick
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
-from tests.runs.test_simulation import SPACE, Desk
-from tests.support.command_line import armwright
 
 
 @pytest.fixture(scope="module")
@@ -29,40 +25,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     space = DesignSpace.model_validate({"actuators": ["XM540-W270", "XM430-W350"], "origin_z": [0.0, 0.0]})
     aw.optimize(aw.Problem(task, space), proposer="none", n_init=10, n_total=10, verify=False, out=folder)
     return folder
-
-
-def test_notes_state_backlash_and_payload() -> None:
-    desk = Desk()
-    (play,), (capacity,) = BACKLASH_ERROR(desk.evaluation), PAYLOAD_CAPACITY(desk.evaluation)
-    backlash, payload = compliance_notes(desk.arm, desk.evaluation)
-    assert backlash == f"Backlash moves the tip by {1e3 * play:.2f} mm at most."
-    assert payload.startswith(f"The actuators hold {capacity:.3g} kg at all targets, ")
-    found = payloads_over_reach(desk.arm)
-    assert payload.endswith(f"{found.payloads[1]:.3g} kg at 100% of the reach of {found.reach:.3g} m.")
-
-
-def test_notes_of_arms_with_sections_state_the_deflection() -> None:
-    desk = Desk(space=SPACE | {"link_section": {"tubes": [[0.03, 0.002]], "material": "aluminium"}})
-    (by_weight,), (by_payload,) = DEFLECTION(desk.evaluation), PAYLOAD_DEFLECTION(desk.evaluation)
-    assert 0.0 < by_payload < by_weight
-    first, *_ = compliance_notes(desk.arm, desk.evaluation)
-    assert first == (
-        f"The weight of arm and load moves the tip by {1e3 * by_weight:.2f} mm at most at the targets, "
-        f"{1e3 * by_payload:.2f} mm by the payload alone."
-    )
-
-
-def test_nothing_is_noted_without_actuators() -> None:
-    space = {key: value for key, value in SPACE.items() if key != "actuators"}
-    desk = Desk(space=space)
-    assert not list(compliance_notes(desk.arm, desk.evaluation))
-
-
-def test_sheet_states_the_notes_and_the_values_that_they_assume(run: Path) -> None:
-    sheet = armwright("export", run, "--format", "sheet").stdout
-    assert "Backlash moves the tip by" in sheet
-    assert "of the reach of" in sheet
-    assert "joint stiffness" in sheet
 
 
 def test_backlash_is_assumed_only_if_a_quantity_depends_on_it() -> None:

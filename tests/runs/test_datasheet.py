@@ -25,7 +25,7 @@ from armwright.problem.objectives import (
     WORST_ERROR,
 )
 from armwright.report.datasheet import sheet_record
-from armwright.report.datasheet_pdf import verdict_of
+from armwright.report.datasheet_tables import verdict_of
 from armwright.robot.actuators import named_actuator
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.mounting import Mounting, mounted
@@ -336,15 +336,15 @@ def test_first_recommended_design_is_the_default(run: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_command_writes_html_pdf_and_json(run: Path, tmp_path: Path) -> None:
+def test_command_writes_html_and_json(run: Path, tmp_path: Path) -> None:
     done = armwright("datasheet", run, "--design", NUMBER)
     files = [Path(line) for line in done.stdout.splitlines()]
-    assert [file.name for file in files] == ["datasheet.html", "datasheet.pdf", "datasheet.json"]
+    assert [file.name for file in files] == ["datasheet.html", "datasheet.json"]
     assert {file.parent for file in files} == {run / "designs" / f"{NUMBER:04d}"}
-    record = json.loads(files[2].read_text())
+    record = json.loads(files[1].read_text())
     assert record["design"] == NUMBER
     assert record["units"]["reach"] == "m"
-    assert files[1].read_bytes().startswith(b"%PDF")
+    assert files[0].read_text().startswith("<!doctype html>")
 
 
 @pytest.mark.parametrize(

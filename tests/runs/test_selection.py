@@ -155,23 +155,6 @@ def test_all_picked_designs_are_a_table_and_csv(run: Path, history: History) -> 
     assert [line.split()[0] for line in table[2:]] == [row["number"] for row in rows]
 
 
-def test_build_sheet_lists_joint_torques_and_ranges(run: Path, history: History) -> None:
-    number = history.front[0].number
-    arm, evaluation = history.member(number).arm, history.evaluation([number])
-    rows = list(csv.DictReader(io.StringIO(invoke("export", run, "--design", number, "--format", "sheet-csv"))))
-    torques = np.abs(evaluation.joint_torques[0])
-    assert len(rows) == len(arm.links) == 4
-    for j, row in enumerate(rows):
-        assert float(row["length"]) == pytest.approx(arm.links[j].length)
-        assert float(row["torque"]) == pytest.approx(torques[:, j].max())
-        assert torques[int(row["target"]) - 1, j] == torques[:, j].max()
-        assert float(row["used_low"]) == pytest.approx(evaluation.q[0, :, j].min())
-    sheet = invoke("export", run, "--design", number, "--format", "sheet")
-    for link in arm.links:
-        assert f"{1e3 * link.length:.1f} mm" in sheet
-    assert f"{1e3 * evaluation.position_error.max():.2f} mm at most" in sheet
-
-
 def test_mistakes_are_reported(run: Path) -> None:
     for arguments, words in (
         (["export", str(run), "--design", "999"], "has the designs 0 to 49"),

@@ -24,7 +24,6 @@ def test_records_state_the_quantities(tmp_path: Path) -> None:
     assert 0.0 < mean < peak < 5 * 4.4
     text = f"{peak:.3g} A peak, {mean:.3g} A mean, at 12 V"
     assert f"supply along its cycle: {text}" in armwright("pick", tmp_path).stdout
-    assert f"the actuators draw {text}" in armwright("export", tmp_path, "--format", "sheet").stdout
 
 
 def test_several_voltages_have_no_common_one() -> None:

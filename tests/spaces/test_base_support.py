@@ -12,7 +12,6 @@ from armwright.kinematics.clearance import clearances
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.objectives import MASS, PRICE
 from armwright.problem.problem import Problem
-from armwright.robot.build_sheet import sheet_markdown, sheet_rows
 from armwright.spaces.base_support import supported_space
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
@@ -140,11 +139,3 @@ def test_impossible_supports_are_refused(keys: dict[str, Any], obstacle: dict[st
         problem(space(**keys), obstacle)
     assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)
-
-
-def test_build_sheet_lists_the_column() -> None:
-    of = space(column=PRICED, origin_z=[0.25, 0.25])
-    arm = of.arm(of.sample(1, 0)[0])
-    zeros = np.zeros((1, len(arm.joints)))
-    sheet = sheet_markdown("x", arm, sheet_rows(arm, zeros, zeros), [])
-    assert "The base stands on a column of 250.0 mm, a tube of 50 x 2 mm, 591.9 g, 5.00 USD." in sheet

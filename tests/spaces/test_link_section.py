@@ -1,4 +1,4 @@
-"""Tubes of links: sections, masses, stiffness, parameters, prompts and build sheets."""
+"""Tubes of links: sections, masses, stiffness, parameters, prompts and data sheets."""
 
 import json
 import math
@@ -14,10 +14,11 @@ from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import load_prompt
 from armwright.problem.objectives import MASS, PRICE
 from armwright.problem.problem import Problem
-from armwright.robot.build_sheet import sheet_markdown, sheet_rows
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.tubes import MATERIALS, Tube
 from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.datasheet.over_reach import link_line
+from armwright.runs.datasheet.parts import parts_list
 from armwright.search.encoding import DesignEncoding
 from armwright.search.variation import offspring
 from armwright.spaces.batch_builder import stack_designs
@@ -156,9 +157,6 @@ def test_files_show_the_radius_and_the_tube_of_each_link() -> None:
     for text in (to_urdf(arm), to_mjcf(arm)):
         assert "0.015" in text
         assert "0.01" in text
-    zeros = np.zeros((1, 3))
-    sheet = sheet_markdown("x", arm, sheet_rows(arm, zeros, zeros), [])
-    assert [line.split("|")[9].strip() for line in sheet.splitlines() if line.startswith(("| 1", "| 2", "| 3"))] == [
-        "30 x 2 mm", "20 x 1.5 mm", "30 x 2 mm",
-    ]  # fmt: skip
-    assert f"{arm.structure_price:.2f} USD" in sheet
+    lines = [link_line(arm, n) for n in (1, 2, 3)]
+    assert [(line.outer_diameter, line.wall) for line in lines] == [(0.03, 0.002), (0.02, 0.0015), (0.03, 0.002)]
+    assert sum(part.price or 0.0 for part in parts_list(arm, searched)) == pytest.approx(arm.structure_price)

@@ -52,7 +52,7 @@ def datasheet(
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Write the data sheet of a design of RUN, or of an arm that exists, as HTML, PDF of two pages, and JSON."""
+    """Write the data sheet of a design of RUN or of an existing arm as JSON, and as HTML that prints on two pages."""
     from armwright.report.datasheet import sheet_record, write_datasheet
     from armwright.robot.robot_descriptions import find_urdf
     from armwright.robot.urdf_reader import read_urdf

@@ -76,7 +76,7 @@ def export(
         str,
         typer.Option(
             "--format",
-            help="urdf, ros2_control, mjcf, sheet (Markdown) or sheet-csv; optuna: the whole run as a study.",
+            help="urdf, ros2_control or mjcf; optuna: the whole run as a study.",
         ),
     ] = "urdf",
     out: Annotated[

@@ -1,29 +1,24 @@
-"""Write a data sheet: datasheet.html, datasheet.pdf and datasheet.json."""
+"""Write a data sheet: datasheet.html and datasheet.json."""
 
 import json
-from io import BytesIO
 from pathlib import Path
 
 from pydantic_core import to_jsonable_python
 
 from armwright.files import naming_write_errors, replace_file
 from armwright.report.datasheet_html import to_html
-from armwright.report.datasheet_pdf import write_pdf
 from armwright.runs.datasheet.sheet import UNITS, DataSheet
 
-HTML, PDF, JSON = "datasheet.html", "datasheet.pdf", "datasheet.json"
+HTML, JSON = "datasheet.html", "datasheet.json"
 
 
 def write_datasheet(sheet: DataSheet, folder: Path) -> list[Path]:
     """Write a data sheet into a folder, replacing an existing one, and return the files."""
     with naming_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        pdf = BytesIO()
-        write_pdf(sheet, pdf)
-        replace_file(folder / PDF, pdf.getvalue())
         replace_file(folder / HTML, to_html(sheet).encode())
         replace_file(folder / JSON, (json.dumps(sheet_record(sheet), indent=2, allow_nan=False) + "\n").encode())
-    return [folder / name for name in (HTML, PDF, JSON)]
+    return [folder / name for name in (HTML, JSON)]
 
 
 def sheet_record(sheet: DataSheet) -> dict[str, object]:

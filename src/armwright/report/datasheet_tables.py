@@ -1,12 +1,13 @@
-"""The tables of a data sheet as text, for HTML and PDF alike."""
+"""The title, sentences and tables of a data sheet as text."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armwright.robot.build_sheet import AXIS_NAMES
 from armwright.runs.datasheet.sheet import NOT_STATED, DataSheet, JointLine, Sensitivity
 from armwright.tasks.moments import MAX_MASS
 
+AXIS_NAMES = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
 MOST_DECIMALS = 3
 ENOUGH = 3  # significant digits
 SHOWN_UNITS = {"m": (1e3, " mm"), "rad": (math.degrees(1.0), "°")}  # of objectives
@@ -46,6 +47,20 @@ def money(value: float | None, missing: str = NOT_STATED) -> str:
     return missing if value is None else f"{value:,.2f}"
 
 
+def title_of(sheet: DataSheet) -> str:
+    """Return the title of a sheet."""
+    return sheet.name if sheet.design is None else f"{sheet.name}, design {sheet.design} ({sheet.joint_letters})"
+
+
+def verdict_of(sheet: DataSheet) -> str:
+    """Return role, verdict and survival in one sentence; empty for an existing arm."""
+    role = f"recommended ({sheet.role.replace('_', ' ')})" if sheet.role else ""
+    broken = f"infeasible: {', '.join(sheet.violated)}" if sheet.violated else ""
+    parts = [part for part in (broken, role, sheet.status and f"simulation: {sheet.status}", sheet.survival) if part]
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
 def key_figures(sheet: DataSheet) -> Table:
     """Return what an engineer asks first."""
     voltage = "" if sheet.voltage is None else f" at {sheet.voltage:g} V"
@@ -57,6 +72,7 @@ def key_figures(sheet: DataSheet) -> Table:
         at_reach += " (the actuators do not hold the arm itself)"
     rows = [
         ("horizontal reach", f"{number(sheet.reach, 1e3)} mm"),
+        ("base", NOT_STATED if sheet.base_position is None else _base(sheet.base_position, sheet.base_yaw or 0.0)),
         ("mass", _stated(sheet, "mass", "kg") if sheet.mass else f"{NOT_STATED} ({sheet.missing['mass']})"),
         ("payload of the task", payload),
         ("payload held at full reach", at_reach),
@@ -84,6 +100,11 @@ def joint_table(sheet: DataSheet) -> Table:
     }
     notes += [f"{key.replace('_', ' ').capitalize()}: {NOT_STATED}, {reason}." for reason, key in reasons.items()]
     return Table("Joints and drives", header, rows, (1, 2), " ".join(notes))
+
+
+def body_lines(sheet: DataSheet) -> tuple[str, ...]:
+    """Return where the bodies of the actuators are, if they count."""
+    return tuple(f"actuator at joint {joint.number}: {joint.body}" for joint in sheet.joints if joint.body)
 
 
 def link_table(sheet: DataSheet) -> Table:
@@ -159,6 +180,12 @@ def sensitivity_table(sheet: DataSheet) -> Table:
     shown = [f"{', '.join(parts)} {reason}" for reason, parts in parts_by_reason.items()]
     note = f"Impossible: {'; '.join(shown)}." if shown else sheet.missing.get("sensitivities", "")
     return Table("Sensitivities", header, rows, (0, 1, 7), note)
+
+
+def _base(position: Sequence[float], yaw: float) -> str:
+    """Return where the base is: the first joint of a design, the base link of an existing arm."""
+    turned = f", turned by {math.degrees(yaw):.1f}°" if yaw else ""
+    return f"at ({', '.join(f'{1e3 * value + 0.0:.1f}' for value in position)}) mm{turned}"
 
 
 def _objective(value: float | None, unit: str) -> str:

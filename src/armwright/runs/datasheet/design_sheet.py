@@ -16,7 +16,6 @@ from armwright.runs.datasheet.over_reach import drawing_of, link_line, reach_lin
 from armwright.runs.datasheet.parts import mass_lines, parts_list
 from armwright.runs.datasheet.sensitivities import sensitivities
 from armwright.runs.datasheet.sheet import DataSheet, ReachLine
-from armwright.runs.export import SHEET_VALUES
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.recommendation import NOT_SIMULATED
@@ -26,6 +25,7 @@ from armwright.runs.simulation_files import SIMULATION
 from armwright.runs.supply_record import supply_of
 from armwright.text import rounded
 
+SHEET_VALUES = ("backlash", "joint_stiffness")  # of actuators, which a sheet depends on whatever the objectives
 NO_ACTUATORS = "the space names no actuators"
 
 

@@ -11,6 +11,7 @@ from armwright.kinematics.cycle_loads import CycleLoads, holding_torques
 from armwright.kinematics.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.robot.arm import Arm
+from armwright.robot.motor_body import MotorBody
 from armwright.runs.datasheet.sheet import JointLine
 
 
@@ -39,10 +40,18 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
             peak_torque=joint.effort,
             used=used,
             unused=None if used is None else (max(0.0, used[0] - joint.lower), max(0.0, joint.upper - used[1])),
+            body="" if joint.body is None else _describe_body(joint.body),
             **{name: known(values[j]) for name, values in need.items()},
         )
         lines.append(line)
     return tuple(lines)
+
+
+def _describe_body(body: MotorBody) -> str:
+    """Return the edges of a body along x, y and z, and its middle from the joint, with all joints at 0."""
+    edges = " x ".join(f"{1e3 * edge:.4g}" for edge in body.size)
+    middle = ", ".join(f"{1e3 * value:.4g}" for value in body.centre)
+    return f"{body.shape} of {edges} mm along x, y and z, shaft along {body.axis}, middle at ({middle}) mm"
 
 
 def known(value: float) -> float | None:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 
 from armwright.robot.actuators import ActuatorRecord
-from armwright.robot.arm import Arm, Link
+from armwright.robot.arm import Actuator, Arm, Link
 from armwright.robot.tubes import Tube
 from armwright.runs.datasheet.sheet import MassLine, Part
 from armwright.spaces.design_space import DesignSpace
@@ -32,17 +32,29 @@ def parts_list(arm: Arm, space: DesignSpace) -> tuple[Part, ...]:
 def _actuators(arm: Arm, space: DesignSpace) -> Iterator[Part]:
     records = {record.name: record for record in space.actuators}
     names = [joint.actuator.name for joint in arm.joints if joint.actuator is not None]
-    for name in dict.fromkeys(names):
+    motors = {joint.actuator.name: joint.actuator for joint in arm.joints if joint.actuator is not None}
+    for name, motor in motors.items():
         record, count = records[name], names.count(name)
+        made = f"{record.maker} {record.kind}".strip()
         yield Part(
             part=name,
             count=count,
             unit_price=record.price,
             price=None if record.price is None else count * record.price,
-            detail=f"{record.maker} {record.kind}".strip() + f", {1e3 * record.mass:.4g} g each",
+            detail=f"{made}, {1e3 * record.mass:.4g} g each{_ratings(motor)}",
             source=record.source,
             price_source=price_source(record),
         )
+
+
+def _ratings(motor: Actuator) -> str:
+    stated = [
+        (", peak {:.4g} N m", motor.peak_torque),
+        (", continuous {:.4g} N m", motor.continuous_torque),
+        (", no-load speed {:.4g} rad/s", motor.speed),
+        (", {:g} V", motor.voltage),
+    ]
+    return "".join(text.format(value) for text, value in stated if value is not None)
 
 
 def price_source(record: ActuatorRecord) -> str:

@@ -42,6 +42,7 @@ class JointLine:
         peak_utilisation: The largest use of it; along a cycle, of the torque that is available at the speed.
         speed_utilisation: The largest use of the speed along the cycle.
         thermal_utilisation: The use of the continuous torque over the cycle.
+        body: The body of its actuator, with all joints at 0, in words; empty if bodies do not count.
     """
 
     number: int
@@ -58,6 +59,7 @@ class JointLine:
     peak_utilisation: float | None = None
     speed_utilisation: float | None = None
     thermal_utilisation: float | None = None
+    body: str = ""
 
 
 @dataclass(frozen=True)
