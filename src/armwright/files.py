@@ -7,14 +7,17 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from armwright.exceptions import ArmwrightError, RunFolderError
 
+MAX_DERIVED = 64 * 1024 * 1024  # [bytes] of a file that a run derives from its trials, far above the largest
+MAX_LINE = 16 * 1024 * 1024  # [bytes] of a record; a prompt has at most 1,000,000 characters
+MAX_RECORDS = 1024 * 1024 * 1024  # [bytes] of a file of records, such as 300,000 trials
 _PART = re.compile(r"(\d{1,10})-[0-9a-f]{16}\.part$")  # of a process
 # Windows reserves device names, whatever their suffix, and drops a dot at the end.
 _NO_FILE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?|.*\.", re.IGNORECASE)
@@ -47,6 +50,22 @@ def read_text(path: Path, limit: int, error: type[Exception]) -> str:
         return read_bytes(path, limit, error).decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as fault:
         raise error(f"{path} is not a text file in UTF-8") from fault
+
+
+def read_records(file: BinaryIO, path: Path) -> Iterator[bytes]:
+    """Yield the lines of a file from its position on, without their ends and without a truncated last line.
+
+    Raises:
+        RunFolderError: A line, or all of them, are longer than any that a run writes.
+    """
+    total = 0
+    while line := file.readline(MAX_LINE + 1):
+        total += len(line)
+        if len(line) > MAX_LINE or total > MAX_RECORDS:
+            limit, of = (MAX_LINE, "a line") if len(line) > MAX_LINE else (MAX_RECORDS, "all lines")
+            raise RunFolderError(f"{path}: expected at most {limit // 1024**2:,} MiB of {of}; restore the file")
+        if line.endswith(b"\n"):
+            yield line[:-1]
 
 
 def replace_file(target: Path, content: bytes, mode: int = 0o666) -> None:

@@ -19,13 +19,14 @@ class LiveServer:
     """The live page's application, called without a network."""
 
     folder: Path
-    token: str = "the-token"
+    key: str = "the-key"
     app: Any = field(init=False)
 
     def __post_init__(self) -> None:
         from armwright.report.live_app import OpenPages, live_app
+        from armwright.report.request_guard import Guard
 
-        self.app = live_app(self.folder, self.token, lambda host: host == "127.0.0.1:9", OpenPages())
+        self.app = Guard(live_app(self.folder, OpenPages()), self.key, {"/"}, lambda host: host == "127.0.0.1:9")
 
     async def _ask(self, method: str, path: bytes, headers: list[tuple[bytes, bytes]], body: bytes) -> tuple[int, Any]:
         address, _, query = path.partition(b"?")
@@ -66,7 +67,7 @@ def a_server() -> LiveServer:
 
 def request_seeds() -> list[bytes]:
     right = {"Host": "127.0.0.1:9", "Origin": "http://127.0.0.1:9", "Content-Type": "application/json",
-             "X-Armwright-Token": "the-token"}  # fmt: skip
+             "X-Armwright-Key": "the-key"}  # fmt: skip
     actions = (
         {"action": "pause"},
         {"action": "stop"},
@@ -75,7 +76,7 @@ def request_seeds() -> list[bytes]:
     )
     posts = [{"method": "POST", "path": "/control", "headers": right, "body": json.dumps(action)} for action in actions]
     paths = ("/run?designs=3&calls=1", "/file?design=2&format=mjcf", "/", "/control")
-    gets = [{"method": "GET", "path": path, "headers": {"Host": "127.0.0.1:9"}, "body": ""} for path in paths]
+    gets = [{"method": "GET", "path": path, "headers": right, "body": ""} for path in paths]
     return [json.dumps(one).encode() for one in (*posts, *posts, *gets)]
 
 

@@ -67,12 +67,13 @@ class LiveStudy:
         self.folder = folder
         self.process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True)
         self.said: list[str] = []
-        while not (found := re.search(r"^live: (http://127\.0\.0\.1:\d+/)$", self.said[-1] if self.said else "")):
+        while not (
+            found := re.search(r"^live: (http://127\.0\.0\.1:\d+/#key=[\w-]{32})$", self.said[-1] if self.said else "")
+        ):
             line = self.process.stdout.readline()
             assert line, "".join(self.said)
             self.said.append(line)
         self.address = found[1]
-        self.port = int(self.address.rstrip("/").rpartition(":")[2])
 
     def __enter__(self) -> Self:
         return self
@@ -221,8 +222,8 @@ def test_killed_study_is_shown_as_not_running(tmp_path: Path, tab: Tab, live: Ex
 
 
 def test_open_page_shows_a_new_reach_map(served: tuple[Path, int, str], tab: Tab) -> None:
-    folder, port, _ = served
-    tab.open(f"http://127.0.0.1:{port}/")
+    folder, port, key = served
+    tab.open(f"http://127.0.0.1:{port}/#key={key}")
     tab.page.wait_for_function("armwright.content.n === 10")
     tab.ask("armwright.set({ design: 4 })")
     box = tab.page.locator("#reach-box")
@@ -248,26 +249,26 @@ def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Pat
     assert run.status["doing"] == "unknown"
 
 
-def test_control_needs_token_origin_and_json(served: tuple[Path, int, str]) -> None:
-    folder, port, token = served
+def test_control_needs_key_origin_and_json(served: tuple[Path, int, str]) -> None:
+    folder, port, key = served
     assert post_control(port, "") == 403
-    assert post_control(port, token[:-1] + ("A" if token[-1] != "A" else "B")) == 403
+    assert post_control(port, key[:-1] + ("A" if key[-1] != "A" else "B")) == 403
     for origin in ("", "null", "http://evil.example", f"http://localhost:{port}", f"https://127.0.0.1:{port}"):
-        assert post_control(port, token, Origin=origin) == 403
-    assert post_control(port, token, Content_Type="text/plain") == 415
+        assert post_control(port, key, Origin=origin) == 403
+    assert post_control(port, key, Content_Type="text/plain") == 415
     assert not read_control(folder).paused
-    assert post_control(port, token) == 204
+    assert post_control(port, key) == 204
     assert read_control(folder).paused
-    assert post_control(port, token, {"action": "resume"}) == 204
+    assert post_control(port, key, {"action": "resume"}) == 204
 
 
 def test_foreign_host_header_is_refused(served: tuple[Path, int, str]) -> None:
     """With DNS rebinding, the browser considers page and server one site."""
-    _, port, token = served
+    _, port, key = served
     for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", ""):
-        assert ask(port, "GET", "/run", Host=host)[0] in (400, 421)
-        assert not host or post_control(port, token, Host=host, Origin=f"http://{host}") == 421
-    assert ask(port, "GET", "/run", Host=f"localhost:{port}")[0] == 200
+        assert ask(port, "GET", "/run", Host=host, X_Armwright_Key=key)[0] in (400, 421)
+        assert not host or post_control(port, key, Host=host, Origin=f"http://{host}") == 421
+    assert ask(port, "GET", "/run", Host=f"localhost:{port}", X_Armwright_Key=key)[0] == 200
 
 
 @pytest.mark.parametrize(
@@ -287,21 +288,25 @@ def test_foreign_host_header_is_refused(served: tuple[Path, int, str]) -> None:
     ],
 )
 def test_invalid_control_requests_are_refused(served: tuple[Path, int, str], content: object, status: int) -> None:
-    folder, port, token = served
+    folder, port, key = served
     before = read_control(folder)
-    assert post_control(port, token, content) == status
+    assert post_control(port, key, content) == status
     assert read_control(folder) == before
 
 
 def test_unknown_paths_and_files_are_not_found(served: tuple[Path, int, str]) -> None:
-    _, port, _ = served
+    _, port, key = served
+
+    def get(path: str) -> tuple[int, bytes]:
+        return ask(port, "GET", path, X_Armwright_Key=key)
+
     for path in ("/../config.yaml", "/config.yaml", "/%2e%2e/etc/passwd", "/file?design=0&format=../../config.yaml",
                  "/file?design=99&format=urdf", "/file", "/control"):  # fmt: skip
-        assert ask(port, "GET", path)[0] in (400, 404, 405)
-    assert ask(port, "GET", "/file?design=9&format=mjcf")[0] == 200
-    whole = ask(port, "GET", "/run")[1]
-    assert ask(port, "GET", "/run?designs=-1&calls=x")[1] == whole
-    assert len(ask(port, "GET", "/run?designs=10")[1]) < len(whole)
+        assert get(path)[0] in (400, 404, 405)
+    assert get("/file?design=9&format=mjcf")[0] == 200
+    whole = get("/run")[1]
+    assert get("/run?designs=-1&calls=x")[1] == whole
+    assert len(get("/run?designs=10")[1]) < len(whole)
 
 
 def test_server_listens_on_loopback_only(served: tuple[Path, int, str]) -> None:

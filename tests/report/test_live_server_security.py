@@ -53,23 +53,23 @@ def lines(*words: str) -> bytes:
     return "\r\n".join([*words, "", ""]).encode("latin-1")
 
 
-def right(port: int, token: str) -> list[str]:
+def right(port: int, key: str) -> list[str]:
     """The headers of the page's own POST, but for its length."""
     host = f"127.0.0.1:{port}"
-    return [f"Host: {host}", f"Origin: http://{host}", "Content-Type: application/json", f"X-Armwright-Token: {token}"]
+    return [f"Host: {host}", f"Origin: http://{host}", "Content-Type: application/json", f"X-Armwright-Key: {key}"]
 
 
 def test_responses_have_security_headers(served: tuple[Path, int, str]) -> None:
-    _, port, token = served
-    host = f"Host: 127.0.0.1:{port}"
+    _, port, key = served
+    host, with_key = f"Host: 127.0.0.1:{port}", f"X-Armwright-Key: {key}"
     for status, request in (
         (200, lines("GET / HTTP/1.1", host)),
-        (200, lines("GET /run HTTP/1.1", host)),
-        (200, lines("HEAD /events HTTP/1.1", host)),
-        (404, lines("GET /config.yaml HTTP/1.1", host)),
-        (405, lines("GET /control HTTP/1.1", host)),
+        (200, lines("GET /run HTTP/1.1", host, with_key)),
+        (200, lines("HEAD /events HTTP/1.1", host, with_key)),
+        (404, lines("GET /config.yaml HTTP/1.1", host, with_key)),
+        (405, lines("GET /control HTTP/1.1", host, with_key)),
         (403, lines("POST /control HTTP/1.1", host, "Content-Length: 0")),
-        (415, lines("POST /control HTTP/1.1", *right(port, token)[:2], right(port, token)[3], "Content-Length: 0")),
+        (415, lines("POST /control HTTP/1.1", *right(port, key)[:2], right(port, key)[3], "Content-Length: 0")),
         (421, lines("GET / HTTP/1.1", "Host: evil.example")),
     ):
         got, headers, _ = said(port, request)
@@ -83,40 +83,40 @@ def test_responses_have_security_headers(served: tuple[Path, int, str]) -> None:
 
 @pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "BREW"])
 def test_control_accepts_post_only(served: tuple[Path, int, str], method: str) -> None:
-    folder, port, token = served
+    folder, port, key = served
     before = read_control(folder)
     more = ["Access-Control-Request-Method: POST", "X-HTTP-Method-Override: POST", "Content-Length: 0"]
-    assert said(port, lines(f"{method} /control HTTP/1.1", *right(port, token), *more))[0] in (400, 405)
+    assert said(port, lines(f"{method} /control HTTP/1.1", *right(port, key), *more))[0] in (400, 405)
     for path in ("/", "/run", "/file?design=0&format=urdf", "/events"):
         status = said(
-            port, lines(f"{'POST' if method == 'GET' else method} {path} HTTP/1.1", *right(port, token), *more)
+            port, lines(f"{'POST' if method == 'GET' else method} {path} HTTP/1.1", *right(port, key), *more)
         )[0]
         assert status in ((200,) if method == "HEAD" else (400, 405))
     assert read_control(folder) == before
 
 
-def test_token_counts_only_in_its_header(served: tuple[Path, int, str]) -> None:
-    folder, port, token = served
-    host, origin, kind, _ = right(port, token)
+def test_key_counts_only_in_its_header(served: tuple[Path, int, str]) -> None:
+    folder, port, key = served
+    host, origin, kind, _ = right(port, key)
     length = "Content-Length: 18"
     body = b'{"action":"pause"}'
     for path, more in (
-        (f"/control?x-armwright-token={token}", []),
-        ("/control", [f"Cookie: x-armwright-token={token}"]),
-        ("/control", [f"Authorization: Bearer {token}"]),
-        ("/control", [f"X-Armwright-Token: {token[:-1]}"]),
-        ("/control", [f"X-Armwright-Token: {token} x"]),
-        ("/control", ["X-Armwright-Token: é"]),
+        (f"/control?x-armwright-key={key}", []),
+        ("/control", [f"Cookie: x-armwright-key={key}"]),
+        ("/control", [f"Authorization: Bearer {key}"]),
+        ("/control", [f"X-Armwright-Key: {key[:-1]}"]),
+        ("/control", [f"X-Armwright-Key: {key} x"]),
+        ("/control", ["X-Armwright-Key: é"]),
     ):
         assert said(port, lines(f"POST {path} HTTP/1.1", host, origin, kind, length, *more) + body)[0] == 403
     assert not read_control(folder).paused
 
 
-def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With hmac's comparison patched to accept everything, any token is accepted."""
+def test_keys_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With hmac's comparison patched to accept everything, any key is accepted."""
     server = a_server()
     wrong = {"host": "127.0.0.1:9", "origin": "http://127.0.0.1:9", "content-type": "application/json",
-             "x-armwright-token": "no"}  # fmt: skip
+             "x-armwright-key": "no"}  # fmt: skip
     assert server.ask("POST", b"/control", wrong, b'{"action":"resume"}')[0] == 403
     monkeypatch.setattr("armwright.report.request_guard.secrets.compare_digest", lambda ours, theirs: True)
     assert server.ask("POST", b"/control", wrong, b'{"action":"resume"}')[0] == 204
@@ -124,10 +124,10 @@ def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.parametrize("first", [True, False])
 def test_two_host_headers_are_refused(served: tuple[Path, int, str], first: bool) -> None:
-    folder, port, token = served
+    folder, port, key = served
     hosts = [f"Host: 127.0.0.1:{port}", "Host: evil.example"][:: 1 if first else -1]
     origin = f"Origin: http://{hosts[0].partition(': ')[2]}"
-    request = lines("POST /control HTTP/1.1", *hosts, origin, *right(port, token)[2:], "Content-Length: 18")
+    request = lines("POST /control HTTP/1.1", *hosts, origin, *right(port, key)[2:], "Content-Length: 18")
     assert said(port, request + b'{"action":"pause"}')[0] in (400, 421)
     assert not read_control(folder).paused
 
@@ -147,22 +147,22 @@ PATHS = (
 
 @pytest.mark.parametrize("path", PATHS)
 def test_paths_do_not_reach_files(served: tuple[Path, int, str], path: str) -> None:
-    _, port, _ = served
-    status, _, body = said(port, lines(f"GET {path} HTTP/1.1", f"Host: 127.0.0.1:{port}"))
+    _, port, key = served
+    status, _, body = said(port, lines(f"GET {path} HTTP/1.1", *right(port, key)))
     assert status in (400, 404)
     assert b"targets" not in body
     assert b"root:" not in body
 
 
 def test_endless_body_is_refused_early(served: tuple[Path, int, str]) -> None:
-    folder, port, token = served
+    folder, port, key = served
     server = next(c.pid for c in psutil.net_connections("inet") if c.laddr.port == port and c.status == "LISTEN")
     before = psutil.Process(server).memory_info().rss
     huge, chunked = "Content-Length: 1000000000000", "Transfer-Encoding: chunked"
     part = b"%x\r\n%s\r\n" % (70_000, b" " * 70_000)
     for extra, body in ((huge, b" " * 70_000), (chunked, part)):
-        assert refused(port, lines("POST /control HTTP/1.1", *right(port, token), extra) + body)
-        # Whoever has no token is not even listened to.
+        assert refused(port, lines("POST /control HTTP/1.1", *right(port, key), extra) + body)
+        # Whoever has no key is not even listened to.
         assert said(port, lines("POST /control HTTP/1.1", *right(port, "no"), extra))[0] == 403
     assert refused(port, lines("GET / HTTP/1.1", f"Host: 127.0.0.1:{port}", "X: " + "x" * 200_000))
     assert psutil.Process(server).memory_info().rss - before < 50e6
@@ -171,16 +171,16 @@ def test_endless_body_is_refused_early(served: tuple[Path, int, str]) -> None:
 
 @pytest.mark.slow
 def test_slow_clients_do_not_block_others(served: tuple[Path, int, str]) -> None:
-    folder, port, token = served
-    begun = lines("POST /control HTTP/1.1", *right(port, token), "Content-Length: 18") + b'{"action":'
+    folder, port, key = served
+    begun = lines("POST /control HTTP/1.1", *right(port, key), "Content-Length: 18") + b'{"action":'
     slow = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) for _ in range(50)]
     for number, connection in enumerate(slow):
         connection.sendall(begun if number % 2 else begun[:30])
-    assert ask(port, "GET", "/run")[0] == 200
-    assert post_control(port, token, {"action": "resume"}) == 204
+    assert ask(port, "GET", "/run", X_Armwright_Key=key)[0] == 200
+    assert post_control(port, key, {"action": "resume"}) == 204
     for connection in slow:
         connection.close()
-    assert ask(port, "GET", "/run")[0] == 200
+    assert ask(port, "GET", "/run", X_Armwright_Key=key)[0] == 200
     assert not read_control(folder).paused
 
 
@@ -204,9 +204,9 @@ ATTACK = """async (home) => {
     const attempt = async (name, what) => {
         try { tried[name] = String(await what()); } catch (e) { tried[name] = 'refused'; } };
     await attempt('read', async () => (await fetch(home + 'run')).status);
-    await attempt('token', async () => (await (await fetch(home)).text()).length);
+    await attempt('shell', async () => (await (await fetch(home)).text()).length);
     await attempt('json', async () => (await fetch(home + 'control', { method: 'POST', body: '{"action":"pause"}',
-        headers: { 'Content-Type': 'application/json', 'X-Armwright-Token': 'x' } })).status);
+        headers: { 'Content-Type': 'application/json', 'X-Armwright-Key': 'x' } })).status);
     await attempt('simple', async () => (await fetch(home + 'control', { method: 'POST', mode: 'no-cors',
         body: '{"action":"pause"}' })).type);
     const loads = (element) => new Promise((done) => {
@@ -235,9 +235,8 @@ def test_cross_origin_page_gets_nothing(served: tuple[Path, int, str], browser: 
     tab = Tab(browser)
     tab.page.goto(evil)
     tried = tab.page.evaluate(ATTACK, f"http://127.0.0.1:{port}/")
-    assert {name: tried[name] for name in ("read", "token", "json", "image", "script", "events")} == dict.fromkeys(
-        ("read", "token", "json", "image", "script", "events"), "refused"
-    )
+    names = ("read", "shell", "json", "image", "script", "events")
+    assert {name: tried[name] for name in names} == dict.fromkeys(names, "refused")
     assert tried["simple"] in ("opaque", "refused")
     others = [frame for frame in tab.page.frames if frame is not tab.page.main_frame]
     assert all("armwright" not in frame.content() for frame in others)
@@ -257,7 +256,7 @@ def test_dns_rebinding_shows_nothing(served: tuple[Path, int, str], browser: Bro
     assert response is not None
     assert response.status == 421
     assert page.evaluate("async () => (await fetch('/run')).status") == 421
-    assert "armwright-token" not in page.content()
+    assert "armwright" not in page.content()
     rebound.close()
 
 

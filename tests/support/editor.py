@@ -2,19 +2,16 @@
 
 import json
 import queue
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import pytest
-import uvicorn
-
 from armwright.editor.edited_files import EditedFiles
 from armwright.editor.server import serve_editor
-from tests.support.live_server import ask
+from tests.support.live_server import ask, port_and_key, running
 
 
 @dataclass
@@ -28,55 +25,32 @@ class ServedEditor:
 
     address: str
     task: Path
-    token: str = field(default="", init=False)
-
-    def __post_init__(self) -> None:
-        page = self.get("/")[1].decode()
-        self.token = page.partition('name="armwright-token" content="')[2].partition('"')[0]
 
     @property
     def port(self) -> int:
-        return int(self.address.partition("127.0.0.1:")[2].partition("/")[0])
+        return port_and_key(self.address)[0]
 
     @property
     def key(self) -> str:
-        return self.address.partition("?key=")[2]
+        return port_and_key(self.address)[1]
 
-    @property
-    def cookie(self) -> str:
-        return f"armwright-{self.port}={self.key}"
-
-    def get(self, path: str, **headers: str) -> tuple[int, bytes]:
-        return ask(self.port, "GET", path, **{"Cookie": self.cookie, **headers})
+    def get(self, path: str) -> tuple[int, bytes]:
+        return ask(self.port, "GET", path, X_Armwright_Key=self.key)
 
     def post(self, path: str, content: Any, **headers: str) -> tuple[int, bytes]:
         """Send what the page sends, but for these headers; one that is empty is left out."""
         right = {
-            "Cookie": self.cookie,
             "Origin": f"http://127.0.0.1:{self.port}",
             "Content_Type": "application/json",
-            "X_Armwright_Token": self.token,
+            "X_Armwright_Key": self.key,
         }
         body = content if isinstance(content, bytes) else json.dumps(content).encode()
         return ask(self.port, "POST", path, body, **{k: v for k, v in (right | headers).items() if v})
 
 
 @contextmanager
-def served_editor(task: Path) -> Iterator[ServedEditor]:
+def served_editor(task: Path, port: int = 0) -> Iterator[ServedEditor]:
     """Serve the editor of a task file until the end of the block."""
     addresses: queue.Queue[str] = queue.Queue()
-    servers: list[uvicorn.Server] = []
-    startup = uvicorn.Server.startup
-
-    async def noting(self: uvicorn.Server, *arguments: Any, **options: Any) -> None:
-        servers.append(self)
-        await startup(self, *arguments, **options)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(uvicorn.Server, "startup", noting)
-        files = EditedFiles(task)
-        thread = threading.Thread(target=serve_editor, args=(files, addresses.put))
-        thread.start()
+    with running(partial(serve_editor, EditedFiles(task), addresses.put, port)):
         yield ServedEditor(addresses.get(), task)
-        servers[0].should_exit = True
-        thread.join()

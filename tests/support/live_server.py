@@ -2,14 +2,16 @@
 
 import http.client
 import json
-import os
 import queue
-import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
+import uvicorn
 
 import armwright as aw
 from armwright.report import live_server as live
@@ -18,23 +20,44 @@ from tests.support.command_line import PATIENCE
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, int, str]]:
-    """A finished run on a server: its folder, the server's port, the page's token."""
+    """A finished run on a server: its folder, the server's port and key."""
     folder = tmp_path_factory.mktemp("served") / "run"
     aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=folder)
+    with served_run(folder) as address:
+        yield folder, *port_and_key(address)
+
+
+@contextmanager
+def served_run(folder: Path, port: int = 0) -> Iterator[str]:
+    """Serve the live page of a run folder until the end of the block; its address."""
     addresses: queue.Queue[str] = queue.Queue()
-    reader, writer = (os.fdopen(end, mode) for end, mode in zip(os.pipe(), ("rb", "wb"), strict=True))
-    with pytest.MonkeyPatch.context() as patch, reader, writer:
-        patch.setattr(live, "LINGER", 0.1)  # not 0: it would end with its first page
-        patch.setattr(live, "GRACE", 0.1)
-        # It ends with the study that `writer` stands for.
-        server = threading.Thread(target=live.serve, args=(folder, addresses.put), kwargs={"study": reader})
-        server.start()
-        port = int(addresses.get().rstrip("/").rpartition(":")[2])
-        _, page = ask(port, "GET", "/")
-        (token,) = re.findall(r'name="armwright-token" content="([\w-]+)"', page.decode())
-        yield folder, port, token
-        writer.close()
-        server.join()
+    with running(partial(live.serve, folder, addresses.put, port=port)):
+        yield addresses.get()
+
+
+@contextmanager
+def running(serve: Callable[[], None]) -> Iterator[None]:
+    """Run a server in a thread, and end it with the block, even if a page is open."""
+    servers: list[uvicorn.Server] = []
+    startup = uvicorn.Server.startup
+
+    async def noting(self: uvicorn.Server, *arguments: Any, **options: Any) -> None:
+        servers.append(self)
+        await startup(self, *arguments, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(uvicorn.Server, "startup", noting)
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield
+        servers[0].should_exit = True
+        thread.join()
+
+
+def port_and_key(address: str) -> tuple[int, str]:
+    """The port and the key in an address that a terminal shows."""
+    server, _, key = address.partition("/#key=")
+    return int(server.rpartition(":")[2]), key
 
 
 def ask(port: int, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
@@ -53,8 +76,8 @@ def ask(port: int, method: str, path: str, body: bytes | None = None, **headers:
     return found
 
 
-def post_control(port: int, token: str, content: object = None, **headers: str) -> int:
+def post_control(port: int, key: str, content: object = None, **headers: str) -> int:
     """What the server says to a POST that is right but for these headers."""
-    right = {"Origin": f"http://127.0.0.1:{port}", "Content_Type": "application/json", "X_Armwright_Token": token}
+    right = {"Origin": f"http://127.0.0.1:{port}", "Content_Type": "application/json", "X_Armwright_Key": key}
     body = content if isinstance(content, bytes) else json.dumps(content or {"action": "pause"}).encode()
     return ask(port, "POST", "/control", body, **{k: v for k, v in (right | headers).items() if v})[0]

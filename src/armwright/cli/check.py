@@ -11,6 +11,8 @@ from armwright.cli.activity import activity
 from armwright.cli.notes import unused_parts
 from armwright.cli.show_inputs import show_cycle, show_target_table, show_task
 from armwright.cli.streams import print_json
+from armwright.exceptions import TaskError
+from armwright.files import read_text
 from armwright.problem.checks.finding import SUSPECTED, Finding
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.checks.reach import longest_reach
@@ -23,6 +25,7 @@ from armwright.spaces.design_space import DesignSpace, builtin_spaces
 from armwright.spaces.parameters import CategoricalParameter, Parameter
 from armwright.tasks.catalogue import builtin_names
 from armwright.tasks.decimal_commas import find_decimal_commas
+from armwright.yaml_documents import MAX_BYTES
 
 FIRST_SECONDS = 1.0  # [s] of samples before a search
 DEEP_SECONDS, DEEP_SAMPLES = 10.0, 1000  # [s] of a deep check, and the samples that it takes at least
@@ -33,7 +36,7 @@ def check_files(task: str, space: Path | None) -> list[Finding]:
     findings: list[Finding] = []
     for name, known in ((task, builtin_names()), (None if space is None else str(space), builtin_spaces())):
         if name is not None and name not in known and os.path.isfile(name):
-            text = Path(name).read_text(encoding="utf-8")
+            text = read_text(Path(name), MAX_BYTES, TaskError)
             findings += [Finding(f"{name}, {message}", SUSPECTED) for message in find_decimal_commas(text)]
     return findings
 

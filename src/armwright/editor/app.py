@@ -1,6 +1,6 @@
 """The editor's HTTP application. Needs the extra `live`.
 
-/           the page; ?key=KEY: the address that the terminal shows
+/           the page, without data
 /opened     the texts of both files, and the lists to choose from
 /assess     POST: texts and edits; the new texts and what they mean
 /points     POST: pasted points; as targets of a task file, and notes on how they were read
@@ -8,14 +8,13 @@
 /design     POST: write both files and search designs
 /stop       POST: end the search
 /job        the state of the search
-/run/       the live page of the search
+/run/       the live page of the search, without data
+/run/...    its data
 
-Everything but the first request needs the key, in a cookie: other users of this machine can connect to the port, but
-do not know the key. Requests that change anything also need the token of the page, and come from the page itself.
+All but the two pages need the server's key (request_guard.py). What changes anything must come from the page itself.
 """
 
 import asyncio
-import secrets
 from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import asdict
@@ -24,21 +23,19 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import to_json
 from starlette.applications import Starlette
-from starlette.datastructures import URL
-from starlette.middleware import Middleware
-from starlette.requests import HTTPConnection, Request
-from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Mount, Route, Router
 
 from armwright.editor.assessment import assess
 from armwright.editor.choices import choices
 from armwright.editor.design_run import DesignRun, next_folder
 from armwright.editor.edited_files import MAX_BYTES, ChangedOnDiskError, EditedFiles, Texts
-from armwright.editor.editor_page import render_editor
+from armwright.editor.editor_page import editor_shell
 from armwright.editor.yaml_edits import Edit, edit_text
 from armwright.exceptions import ArmwrightError, SpaceError, TaskError
-from armwright.report.live_app import LivePage, OpenPages
-from armwright.report.request_guard import Guard, read_request
+from armwright.report.live_app import LivePage, OpenPages, show_shell
+from armwright.report.request_guard import read_request
 from armwright.tasks.points_file import parse_points
 from armwright.tasks.task import Task
 from armwright.yaml_documents import parse_document
@@ -46,6 +43,7 @@ from armwright.yaml_documents import parse_document
 MAX_BODY = 4 * MAX_BYTES  # [bytes]; two texts, their quotes escaped
 MAX_EDITS = 10_000
 MIN_SECONDS, MAX_SECONDS = 5.0, 24 * 3600.0
+SHELLS = ("/", "/run/")
 
 Text = Annotated[str, Field(max_length=MAX_BYTES)]
 Body = TypeVar("Body", bound=BaseModel)
@@ -88,44 +86,15 @@ class StopBody(BaseModel, frozen=True, extra="forbid"):
     """Nothing."""
 
 
-def editor_app(
-    files: EditedFiles, key: str, port: int, is_allowed: Callable[[str], bool], pages: OpenPages
-) -> Starlette:
-    """Return the editor's application.
+def editor_app(files: EditedFiles, pages: OpenPages) -> Starlette:
+    """Return the editor's application, to be guarded.
 
     Args:
         files: The edited files.
-        key: What the first address carries, and then the cookie.
-        port: The port, for the name of the cookie: cookies are shared by all ports of a host.
-        is_allowed: Tells whether a Host header names this server.
         pages: Counts the open live pages.
     """
     editor = Editor(files, pages)
-    middleware = [Middleware(Guard, is_allowed=is_allowed), Middleware(KeyGuard, key=key, cookie=f"armwright-{port}")]
-    return Starlette(routes=editor.routes(), middleware=middleware, lifespan=editor.lifespan)
-
-
-class KeyGuard:
-    """Refuse requests without the key, in the address of the page or in a cookie."""
-
-    def __init__(self, app: Any, key: str, cookie: str) -> None:
-        self._app = app
-        self._key = key
-        self._cookie = cookie
-
-    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        app = self._app
-        if scope["type"] == "http":
-            connection = HTTPConnection(scope)
-            if connection.url.path == "/" and self._is_key(connection.query_params.get("key", "")):
-                app = RedirectResponse(str(URL("/")), 303)
-                app.set_cookie(self._cookie, self._key, httponly=True, samesite="lax")
-            elif not self._is_key(connection.cookies.get(self._cookie, "")):
-                app = PlainTextResponse("open the address that `armwright edit` printed, with its key", 403)
-        await app(scope, receive, send)
-
-    def _is_key(self, text: str) -> bool:
-        return secrets.compare_digest(text.encode(), self._key.encode())
+    return Starlette(routes=editor.routes(), lifespan=editor.lifespan)
 
 
 class Editor:
@@ -139,7 +108,6 @@ class Editor:
     def __init__(self, files: EditedFiles, pages: OpenPages) -> None:
         self._files = files
         self._pages = pages
-        self._token = secrets.token_urlsafe(24)
         self._job: DesignRun | None = None
         self._live: Router | None = None
         self._watching: asyncio.Task[None] | None = None
@@ -155,6 +123,7 @@ class Editor:
             Route("/save", self._post(TextsBody, self.save), methods=["POST"]),
             Route("/design", self._post(DesignBody, self.design), methods=["POST"]),
             Route("/stop", self._post(StopBody, self.stop), methods=["POST"]),
+            Route("/run/", show_shell),
             Mount("/run", app=self.run),
         ]
 
@@ -167,7 +136,7 @@ class Editor:
             await asyncio.to_thread(self._job.close)
 
     async def page(self, request: Request) -> Response:
-        return Response(render_editor(self._files.task.name, self._token), media_type="text/html; charset=utf-8")
+        return Response(editor_shell(), media_type="text/html; charset=utf-8")
 
     async def opened(self, request: Request) -> Response:
         names = {"task": self._files.task.name, "space": self._files.space.name}
@@ -201,7 +170,7 @@ class Editor:
         name = parse_document(body.task, Task, TaskError, str(self._files.task)).name
         await asyncio.to_thread(self._files.save, body.texts, body.overwrite)
         self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
-        page = LivePage(self._job.folder, self._token, self._pages)
+        page = LivePage(self._job.folder, self._pages)
         self._live = Router(page.routes())
         if self._watching is not None:
             self._watching.cancel()
@@ -227,7 +196,7 @@ class Editor:
         """Return the handler of a request of the page with such a body."""
 
         async def answer(request: Request) -> Response:
-            body = await read_request(request, self._token, MAX_BODY)
+            body = await read_request(request, MAX_BODY)
             if isinstance(body, Response):
                 return body
             try:

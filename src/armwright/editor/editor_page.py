@@ -2,7 +2,7 @@
 
 from importlib import resources
 
-from armwright.report.page_assembly import SHARED, PageSource, assemble, token_tag
+from armwright.report.page_assembly import SHARED, PageSource, assemble
 
 EDITOR = PageSource(
     template="editor.html",
@@ -13,6 +13,6 @@ EDITOR = PageSource(
 )
 
 
-def render_editor(name: str, token: str) -> str:
-    """Return the page for a task file of this name."""
-    return assemble(EDITOR, f"{name}: armwright", connects=True, values={"token": token_tag(token)})
+def editor_shell() -> str:
+    """Return the page, which fetches its data."""
+    return assemble(EDITOR, "armwright", connects=True, values={})

@@ -1,7 +1,6 @@
 """Serve the editor to browsers on this machine."""
 
 import html
-import secrets
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
@@ -26,21 +25,18 @@ def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0,
         FailureError: The port cannot be used.
     """
     check_extra("live", "the editor")
-    from armwright.editor.app import editor_app
+    from armwright.editor.app import SHELLS, editor_app
     from armwright.report.live_app import OpenPages
 
-    key, pages = secrets.token_urlsafe(24), OpenPages()
+    pages = OpenPages()
     with TemporaryDirectory(prefix="armwright-") as private:
 
-        def announce(server: str) -> None:
-            address = f"{server}?key={key}"
+        def announce(address: str) -> None:
             tell(address)
             if opens_browser:
                 _open(address, Path(private))
 
-        serve_app(
-            lambda is_allowed, port: editor_app(files, key, port, is_allowed, pages), pages, announce, LOOPBACK, port
-        )
+        serve_app(editor_app(files, pages), SHELLS, pages, announce, LOOPBACK, port)
 
 
 def _open(address: str, private: Path) -> None:

@@ -16,6 +16,7 @@ from pydantic import ConfigDict, TypeAdapter
 
 from armwright.exceptions import RunFolderError, SettingsError, TaskError, did_you_mean
 from armwright.experiments.base_placement import placed
+from armwright.files import MAX_DERIVED, read_bytes
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.pareto import front_indices, knee_index, paper_solution_indices
 from armwright.problem.existing_arm import ExistingArm
@@ -171,14 +172,13 @@ def compare_arms(
 def read_existing_arms(folder: Path, n_objectives: int) -> tuple[ComparedArm, ...]:
     """Return the arms of the last comparison with a run that has this number of objectives; empty without one."""
     path = folder / EXISTING_ARMS
+    if not path.exists():
+        return ()
+    content = read_bytes(path, MAX_DERIVED, RunFolderError)
     try:
-        arms = _ARMS.validate_json(path.read_bytes())
+        arms = _ARMS.validate_json(content)
         if any(len(arm.values) != n_objectives for arm in arms):
             raise ValueError(f"expected {n_objectives} values")
-    except FileNotFoundError:
-        return ()
-    except OSError as fault:
-        raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
     except ValueError as fault:  # includes pydantic's errors
         raise RunFolderError(f"{path} is damaged; remove it, and compare the arms again") from fault
     return arms

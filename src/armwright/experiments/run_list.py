@@ -9,7 +9,7 @@ from armwright.experiments.run_summary import RunSummary, describe_method, read_
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import CONFIG, read_config
 from armwright.runs.results import read_summary
-from armwright.runs.trials_file import TRIALS
+from armwright.runs.trials_file import TRIALS, count_trials
 
 
 def find_runs(folders: Iterable[Path]) -> list[Path]:
@@ -60,7 +60,9 @@ def _run_record(folder: Path) -> dict[str, Any]:
             "share_of_best_known": None if known is None else known["share"],
             "state": "finished",
         }
-    trials = folder / TRIALS
-    n = trials.read_bytes().count(b"\n") if trials.is_file() else 0
+    try:
+        n = count_trials(folder / TRIALS)
+    except RunFolderError:
+        return record | {"state": f"damaged {TRIALS}"}
     planned = "" if isinstance(config.method, FrontMethod) else f" of {config.method.n_trials}"
     return record | {"trials": n, "state": f"unfinished, {n}{planned} trials"}

@@ -13,7 +13,7 @@ from typing import Annotated, Any, cast
 from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
 from armwright.exceptions import RunFolderError
-from armwright.files import naming_write_errors, open_to_append
+from armwright.files import naming_write_errors, open_to_append, read_records
 from armwright.llm.backend import Question, Reply
 from armwright.runs.control import Hint
 
@@ -131,21 +131,27 @@ def _record(call: Call) -> dict[str, Any]:
 
 def _read(path: Path, mend: bool) -> Iterator[Call]:
     """Read the calls of a file; `mend` removes a last line that a crash cut short."""
+    end = 0
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            for number, line in enumerate(read_records(file, path), start=1):
+                end += len(line) + 1
+                yield _call(line, f"{path}, line {number}")
+            is_cut_short = file.tell() > end
     except FileNotFoundError:
         return
     except OSError as fault:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    end = content.rfind(b"\n") + 1
-    if mend and end < len(content):
+    if mend and is_cut_short:
         with naming_write_errors(path):
             os.truncate(path, end)
-    for number, line in enumerate(content[:end].split(b"\n")[:-1], start=1):
-        try:
-            yield _CALL.validate_json(line)
-        except ValidationError as fault:
-            raise RunFolderError(f"{path}, line {number} is damaged; restore the file or delete the line") from fault
+
+
+def _call(line: bytes, where: str) -> Call:
+    try:
+        return _CALL.validate_json(line)
+    except ValidationError as fault:
+        raise RunFolderError(f"{where} is damaged; restore the file or delete the line") from fault
 
 
 def _check_complete(content: Any) -> Any:

@@ -1,10 +1,12 @@
 """The live page's HTTP application. Needs the extra `live`.
 
-/               the page
+/               the page, without data
 /run            the run, packed; ?designs=N&calls=M: only what is new since then
 /file           a design as text: ?design=N&format=urdf, mjcf or datasheet
-/events         the status of the study, as server-sent events
-/control        POST: pause, resume, stop, hint; with the page's token, from the page alone
+/events         the status of the study whenever it changes, as lines of JSON
+/control        POST: pause, resume, stop, hint; from the page alone
+
+All but the page need the server's key (request_guard.py).
 """
 
 import asyncio
@@ -16,21 +18,20 @@ from typing import Literal
 
 from pydantic import BaseModel, ValidationError
 from starlette.applications import Starlette
-from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from armwright.exceptions import ArmwrightError
-from armwright.files import replace_surrogates
 from armwright.report.live_run import LiveRun
-from armwright.report.page import render_page
-from armwright.report.request_guard import Guard, read_request
+from armwright.report.page import live_shell
+from armwright.report.request_guard import read_request
 from armwright.runs.control import add_hint, pause_study, resume_study, stop_study
 
 POLL = 0.25  # [s] between two checks of the run folder
-HEARTBEAT = 15.0  # [s] between events while nothing changes
+HEARTBEAT = 15.0  # [s] between lines while nothing changes
 MAX_BODY = 64 * 1024  # largest POST [bytes]
+LINES = "application/x-ndjson"
 
 
 class ControlRequest(BaseModel, frozen=True, extra="forbid"):
@@ -52,16 +53,14 @@ class OpenPages:
         self.is_closing = False  # whether the server is shutting down
 
 
-def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages: OpenPages) -> Starlette:
-    """Return the server's application.
+def live_app(folder: Path, pages: OpenPages) -> Starlette:
+    """Return the server's application, to be guarded.
 
     Args:
         folder: The run folder.
-        token: Required by requests that change anything.
-        is_allowed: Tells whether a Host header names this server; others are refused (DNS rebinding).
         pages: Counts the open pages.
     """
-    page = LivePage(folder, token, pages)
+    page = LivePage(folder, pages)
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncGenerator[None]:
@@ -69,37 +68,35 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         yield
         watching.cancel()
 
-    return Starlette(routes=page.routes(), middleware=[Middleware(Guard, is_allowed=is_allowed)], lifespan=lifespan)
+    return Starlette(routes=[Route("/", show_shell), *page.routes()], lifespan=lifespan)
+
+
+async def show_shell(request: Request) -> Response:
+    """Answer with the live page, without data."""
+    return Response(live_shell(), media_type="text/html; charset=utf-8")
 
 
 class LivePage:
-    """The page of a run folder, and its requests.
+    """The requests of the page of a run folder.
 
     Args:
         folder: The run folder.
-        token: Required by requests that change anything.
         pages: Counts the open pages.
     """
 
-    def __init__(self, folder: Path, token: str, pages: OpenPages) -> None:
+    def __init__(self, folder: Path, pages: OpenPages) -> None:
         self._folder = folder
-        self._token = token
         self._pages = pages
         self._run = LiveRun(folder)
 
     def routes(self) -> list[Route]:
         """Return the routes below the page's address."""
         return [
-            Route("/", self.page),
             Route("/run", self.packed),
             Route("/file", self.file),
             Route("/events", self.events, methods=["GET"]),
             Route("/control", self.control, methods=["POST"]),
         ]
-
-    async def page(self, request: Request) -> Response:
-        title = replace_surrogates(f"{self._folder.resolve().name}: armwright, live")
-        return Response(render_page(title, token=self._token), media_type="text/html; charset=utf-8")
 
     async def packed(self, request: Request) -> Response:
         designs, calls = (_natural(request, name) or 0 for name in ("designs", "calls"))
@@ -123,11 +120,11 @@ class LivePage:
 
     async def events(self, request: Request) -> Response:
         if request.method == "HEAD":  # the stream would never end
-            return Response(media_type="text/event-stream")
-        return StreamingResponse(self._statuses(), media_type="text/event-stream")
+            return Response(media_type=LINES)
+        return StreamingResponse(self._statuses(), media_type=LINES)
 
     async def control(self, request: Request) -> Response:
-        body = await read_request(request, self._token, MAX_BODY)
+        body = await read_request(request, MAX_BODY)
         if isinstance(body, Response):
             return body
         try:
@@ -156,7 +153,7 @@ class LivePage:
             await asyncio.sleep(POLL)
 
     async def _statuses(self) -> AsyncGenerator[str]:
-        """Yield the status as an event whenever it changes, and at intervals while it does not."""
+        """Yield the status as a line whenever it changes, and at intervals while it does not."""
         self._pages.count += 1
         self._pages.were_open = True
         sent, since = None, 0.0
@@ -165,7 +162,7 @@ class LivePage:
                 now = asyncio.get_running_loop().time()
                 if self._run.status != sent or now - since > HEARTBEAT:
                     sent, since = self._run.status, now
-                    yield f"event: status\ndata: {json.dumps(sent)}\n\n"
+                    yield f"{json.dumps(sent)}\n"
                 await asyncio.sleep(POLL)
         finally:
             self._pages.count -= 1

@@ -98,6 +98,7 @@ class LiveRun:
         n_init = 0 if study is None else study.n_init
         used = used_hints(calls)  # proposals, named PROPOSER-NUMBER, by hint
         return {
+            "name": self.folder.resolve().name,
             "run": f"{self._server}-{self._run}",
             "doing": doing,
             "since": 0.0 if status is None else status.since,

@@ -10,7 +10,7 @@ import secrets
 import socket
 import subprocess
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
@@ -38,7 +38,7 @@ def serve(
 
     Args:
         folder: The run folder.
-        tell: Called with the page's address once it can be opened.
+        tell: Called with the page's address, which holds the key, once it can be opened.
         host: Address to listen on.
         port: Port to listen on; 0 for any free one.
         study: A pipe that closes when the study's process ends; the server then ends as soon as no page is open.
@@ -50,22 +50,24 @@ def serve(
     check_extra("live", "the live page")
     from armwright.report.live_app import OpenPages, live_app
 
-    pages, token = OpenPages(), secrets.token_urlsafe(24)
-    serve_app(lambda is_allowed, _: live_app(folder, token, is_allowed, pages), pages, tell, host, port, study)
+    pages = OpenPages()
+    serve_app(live_app(folder, pages), {"/"}, pages, tell, host, port, study)
 
 
 def serve_app(
-    make_app: Callable[[Callable[[str], bool], int], "Starlette"],
+    app: "Starlette",
+    shells: Collection[str],
     pages: "OpenPages",
     tell: Callable[[str], None],
     host: str,
     port: int,
     study: BinaryIO | None = None,
 ) -> None:
-    """Serve an application as `serve` does.
+    """Serve an application as `serve` does, behind a guard with a key of 192 bits.
 
     Args:
-        make_app: Called with the check of Host headers and the port.
+        app: The application.
+        shells: The paths of its pages, which need no key.
         pages: Counts the open pages.
         tell: As in `serve`, like the rest.
         host: Address.
@@ -74,17 +76,23 @@ def serve_app(
     """
     import uvicorn
 
-    listener = _listen(host, port)
+    from armwright.report.request_guard import Guard
+
+    listener, key = _listen(host, port), secrets.token_urlsafe(24)
     port = listener.getsockname()[1]
-    app = make_app(_hosts(host, listener), port)
     settings = uvicorn.Config(
-        app, log_config=None, access_log=False, lifespan="on", timeout_graceful_shutdown=1, server_header=False
-    )
+        Guard(app, key, shells, _hosts(host, listener)), log_config=None, access_log=False,
+        log_level="error",  # a client's invalid requests are not news
+        lifespan="on", timeout_graceful_shutdown=1, server_header=False,
+        proxy_headers=False,  # any user of this machine can send X-Forwarded-Proto and -For
+        ws="none",
+    )  # fmt: skip
 
     class Server(uvicorn.Server):
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
-            tell(f"http://{f'[{host}]' if ':' in host else host}:{port}/")  # from here on Ctrl-C ends it in order
+            # From here on Ctrl-C ends it in order.
+            tell(f"http://{f'[{host}]' if ':' in host else host}:{port}/#key={key}")
 
     server = Server(settings)
     is_alone = threading.Event()

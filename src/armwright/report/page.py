@@ -6,7 +6,7 @@ from pathlib import Path
 
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, replace_file
-from armwright.report.page_assembly import PageSource, assemble, token_tag
+from armwright.report.page_assembly import PageSource, assemble
 from armwright.report.page_content import RunContent
 from armwright.runs.results import REPORT
 
@@ -21,15 +21,15 @@ def write_report(folder: str | Path) -> Path:
         raise RunFolderError(f"{folder} has no finished trial yet, so there is nothing to report")
     data = base64.b64encode(zlib.compress(content.packed(), 6)).decode()
     task = content.config.task.name
-    page = render_page(f"{task}, seed {content.config.seed}: armwright", data=data)
+    holder = f'<script type="text/plain" id="content">{data}</script>'
+    title = f"{task}, seed {content.config.seed}: armwright"
+    page = assemble(PAGE, title, connects=False, values={"data": holder})
     path = folder / REPORT
     with naming_write_errors(path, "; the trials are safe"):
         replace_file(path, page.encode())
     return path
 
 
-def render_page(title: str, data: str = "", token: str = "") -> str:
-    """Return the page's HTML: with embedded data, or live with the token for its requests."""
-    holder = f'<script type="text/plain" id="content">{data}</script>' if data else ""
-    values = {"data": holder, "token": token_tag(token) if token else ""}
-    return assemble(PAGE, title, connects=bool(token), values=values)
+def live_shell() -> str:
+    """Return the HTML of the live page, which fetches its data."""
+    return assemble(PAGE, "armwright, live", connects=True, values={"data": ""})

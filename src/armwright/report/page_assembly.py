@@ -68,11 +68,6 @@ def assemble(source: PageSource, title: str, connects: bool, values: Mapping[str
     return re.sub(r"\{\{ (\w+) \}\}", lambda found: given[found[1]], source.read(source.template))
 
 
-def token_tag(token: str) -> str:
-    """Return the HTML that gives a page the token for its requests."""
-    return f'<meta name="armwright-token" content="{html.escape(token)}">'
-
-
 @cache
 def program(source: PageSource) -> str:
     """Return the page's modules as one script, each in its own function, in order of their imports."""

@@ -11,7 +11,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arrays import Array
+from armwright.arrays import Array, open_arrays
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.robot.urdf_writer import to_urdf
@@ -88,7 +88,7 @@ def fingerprint(arm: Arm | UrdfArm) -> str:
 def _read(file: Path) -> PageReachMap | None:
     """Return a map; None for a file that is damaged or too large to show."""
     try:
-        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
+        with open_arrays(file) as arrays:
             points, spacing = np.asarray(arrays["points"], dtype=np.float64), float(arrays["spacing"])
             shape = [int(n) for n in arrays["shape"]]
             is_grid = len(shape) == 3 and min(shape) > 0 and points.shape == (math.prod(shape), 3)

@@ -1,13 +1,19 @@
-"""What the local servers refuse, and the headers of all their responses."""
+"""What the local servers refuse, and the headers of all their responses.
+
+Other users of this machine can connect to a port, but do not know the key of its server. It is in the fragment of the
+address that the terminal shows, which browsers do not send. The page (page/key.js) keeps it in the storage of its tab,
+which belongs to one port, and sends it as a header. A cookie would reach the servers of other users on other ports.
+"""
 
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
+KEY_HEADER = "x-armwright-key"
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -19,45 +25,56 @@ HEADERS = {
 
 
 class Guard:
-    """Refuse requests for other hosts, and add the security headers to every response.
+    """Refuse requests for other hosts and without the key, and add the security headers to every response.
 
     Args:
         app: The guarded application.
+        key: The key of the server.
+        shells: The paths of pages, which hold no data and need no key.
         is_allowed: Tells whether a Host header names this server; others are refused (DNS rebinding).
     """
 
-    def __init__(self, app: Any, is_allowed: Callable[[str], bool]) -> None:
+    def __init__(self, app: Any, key: str, shells: Collection[str], is_allowed: Callable[[str], bool]) -> None:
         self._app = app
+        self._key = key.encode()
+        self._shells = shells
         self._is_allowed = is_allowed
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-
         async def send_with_headers(message: Any) -> None:
             if message["type"] == "http.response.start":
                 MutableHeaders(scope=message).update(HEADERS)
             await send(message)
 
-        hosts = Headers(scope=scope).getlist("host")
-        app = self._app
+        match scope["type"]:
+            case "http":
+                await (self._refusal(scope) or self._app)(scope, receive, send_with_headers)
+            case "lifespan":
+                await self._app(scope, receive, send)
+            case _:  # no page opens a WebSocket
+                await send({"type": "websocket.close"})
+
+    def _refusal(self, scope: Any) -> Response | None:
+        headers = Headers(scope=scope)
+        hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._is_allowed(hosts[0]):  # with two, a proxy might use the other one
-            app = PlainTextResponse("unknown host; use the address that the server printed", 421)
-        await app(scope, receive, send_with_headers)
+            return PlainTextResponse("unknown host; use the address that the server printed", 421)
+        if scope["path"] in self._shells or secrets.compare_digest(headers.get(KEY_HEADER, "").encode(), self._key):
+            return None
+        return PlainTextResponse("the key is missing or wrong; use the address that the server printed", 403)
 
 
-async def read_request(request: Request, token: str, limit: int) -> bytes | Response:
+async def read_request(request: Request, limit: int) -> bytes | Response:
     """Return the body of a POST of the page itself, or the refusal of any other.
 
     Args:
         request: The request.
-        token: The token that only the page knows.
         limit: Largest body [bytes].
     """
-    refusal = _refusal(request, token)
-    if refusal is not None:
-        return refusal
+    if request.headers.get("origin", "") != f"{request.url.scheme}://{request.headers.get('host', '')}":
+        return PlainTextResponse("only the page itself may send this", status_code=403)
+    if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
+        return PlainTextResponse("expected application/json", status_code=415)
     body = b""
     try:
         async for part in request.stream():
@@ -67,15 +84,3 @@ async def read_request(request: Request, token: str, limit: int) -> bytes | Resp
     except ClientDisconnect:
         return Response(status_code=400)  # nobody receives it
     return body
-
-
-def _refusal(request: Request, token: str) -> Response | None:
-    """Return why a request may not change anything; None if it may."""
-    if not secrets.compare_digest(request.headers.get("x-armwright-token", "").encode(), token.encode()):
-        return PlainTextResponse("the token of the page is missing or wrong; reload the page", status_code=403)
-    origin = request.headers.get("origin", "")
-    if origin != f"{request.url.scheme}://{request.headers.get('host', '')}":
-        return PlainTextResponse("only the page itself may send this", status_code=403)
-    if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        return PlainTextResponse("expected application/json", status_code=415)
-    return None

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeVar
 
-from filelock import FileLock
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from armwright.exceptions import SettingsError
-from armwright.files import naming_write_errors, replace_file, replace_surrogates
+from armwright.files import naming_write_errors, read_bytes, replace_file, replace_surrogates
+from armwright.runs.private_lock import private_lock
 
 CONTROL = "control.json"
 STATUS = "status.json"
@@ -171,7 +171,7 @@ class Channel:
 
 def _change(folder: Path, change: Callable[[Control], Control]) -> Control:
     """Replace the request by the result of `change`."""
-    with naming_write_errors(folder / CONTROL), FileLock(folder / LOCK, timeout=LOCK_SECONDS):
+    with naming_write_errors(folder / CONTROL), private_lock(folder / LOCK, LOCK_SECONDS):
         control = change(read_control(folder))
         replace_file(folder / CONTROL, control.model_dump_json().encode())
     return control
@@ -180,8 +180,6 @@ def _change(folder: Path, change: Callable[[Control], Control]) -> Control:
 def _read(path: Path, schema: type[Content]) -> Content | None:
     """Return the content of a file that another process wrote; None if it is missing or damaged."""
     try:
-        if not path.is_file() or path.stat().st_size > MAX_FILE_SIZE:
-            return None
-        return schema.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError):
+        return schema.model_validate_json(read_bytes(path, MAX_FILE_SIZE, ValueError)) if path.is_file() else None
+    except ValueError:  # includes pydantic's
         return None

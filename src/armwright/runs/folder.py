@@ -21,21 +21,23 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from filelock import FileLock, Timeout
+from filelock import BaseFileLock, Timeout
 
 from armwright.exceptions import RunConflictError, RunFolderError
-from armwright.files import check_no_links, is_part, naming_write_errors, open_to_append, replace_file
+from armwright.files import check_no_links, is_part, naming_write_errors, open_to_append, read_text, replace_file
 from armwright.problem.evaluators import Evaluator
 from armwright.runs.config import Method, RunConfig, check_same_run, versions
 from armwright.runs.control import CHANNEL_FILES
 from armwright.runs.history import History
+from armwright.runs.private_lock import private_lock
 from armwright.runs.trial import FinishedTrial, trial_line
-from armwright.runs.trials_file import TRIALS, read_trials
-from armwright.yaml_documents import dump_document, parse_document
+from armwright.runs.trials_file import TRIALS, count_trials, read_trials
+from armwright.yaml_documents import MAX_BYTES, dump_document, parse_document
 
 LOCK = ".lock"  # locked by the process that writes; the system releases the lock of a dead process
 LOCK_SECONDS = 2.0  # to wait for it: the workers of a killed experiment take a moment to end
 CONFIG = "config.yaml"
+MAX_CONFIG = 4 * MAX_BYTES  # [bytes]; a task and a space with all their defaults
 KEPT = ". What was written before is safe; free room or give another --out DIR, and run the same command again"
 PROPOSALS = "proposals"
 SEARCH = "search.npz"
@@ -48,7 +50,7 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._lock = FileLock(path / LOCK)
+        self._lock: BaseFileLock | None = None
         self._stat: os.stat_result | None = None
         self._trials: FileIO | None = None
 
@@ -57,8 +59,9 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
         check_no_links(self.path)
         with naming_write_errors(self.path / LOCK, KEPT):
+            self._lock = private_lock(self.path / LOCK, LOCK_SECONDS)
             try:
-                self._lock.acquire(timeout=LOCK_SECONDS)
+                self._lock.acquire()
             except Timeout as fault:
                 raise RunFolderError(
                     f"{self.path} is in use by another armwright process; wait for it, or give another --out DIR"
@@ -72,7 +75,8 @@ class RunFolder:
         if self._trials is not None:
             self._trials.close()
             self._trials = None
-        self._lock.release()
+        if self._lock is not None:
+            self._lock.release()
 
     def adopt(self, config: RunConfig) -> RunConfig:
         """Return the folder's configuration: `config` for a folder without trials, or for one whose run it extends.
@@ -80,14 +84,14 @@ class RunFolder:
         Raises:
             RunConflictError: The folder holds a run with other settings, or other files.
         """
-        if not (self.path / SEARCH).exists() and not self._n_trials():
+        if not (self.path / SEARCH).exists() and not count_trials(self.path / TRIALS):
             self._check_free()
             self.write_config(config)
             return config
         stored = read_config(self.path)
         check_same_run(self.path, stored, config)
         if config.method != stored.method:  # a larger n_total
-            if self._n_trials() > stored.study.n_trials:
+            if count_trials(self.path / TRIALS) > stored.study.n_trials:
                 raise RunConflictError(
                     f"{self.path} was refined, so its study cannot resume; give another --out DIR, or refine it again"
                 )
@@ -103,10 +107,6 @@ class RunFolder:
             config = config.model_copy(update={"versions": now, "earlier_versions": earlier})
             self.write_config(config)
         return config
-
-    def _n_trials(self) -> int:
-        trials = self.path / TRIALS
-        return trials.read_bytes().count(b"\n") if trials.is_file() else 0
 
     def _check_free(self) -> None:
         """Raise RunConflictError if the folder holds other files than those of a run without trials."""
@@ -181,7 +181,9 @@ def is_held(folder: Path) -> bool:
     import fcntl
 
     try:
-        lock = os.open(folder / LOCK, os.O_RDONLY)
+        lock = os.open(folder / LOCK, os.O_RDONLY | os.O_NONBLOCK)  # a pipe has no writer
+    except PermissionError:  # another user's run, whose status.json is all that is known of it
+        return True
     except OSError:
         return False
     try:
@@ -198,11 +200,9 @@ def read_config(path: Path) -> RunConfig:
     file = path / CONFIG
     check_no_links(path)
     try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as fault:
-        raise RunFolderError(
-            f"{path} is not a run folder: cannot read {CONFIG} ({fault}); restore it, or give another folder"
-        ) from fault
+        text = read_text(file, MAX_CONFIG, RunFolderError)
+    except RunFolderError as fault:
+        raise RunFolderError(f"{path} is not a run folder: {fault}; restore it, or give another folder") from fault
     try:
         return parse_document(text, RunConfig, RunFolderError, str(file))
     except RunFolderError as fault:

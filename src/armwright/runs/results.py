@@ -16,7 +16,7 @@ from pydantic_core import to_jsonable_python
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
-from armwright.files import naming_write_errors, replace_folder, to_csv
+from armwright.files import MAX_DERIVED, naming_write_errors, read_text, replace_folder, to_csv
 from armwright.pareto import hypervolume
 from armwright.problem.failure import FAILURE_KINDS
 from armwright.runs.assumptions import assumed_values
@@ -111,8 +111,8 @@ def discard_results(path: Path) -> None:
 def read_summary(path: Path) -> dict[str, Any] | None:
     """Return the summary of a run folder; None if the run has not ended or the file is damaged."""
     try:
-        return parse_summary((path / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        return parse_summary(read_text(path / SUMMARY, MAX_DERIVED, ValueError))
+    except (ValueError, RecursionError):
         return None
 
 

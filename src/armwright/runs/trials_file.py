@@ -3,10 +3,12 @@
 import os
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from pydantic import ValidationError
 
 from armwright.exceptions import DesignError, RunFolderError
+from armwright.files import read_records
 from armwright.runs.config import RunConfig
 from armwright.runs.trial import FinishedTrial, parse_trial
 
@@ -16,12 +18,20 @@ TRIALS = "trials.jsonl"
 def read_trials(path: Path, config: RunConfig) -> tuple[list[FinishedTrial], int]:
     """Read the trials of a file, and its length [bytes] without a truncated last line."""
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            return _parse_trials(file, 0, path, config)
     except FileNotFoundError:
         return [], 0
     except OSError as fault:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    return _parse_trials(content, 0, path, config)
+
+
+def count_trials(path: Path) -> int:
+    """Return the number of lines of a file, which are not read as trials; 0 without a file."""
+    if not path.is_file():
+        return 0
+    with path.open("rb") as file:
+        return sum(1 for _ in read_records(file, path))
 
 
 class TrialsReader:
@@ -41,7 +51,7 @@ class TrialsReader:
             is_same, self._inode = status.st_ino == self._inode, status.st_ino
             if is_same and status.st_size >= self._length:
                 file.seek(self._length)
-                new, length = _parse_trials(file.read(), len(self.trials), self._path, self._config)
+                new, length = _parse_trials(file, len(self.trials), self._path, self._config)
                 self.trials = [*self.trials, *new]
                 self._length += length
                 return False
@@ -50,11 +60,12 @@ class TrialsReader:
         return had_trials
 
 
-def _parse_trials(content: bytes, first: int, path: Path, config: RunConfig) -> tuple[list[FinishedTrial], int]:
+def _parse_trials(file: BinaryIO, first: int, path: Path, config: RunConfig) -> tuple[list[FinishedTrial], int]:
     """Parse the trials from number `first` on, and the length [bytes] without a truncated last line."""
-    end = content.rfind(b"\n") + 1
+    end = 0
     trials: list[FinishedTrial] = []
-    for number, line in enumerate(content[:end].split(b"\n")[:-1], start=first):
+    for number, line in enumerate(read_records(file, path), start=first):
+        end += len(line) + 1
         try:
             trials.append(parse_trial(line, number, config))
         except (ValueError, DesignError) as fault:

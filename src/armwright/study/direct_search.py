@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, open_arrays
 from armwright.exceptions import MissingExtraError, RunFolderError, SettingsError
 from armwright.kinematics.ik import MANY_ARMS
 from armwright.pareto import PENALTY
@@ -188,7 +188,7 @@ class DirectSearch:
         if not path.exists():
             return
         try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as state:
+            with open_arrays(path) as state:
                 self.search.restore(state)
                 self.seconds = float(state["seconds"])
                 self.ended_after = float(state["ended_after"])

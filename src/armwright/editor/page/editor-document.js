@@ -1,11 +1,11 @@
 // The texts of the two files, which are the only state of the page: a change in a form is a change of the text.
 
 import { $ } from "./format.js";
+import { post } from "./key.js";
 
 const PAUSE = 300; // [ms] without a key before typed text is assessed
 const MOST_UNDONE = 200; // changes that can be undone
 
-const token = document.querySelector("meta[name=armwright-token]").content;
 let listener = () => {};
 let typing = null;
 let last = Promise.resolve(); // requests follow one another
@@ -24,13 +24,11 @@ export const opened = {
 export async function ask(path, content) {
   let reply = null;
   try {
-    reply = await fetch(path, {
-      method: "POST", headers: { "content-type": "application/json", "x-armwright-token": token }, body: JSON.stringify(content),
-    });
-  } catch {
+    reply = await post(path, content);
+  } catch (fault) {
+    if (fault.status) throw fault;
     throw new Error("The editor does not answer. Is `armwright edit` still running in the terminal?");
   }
-  if (!reply.ok) throw Object.assign(new Error(await reply.text()), { status: reply.status });
   return reply.status === 204 ? null : reply.json();
 }
 

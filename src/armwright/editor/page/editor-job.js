@@ -2,6 +2,7 @@
 
 import { ask, complain, design, opened } from "./editor-document.js";
 import { $, duration } from "./format.js";
+import { request, withKey } from "./key.js";
 
 const EVERY = 500; // [ms] between two questions
 const LEAST = 5; // [s] of a budget
@@ -11,6 +12,7 @@ export function openJob() {
   $("budget").addEventListener("keydown", (event) => {
     if (event.key === "Enter") start();
   });
+  $("job-page").href = withKey("run/");
   $("job-stop").addEventListener("click", () => ask("stop", {}).catch((fault) => complain(fault.message)));
   look();
 }
@@ -33,8 +35,9 @@ async function start() {
 async function look() {
   let job = null;
   try {
-    job = await (await fetch("job")).json();
-  } catch {
+    job = await (await request("job")).json();
+  } catch (fault) {
+    if (fault.status) complain(fault.message);
     setTimeout(look, 4 * EVERY);
     return;
   }

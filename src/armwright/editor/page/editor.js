@@ -5,6 +5,7 @@ import { drawForms, openForms } from "./editor-forms.js";
 import { openJob } from "./editor-job.js";
 import { drawScene, openScene, targetPlaces } from "./editor-scene.js";
 import { $, element, plural } from "./format.js";
+import { openKey, request } from "./key.js";
 
 function draw() {
   const field = $("text"), { assessed, texts, shown } = opened;
@@ -51,7 +52,9 @@ function listenToKeys() {
 
 async function start() {
   try {
-    const reply = await (await fetch("opened")).json();
+    openKey();
+    const reply = await (await request("opened")).json();
+    document.title = `${reply.files.task}: armwright`;
     $("title").textContent = reply.files.task;
     openForms(reply.choices);
     openScene();

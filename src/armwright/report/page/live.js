@@ -1,36 +1,30 @@
 // The page of a run in progress: fetches new content from its server, and sends requests of the user.
 
 import { $, duration, element, plural } from "./format.js";
+import { openKey, post, request } from "./key.js";
 
 const AGAIN = 1000; // [ms] between attempts to reach a lost server
 
 let content = null;
 let take = null;
-let token = "";
 let status = null;
 let beside = null; // state of the reach maps and existing arms that the page shows
 let busy = false, behind = false, lost = false;
 
 // Fetches the part of the run that the page lacks.
 async function fetchRun() {
-  const reply = await fetch(`run?designs=${content.n}&calls=${content.calls.length}`);
-  if (!reply.ok) throw new Error(await reply.text());
-  return reply.arrayBuffer();
+  return (await request(`run?designs=${content.n}&calls=${content.calls.length}`)).arrayBuffer();
 }
 
 // Fetches the file of a design that the page does not hold; null offline.
 export function fileFetcher() {
   if ($("content")) return null;
-  return async (design, format) => {
-    const reply = await fetch(`file?design=${design}&format=${format}`);
-    if (!reply.ok) throw new Error(await reply.text());
-    return reply.text();
-  };
+  return async (design, format) => (await request(`file?design=${design}&format=${format}`)).text();
 }
 
 export function openLive(shownContent, taken) {
   [content, take] = [shownContent, taken];
-  token = document.querySelector("meta[name=armwright-token]").content;
+  openKey();
   $("live").hidden = false;
   $("loading").textContent = "The first designs are being evaluated …";
   $("pause").addEventListener("click", () => send({ action: status?.paused ? "resume" : "pause" }));
@@ -46,30 +40,55 @@ export function openLive(shownContent, taken) {
   setInterval(show, 1000); // updates the elapsed seconds
 }
 
-let events = null;
+let listening = new AbortController();
 
-function listenTo() {
-  events?.close();
-  events = null;
+// Follows the status while the tab is visible; not by an EventSource, which cannot send the key.
+async function listenTo() {
+  listening.abort();
   if (document.hidden) return;
-  events = new EventSource("events"); // reconnects automatically
-  events.addEventListener("status", (event) => {
-    lost = false;
-    const before = status;
-    status = JSON.parse(event.data);
-    if (before !== null && before.run !== status.run) { // another run in this folder, or at this address
-      location.reload();
-      return;
+  listening = new AbortController();
+  const { signal } = listening;
+  while (!signal.aborted) {
+    try {
+      // Out of this function, so that no fault of the page is taken for a lost connection.
+      await readLines(await request("events", { signal }), (line) => queueMicrotask(() => takeStatus(JSON.parse(line))));
+    } catch (fault) {
+      if (signal.aborted) return;
+      if (fault.status === 403) {
+        $("loading").textContent = `This page cannot be shown: ${fault.message}`;
+        complain("refusal", fault.message);
+        return;
+      }
     }
-    show();
-    const isNews = status.designs !== content.n || status.calls !== content.calls.length
-      || status.finished !== content.head?.result.finished || status.beside !== beside;
-    if (isNews && (status.designs || content.n)) catchUp();
-  });
-  events.addEventListener("error", () => {
     lost = true;
     show();
-  });
+    await new Promise((next) => setTimeout(next, AGAIN));
+  }
+}
+
+async function readLines(reply, listener) {
+  const reader = reply.body.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = "";
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    const lines = (rest + part.value).split("\n");
+    rest = lines.pop();
+    lines.forEach(listener);
+  }
+}
+
+function takeStatus(news) {
+  lost = false;
+  const before = status;
+  status = news;
+  if (before !== null && before.run !== status.run) { // another run in this folder
+    location.reload();
+    return;
+  }
+  document.title = `${status.name}: armwright, live`;
+  show();
+  const isNews = status.designs !== content.n || status.calls !== content.calls.length
+    || status.finished !== content.head?.result.finished || status.beside !== beside;
+  if (isNews && (status.designs || content.n)) catchUp();
 }
 
 async function catchUp() {
@@ -83,8 +102,8 @@ async function catchUp() {
   try {
     news = await fetchRun();
     beside = fetched;
-  } catch {
-    setTimeout(catchUp, AGAIN);
+  } catch (fault) {
+    if (fault.status !== 403) setTimeout(catchUp, AGAIN);
   }
   busy = false;
   if (news !== null) take(news);
@@ -94,15 +113,13 @@ async function catchUp() {
   }
 }
 
-async function send(request) {
+async function send(action) {
   try {
-    const reply = await fetch("control", {
-      method: "POST", headers: { "content-type": "application/json", "x-armwright-token": token }, body: JSON.stringify(request),
-    });
-    complain("refusal", reply.ok ? "" : `Refused: ${await reply.text()}.`);
-    return reply.ok;
-  } catch {
-    complain("refusal", "The request did not reach the server.");
+    await post("control", action);
+    complain("refusal", "");
+    return true;
+  } catch (fault) {
+    complain("refusal", fault.status ? `Refused: ${fault.message}` : "The request did not reach the server.");
     return false;
   }
 }

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import SettingsError
+from armwright.files import MAX_DERIVED, read_text
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import BACKLASH_ERROR, CYCLE_TIME, DEFLECTION, PRICE, WORST_ERROR
@@ -106,9 +107,9 @@ def _verdict(run: Path, number: int, records: Sequence[Mapping[str, Any]]) -> Ve
         first, roles = records[0], ", ".join(one["role"] for one in records)
         return Verdict(roles, first["status"], "" if first["survival"] is None else first["survival"]["verdict"])
     try:
-        simulated = json.loads((run / SIMULATION).read_text(encoding="utf-8"))["designs"]
+        simulated = json.loads(read_text(run / SIMULATION, MAX_DERIVED, ValueError))["designs"]
         status = next((str(one["verdict"]) for one in simulated if one["design"] == number), NOT_SIMULATED)
-    except (OSError, ValueError, LookupError, TypeError):  # none, or a damaged file
+    except (ValueError, LookupError, TypeError):  # none, or a damaged file
         status = NOT_SIMULATED
     return Verdict(status=f"{status}; not among the recommended designs")
 

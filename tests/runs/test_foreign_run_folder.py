@@ -1,0 +1,157 @@
+"""Run folders that others made or can read: huge files are not read whole, and locks are the owner's alone."""
+
+import fcntl
+import json
+import os
+import shutil
+import tracemalloc
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from armwright import arrays, files
+from armwright.exceptions import RunFolderError
+from armwright.experiments.compare_arms import read_existing_arms
+from armwright.experiments.run_list import list_runs
+from armwright.llm.transcript import Transcript
+from armwright.problem.problem import Problem
+from armwright.report.page import write_report
+from armwright.runs.control import add_hint, read_control, read_status
+from armwright.runs.datasheet.design_sheet import design_sheet
+from armwright.runs.folder import RunFolder, is_held, read_run
+from armwright.runs.results import read_summary
+from armwright.study.front_run import find_front
+from armwright.study.study import optimize
+from armwright.tasks.catalogue import load_task
+
+HUGE = 3 * 1024**3  # [bytes] of zeros, which take no room on the disk
+MOST = 400 * 1024**2  # [bytes] of memory at once
+READERS: dict[str, Callable[[Path], object]] = {
+    "config.yaml": read_run,
+    "trials.jsonl": read_run,
+    "transcripts.jsonl": lambda run: Transcript(run / "transcripts.jsonl", read_only=True),
+    "summary.json": read_summary,
+    "existing_arms.json": lambda run: read_existing_arms(run, 2),
+    "simulation.json": lambda run: design_sheet(run, 0),
+    "control.json": read_control,
+    "status.json": read_status,
+}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("finished") / "run"
+    optimize(Problem(load_task("target-1")), proposer="rules", n_init=3, n_step=2, n_total=2, out=folder)
+    return folder
+
+
+@pytest.fixture
+def run(finished: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(finished, tmp_path / "run"))
+
+
+@pytest.fixture
+def memory() -> Iterator[None]:
+    """Fail if the test takes more memory than MOST at any time."""
+    tracemalloc.start()
+    yield
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < MOST, f"{peak // 1024**2} MiB"
+
+
+@pytest.mark.usefixtures("memory")
+@pytest.mark.parametrize("name", READERS)
+def test_huge_files_are_not_read_whole(run: Path, name: str) -> None:
+    with (run / name).open("wb") as file:
+        file.truncate(HUGE)
+    with suppress(RunFolderError):
+        READERS[name](run)
+    list_runs([run])
+    with suppress(RunFolderError):
+        write_report(run)
+
+
+def test_trials_and_calls_are_refused_beyond_their_limits(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    trials = run / "trials.jsonl"
+    lines = trials.read_bytes().splitlines(keepends=True)
+    monkeypatch.setattr(files, "MAX_RECORDS", sum(map(len, lines)))
+    monkeypatch.setattr(files, "MAX_LINE", max(map(len, lines)))
+    assert len(read_run(run)[1]) == len(lines)
+    for limit in ("MAX_RECORDS", "MAX_LINE"):
+        with monkeypatch.context() as patch:
+            patch.setattr(files, limit, getattr(files, limit) - 1)
+            with pytest.raises(RunFolderError, match=r"trials\.jsonl: expected at most .* MiB of "):
+                read_run(run)
+            assert list_runs([run])[0]["state"] in ("finished", "damaged trials.jsonl")
+
+
+def test_arrays_that_unpack_to_more_than_a_limit_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "run"
+    find_front(Problem(load_task("target-1")), evaluations=200, out=folder)
+    file = folder / "search.npz"
+    with zipfile.ZipFile(file) as packed:
+        size = sum(entry.file_size for entry in packed.infolist())
+    monkeypatch.setattr(arrays, "MAX_ARRAYS", size)
+    find_front(Problem(load_task("target-1")), evaluations=200, out=folder)
+    monkeypatch.setattr(arrays, "MAX_ARRAYS", size - 1)
+    with pytest.raises(RunFolderError, match=r"search\.npz is damaged \(expected arrays of at most"):
+        find_front(Problem(load_task("target-1")), evaluations=200, out=folder)
+
+
+def mode(path: Path) -> int:
+    return path.stat().st_mode & 0o777
+
+
+@pytest.mark.parametrize("before", [None, 0o644, 0o666])
+def test_no_other_user_can_open_the_locks_of_a_run(run: Path, before: int | None) -> None:
+    locks = [run / ".lock", run / ".control.lock"]
+    for lock in locks:
+        lock.unlink(missing_ok=True)
+        if before is not None:
+            lock.touch()
+            lock.chmod(before)
+    mask = os.umask(0)
+    try:
+        with RunFolder(run):
+            add_hint(run, "a hint")
+            assert [mode(lock) for lock in locks] == [0o600, 0o600]
+            assert is_held(run)
+    finally:
+        os.umask(mask)
+    assert not is_held(run)
+
+
+def test_a_lock_that_somebody_opened_before_is_waited_for(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armwright.runs.folder.LOCK_SECONDS", 0.01)
+    lock = run / ".lock"
+    lock.chmod(0o644)
+    with lock.open("rb") as opened:
+        fcntl.flock(opened, fcntl.LOCK_SH)
+        with pytest.raises(RunFolderError, match="is in use by another"), RunFolder(run):
+            pass
+    monkeypatch.undo()
+    with RunFolder(run):
+        assert mode(lock) == 0o600
+
+
+def test_a_lock_of_another_user_counts_as_held(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def deny(*_: object) -> int:
+        raise PermissionError
+
+    monkeypatch.setattr("armwright.runs.folder.os.open", deny)
+    assert is_held(run)
+
+
+def test_a_lock_that_is_a_link_leaves_its_target_as_it_is(run: Path, tmp_path: Path) -> None:
+    target = tmp_path / "mine"
+    target.touch(0o644)
+    (run / ".lock").unlink()
+    (run / ".lock").symlink_to(target)
+    with pytest.raises(RunFolderError, match="is a link"), RunFolder(run):
+        pass
+    assert mode(target) == 0o644
+    assert json.loads((run / "status.json").read_text())["doing"] == "finished"
