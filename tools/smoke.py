@@ -113,7 +113,6 @@ def main(folder: Path) -> None:
     assert all(ET.parse(urdf).getroot().tag == "robot" for urdf in urdfs)
     assert "is finished" in armwright("optimize", "target-1", "--seed", "0", "--out", "run").stdout
     armwright("report", "run")
-    armwright("refine", "run", "--evaluations", "100")
     armwright("pick", "run", "--by", "torque")
     for kind in FORMATS:
         armwright("export", "run", "--format", kind, "--out", f"out/{kind}")

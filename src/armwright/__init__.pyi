@@ -48,7 +48,6 @@ from .study.cluster import Workers as Workers
 from .study.direct_search import FrontRun as FrontRun
 from .study.front_run import find_front as find_front
 from .study.progress import StudyResult as StudyResult
-from .study.refine_run import refine_run as refine_run
 from .study.study import optimize as optimize
 from .tasks.catalogue import builtin_tasks as builtin_tasks, load_task as load_task, random_task as random_task
 from .tasks.task import Task as Task

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-SAMPLING, PROPOSING, REFINING = 1, 2, 3  # purposes of seeds within a run
+SAMPLING, PROPOSING = 1, 2  # purposes of seeds within a run
 
 
 def derived_seed(seed: int, *key: int) -> int:

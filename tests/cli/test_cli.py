@@ -193,7 +193,7 @@ def test_version_and_help() -> None:
     commands = re.findall(r"^│ ([a-z]+(?:-[a-z]+)*) ", shown, re.MULTILINE)
     assert commands == [
         *("init", "edit", "check", "tasks", "actuators", "draft"),
-        *("design", "optimize", "refine", "experiment"),
+        *("design", "optimize", "experiment"),
         *("pick", "export", "simulate", "datasheet", "reach-map", "compare", "compare-arms", "runs"),
         *("report", "live", "prompt", "doctor"),
     ]

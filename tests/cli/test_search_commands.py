@@ -1,4 +1,4 @@
-"""`design`, `refine` and `optimize --refine-every` on the command line."""
+"""`design` and `optimize` on the command line."""
 
 import json
 from pathlib import Path
@@ -10,11 +10,11 @@ from tests.support.command_line import armwright, refused
 
 
 @pytest.mark.slow
-def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> None:
+def test_design_continues_its_run_and_starts_from_another(in_folder: Path) -> None:
     done = armwright("design", "target-1", "--evaluations", "3000", "--seed", "4", "--no-figures")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    for words in ("of the best known hypervolume", "robust", "sensitive", "budget spent", "a toy"):
+    for words in ("of the best known hypervolume", "robust", "sensitive", "from other initial postures", "budget spent", "a toy"):
         assert words in done.stdout
     assert (in_folder / "runs" / "target-1-design-seed4" / "summary.json").is_file()
     more = armwright("design", "target-1", "--evaluations", "4000", "--seed", "4", "--no-figures", "--json")
@@ -23,17 +23,8 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
     assert summary["folder"] == "runs/target-1-design-seed4"
 
     armwright("optimize", "target-1", *SHORT, "--proposer", "none", "--out", "mine")
-    refined = armwright("refine", "mine", "--evaluations", "120")
-    assert refined.returncode == 0, refined.stderr
-    assert "improved designs" in refined.stdout
-    assert " refine " in refined.stdout
-    assert "from other initial postures" in refined.stdout
-    refined_summary = json.loads((in_folder / "mine" / "summary.json").read_text())
-    record = refined_summary["verification"]
-    assert record["robust"] + record["sensitive"] == refined_summary["front_size"]
     again = armwright("optimize", "target-1", *SHORT, "--proposer", "none", "--out", "mine")
     assert "is finished; nothing was computed again" in again.stdout
-
     from_run = armwright(
         "design", "target-1", "--evaluations", "300", "--from", "mine", "--no-figures", "--out", "from-run"
     )
@@ -41,28 +32,21 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
 
 
 @pytest.mark.slow
-def test_design_and_refine_draw_their_figures(in_folder: Path) -> None:
+def test_design_and_optimize_draw_their_figures(in_folder: Path) -> None:
     armwright("design", "target-1", "--evaluations", "1000", "--out", "front")
     armwright("optimize", "target-1", *SHORT, "--out", "mine")
-    armwright("refine", "mine", "--evaluations", "60")
     for folder in ("front", "mine"):
         drawn = {path.name for path in (in_folder / folder / "figures").iterdir()}
         assert {"hypervolume.png", "front.png", "arms.pdf"} <= drawn
 
 
 @pytest.mark.slow
-def test_robust_and_refine_every(in_folder: Path) -> None:
-    done = armwright(
-        "optimize", "target-1", *SHORT, "--robust", "--refine-every", "3", "--proposer", "none", "--out", "r", "--json"
-    )
+def test_robust_run_is_resumed_by_a_robust_command_only(in_folder: Path) -> None:
+    done = armwright("optimize", "target-1", *SHORT, "--robust", "--proposer", "none", "--out", "r", "--json")
     assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)
-    assert summary["evaluations"] > summary["n_trials"]
-    assert summary["front_gap"] is None
-    config = (in_folder / "r" / "config.yaml").read_text()
-    assert "tolerance: 0.001" in config
-    assert "refine_every: 3" in config
-    line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--refine-every", "3", "--out", "r")
+    assert json.loads(done.stdout)["front_gap"] is None
+    assert "tolerance: 0.001" in (in_folder / "r" / "config.yaml").read_text()
+    line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--out", "r")
     assert "tolerance: 0.001 stored, 0.0 requested" in line
 
 
@@ -109,8 +93,6 @@ def test_run_without_a_successful_evaluation_ends_with_an_error(in_folder: Path)
         (2, ("design", "target-1", "--proposer", "none"), "proposes no initial designs"),
         (2, ("design", "target-1", "--proposer", "rules", "--from", "x"), "use one of them"),
         (1, ("design", "target-1", "--from", "nothing"), "not a run folder"),
-        (2, ("optimize", "target-1", "--refine-every", "0"), "refine_every: expected"),
-        (1, ("refine", "nothing"), "not a run folder"),
     ],
 )
 def test_invalid_search_arguments_are_one_line(in_folder: Path, code: int, args: tuple[str, ...], words: str) -> None:
@@ -118,10 +100,9 @@ def test_invalid_search_arguments_are_one_line(in_folder: Path, code: int, args:
     assert not list(in_folder.glob("runs/*"))
 
 
-def test_optimize_and_refine_reject_a_design_run(in_folder: Path) -> None:
+def test_optimize_and_prompt_reject_a_design_run(in_folder: Path) -> None:
     done = armwright("design", "target-1", "--evaluations", "300", "--no-figures", "--out", "run", "--json")
     assert json.loads(done.stdout)["search"]["ended_by"] == "budget"
-    assert "not a study" in refused(1, "refine", "run")
     assert "holds a run with other settings" in refused(2, "optimize", "target-1", "--out", "run")
     assert "not a study" in refused(1, "prompt", "--after", "run")
     assert "to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:run", "--out", "other")

@@ -304,7 +304,7 @@ def test_failing_cell_is_reported_and_others_continue(in_folder: Path) -> None:
 def test_printed_commands_make_the_same_runs(in_folder: Path) -> None:
     methods = {
         "bbo": {"label": "BBO", "sampler": "nsga2"},
-        "rules": {"label": "BBO/rules", "proposer": "rules", "n_step": 3, "refine_every": 3},
+        "rules": {"label": "BBO/rules", "proposer": "rules", "n_step": 3},
         "front": {"label": "front", "design": "1500"},
     }
     file = file_of(in_folder, methods=methods, tasks=["random-3"], seeds=[7], robust=True)

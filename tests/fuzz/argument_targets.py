@@ -19,7 +19,7 @@ def argument_seeds() -> list[bytes]:
     lines = (
         ["tasks", "target-1"], ["tasks", "--json"], ["optimize", "target-1", "--n-total", "2", "--n-init", "1"],
         ["optimize", "target-1", "--sampler", "random", "--objectives", "torque,mass", "--robust", "--seed", "3"],
-        ["optimize", "target-1", "--proposer", "rules", "--n-step", "2", "--refine-every", "2", "--json"],
+        ["optimize", "target-1", "--proposer", "rules", "--n-step", "2", "--json"],
         ["optimize", "target-1", "--proposer", f"replay:{run}", "--model-options",
          "{replay_strict: true, memory: own}"],
         ["optimize", "target-1", "--proposer", "manual:desk", "--prompt", "minus", "--model-options",
@@ -35,7 +35,7 @@ def argument_seeds() -> list[bytes]:
         ["compare-arms", "target-1", "arm.urdf", "--base", "0,0,0.5", "--tip", "tip", "--base-link", "base"],
         ["pick", run, "--where", "torque<=9", "--by", "mass", "-n", "2"], ["pick", run, "--weights", "torque=1"],
         ["export", run, "--design", "2", "--format", "mjcf", "--out", "x/y.xml"], ["report", run],
-        ["actuators"], ["doctor", "--model", "openai-chat:x"], ["check", "target-1", "--json"], ["refine", run],
+        ["actuators"], ["doctor", "--model", "openai-chat:x"], ["check", "target-1", "--json"],
         ["draft", "words", "--print-prompt"], ["init", "new.yaml", "--from", "points.csv", "--unit", "mm"],
         ["init", "new.yaml", "--offset", "0", "0", "1"], ["--version"], ["--help"],
     )  # fmt: skip
@@ -56,7 +56,7 @@ def run_arguments(data: bytes) -> None:
     listed = content if isinstance(content, list) else [content]
     given = [_argument(one) for one in listed][:40]
     if any(one.partition("=")[0] in NEVER or "--figures".startswith(one) for one in given if one) or (
-        given and given[0] in ("report", "refine")
+        given and given[0] == "report"
     ):
         return
     if given and given[0] in ("optimize", "design", "experiment", "compare", "compare-arms"):

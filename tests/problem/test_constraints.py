@@ -44,7 +44,6 @@ from armwright.spaces.design_space import paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.spaces.tolerance import perturbed
 from armwright.study.front_run import find_front
-from armwright.study.refine_run import refine_run
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
@@ -275,12 +274,6 @@ def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
     rows = SPACE.matrix(designs)
     off = np.max([problem.evaluate_matrix(copies).violations for copies in perturbed(SPACE, rows)], axis=0)
     assert np.all(off <= 0.06)  # 5 % in float64
-    # refined designs stay feasible
-    refined = refine_run(tmp_path / "run", 240)
-    assert refined.added
-    assert all(trial.is_feasible for trial in refined.history.trials[len(run.trials) :])
-    designs = [trial.design for trial in refined.history]
-    assert np.array_equal(refined.history.violations, problem.evaluate(designs).violations)
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
@@ -347,7 +340,7 @@ def test_replay_has_identical_violations(chat_server: ChatServer, tmp_path: Path
 
 def test_run_without_a_feasible_design_reports_the_nearest(tmp_path: Path) -> None:
     problem = Problem(task(*IMPOSSIBLE))
-    run = optimize(problem, proposer="rules", n_total=6, refine_every=2, seed=1, out=tmp_path / "run")
+    run = optimize(problem, proposer="rules", n_total=6, seed=1, out=tmp_path / "run")
     assert run.front == []
     assert run.hypervolume.tolist() == [0.0] * 6
     broken = problem.evaluate([trial.design for trial in run.trials]).violations
@@ -358,8 +351,6 @@ def test_run_without_a_feasible_design_reports_the_nearest(tmp_path: Path) -> No
     words = f"the nearest, #{nearest}, violates worst_error <= 1e-08 .* most"
     with pytest.raises(FailureError, match=words):
         pick(run.history)
-    with pytest.raises(RunFolderError, match=words):
-        refine_run(tmp_path / "run")
 
 
 @pytest.mark.slow

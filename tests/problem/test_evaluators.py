@@ -12,7 +12,6 @@ import armwright as aw
 from armwright.exceptions import EvaluatorError, RunConflictError, SettingsError
 from armwright.problem.objectives import LENGTH, POSITION_ERROR
 from armwright.runs.folder import read_run
-from armwright.study.refine_run import refine_run
 from tests.support.arms import paper_arms
 
 SPACE = aw.paper_space(joints=3)
@@ -112,13 +111,6 @@ def test_what_a_task_states_of_its_objectives_does_not_apply_to_an_evaluator(tmp
     assert len(run.config.reference_point or ()) == 1
 
 
-def test_refinement_of_a_measured_run_is_refused(tmp_path: Path) -> None:
-    problem = aw.Problem(TASK, SPACE, evaluator=measured)
-    aw.optimize(problem, proposer="none", sampler="random", n_init=2, n_total=1, out=tmp_path / "run")
-    with pytest.raises(SettingsError, match=r"was measured by the evaluator .*measured, which a refinement would call"):
-        refine_run(tmp_path / "run")
-
-
 def test_evaluator_of_one_objective_may_return_a_number() -> None:
     assert aw.evaluator("energy [J]")(lambda arm, task: np.float32(0.5))(ARM, TASK) == (0.5,)
 
@@ -150,10 +142,6 @@ def test_failed_evaluation_has_infinite_objectives_and_its_violations() -> None:
         (lambda: aw.evaluator("Energy")(len), "lowercase letters"),
         (lambda: aw.evaluator("torque")(len), "is built in"),
         (lambda: aw.Problem(TASK, SPACE, tolerance=0.001, evaluator=measured), "a tolerance or an evaluator, got both"),
-        (
-            lambda: aw.optimize(aw.Problem(TASK, SPACE, evaluator=measured), refine_every=5),
-            "--refine-every does not go with an evaluator",
-        ),
         (
             lambda: aw.optimize(aw.Problem(TASK, SPACE, evaluator=measured), evaluation_timeout=0.0),
             "evaluation_timeout: expected seconds > 0, got 0.0",

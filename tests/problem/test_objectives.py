@@ -54,11 +54,6 @@ def three(task: Task) -> Problem:
 OPEN = load_task("target-1").model_copy(update={"reference_point": None})
 
 
-def test_single_objective_study_is_refined() -> None:
-    run = optimize(one(OPEN), proposer="none", n_init=3, n_total=8, refine_every=3)
-    assert any(trial.refines is not None for trial in run.trials)
-
-
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
 def test_nonfinite_objective_is_refused(tmp_path: Path, number: float) -> None:
     broken = (POSITION_ERROR, replace(SPREAD, each=lambda e: np.full(e.position_error.shape, number)))

@@ -55,9 +55,3 @@ def test_built_in_task_and_space_are_named_and_a_folder_elsewhere_keeps_its_path
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     assert repeat_command(config, tmp_path / "elsewhere").startswith("armwright optimize elsewhere --")
-
-
-def test_command_of_a_refined_run_refines_the_repeated_one(tmp_path: Path) -> None:
-    aw.optimize(problem("mine"), proposer="none", out=tmp_path / "run", **SHORT)
-    config, _ = read_run(tmp_path / "run")
-    assert repeat_command(config, tmp_path / "run", refined=True).endswith(" --out again && armwright refine again")

@@ -121,7 +121,6 @@ def test_exported_trials_equal_those_of_the_run(which: str, request: pytest.Fixt
                 "expected": None if ours.expected is None else list(ours.expected),
                 "fault": ours.fault,
                 "failure": ours.failure or None,
-                "refines": ours.refines,
                 "duplicate_of": ours.duplicate_of,
                 "verdict": verdicts.get(ours.number),
             }

@@ -71,7 +71,6 @@ def test_config_reproduces_the_run(run: StudyResult) -> None:
         "n_step": 4,
         "n_total": 8,
         "in_flight": None,
-        "refine_every": None,
         "initial_designs": [],
         "screen": False,
     }
@@ -94,9 +93,7 @@ def test_summary_has_the_documented_keys(run: StudyResult) -> None:
         "front_gap",
         "front_size",
         "verification",
-        "evaluations",
         "duplicates",
-        "refine",
         "attribution",
         "proposer",
         "proposer_bias",

@@ -20,7 +20,6 @@ from armwright.problem.reduction import without_joints
 from armwright.runs.conditions import read_condition
 from armwright.runs.folder import read_run
 from armwright.runs.selection import pick
-from armwright.search.cma_es import refine
 from armwright.search.encoding import DesignEncoding
 from armwright.search.variation import offspring
 from armwright.spaces.batch_builder import stack_designs
@@ -164,27 +163,13 @@ def test_search_encodes_logarithmic_columns() -> None:
     assert units.min() >= 0.0
     assert units.max() <= 1.0
     assert encoding.from_units(units)[:, :-1] == pytest.approx(matrix[:, encoding.real][:, :-1])
-    several = units.reshape(4, 50, -1)  # as a refinement of several designs holds them
+    several = units.reshape(4, 50, -1)  # as CMA-ES from several starts holds them
     assert encoding.from_units(several).reshape(200, -1) == pytest.approx(encoding.from_units(units))
     kp = [p.name for p in space.parameters if isinstance(p, FloatParameter)].index("kp")
     assert units[:, kp] == pytest.approx(np.log(matrix[:, encoding.real[kp]]) / np.log(200.0))
     children = offspring(matrix, np.zeros(200, dtype=np.int64), encoding, 500, np.random.default_rng(0))
     for design in space.designs(children):
         assert space.design(design.params) == design
-
-
-def test_refinement_tunes_custom_parameters() -> None:
-    space = space_of()
-    column = [p.name for p in space.parameters].index("kp")
-
-    def distance(matrix: np.ndarray) -> np.ndarray:
-        return np.abs(np.log(matrix[:, [column]] / 30.0))
-
-    start = space.matrix(space.sample(1, 5))
-    refined = refine(space.parameters, distance, start, distance(start), (1.0,), 3000, 0)
-    assert refined.values[0, 0] < 0.2 * distance(start)[0, 0]
-    (design,) = space.designs(refined.matrix)
-    assert space.design(design.params) == design
 
 
 def test_reduction_renumbers_parameters_per_joint() -> None:

@@ -84,7 +84,7 @@ def test_killed_study_with_figures(torture: Callable[[str, Scenario], Counter[st
 
 
 def test_killed_study_with_sampler_notes(torture: Callable[[str, Scenario], Counter[str]]) -> None:
-    settings = ("--proposer", "none", "--sampler", "nsga2", "--refine-every", "20", "--no-figures")
+    settings = ("--proposer", "none", "--sampler", "nsga2", "--no-figures")
     torture("optimize, NSGA-II", study(60, *settings))
 
 

@@ -43,7 +43,6 @@ COMMANDS = {
     "Search": (
         search_commands.design,
         search_commands.optimize,
-        search_commands.refine,
         experiment_commands.experiment,
     ),
     "After a run": (

@@ -1,4 +1,4 @@
-"""Commands that search designs: design, optimize, refine."""
+"""Commands that search designs: design, optimize."""
 
 import time
 from collections.abc import Callable
@@ -24,7 +24,6 @@ from armwright.cli.options import (
     Objectives,
     PromptName,
     Robust,
-    RunFolder,
     Scheduler,
     Seed,
     SpaceFile,
@@ -157,13 +156,6 @@ def optimize(
             rich_help_panel=SEARCH,
         ),
     ] = None,
-    refine_every: Annotated[
-        int | None,
-        typer.Option(
-            help="Refine a design of the front by 1000 evaluations after every N counted trials.",
-            rich_help_panel=SEARCH,
-        ),
-    ] = None,
     screen: Annotated[
         bool,
         typer.Option(
@@ -224,7 +216,7 @@ def optimize(
     choice = choose_proposer(proposer, given)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
-    is_method_chosen = proposer != "auto" or model is not None or sampler != "auto" or refine_every is not None
+    is_method_chosen = proposer != "auto" or model is not None or sampler != "auto"
     if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
         console.print(note)
     check_before_search(console, problem, check_files(task, space), folder)
@@ -242,7 +234,6 @@ def optimize(
                 n_step=n_step,
                 n_total=n_total,
                 in_flight=choice.options.in_flight,
-                refine_every=refine_every,
                 initial_designs=initial_designs,
                 screen=screen,
                 on_model_failure=choice.options.on_failure,
@@ -278,24 +269,6 @@ def optimize(
         show_result(console, run, drawn)
     if all(trial.failure is not None for trial in run.trials):
         raise typer.Exit(1)
-
-
-def refine(
-    run: RunFolder,
-    evaluations: Annotated[int, typer.Option(help="Evaluations per design of the front.")] = 1000,
-    json_: SummaryJson = False,
-) -> None:
-    """Refine base and link lengths of RUN's Pareto designs, and add the improved designs to the run."""
-    from armwright.cli.show_results import show_refined
-    from armwright.study.refine_run import refine_run
-
-    with activity("refining the designs of the front"):
-        refined = refine_run(run, evaluations)
-    _draw(run)
-    if json_:
-        print_json({"folder": run, **refined.summary})
-        return
-    show_refined(open_console(), refined)
 
 
 def _draw(folder: Path, has_time: Callable[[float], bool] = lambda _: True) -> list[Path]:

@@ -21,7 +21,6 @@ from armwright.runs.results import REPORT
 from armwright.spaces.custom_parameters import describe_custom
 from armwright.study.direct_search import FrontRun
 from armwright.study.progress import StudyResult
-from armwright.study.refine_run import RefinedRun
 from armwright.study.time_plan import MAX_DESIGNS
 
 SHORT_NAMES = {POSITION_ERROR: "error [m]", TORQUE: "torque"}
@@ -35,13 +34,12 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
     if summary["proposer"] is not None:
         print_table(console, _attribution_table(summary["attribution"]))
     _show_hypervolume(console, history, summary, "more trials")
-    more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
     n_infeasible = int((~history.feasible & ~history.failed).sum())
     infeasible = f", {n_infeasible} infeasible" if problem.constraints else ""
     sources = ", ".join(f"{count} {look(source).label}" for source, count in summary["by_source"].items())
     seconds = summary["seconds"]
     parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
-    console.print(f"{summary['n_trials']} trials{more}{infeasible}: {sources}; {seconds['total']:.1f} s ({parts})")
+    console.print(f"{summary['n_trials']} trials{infeasible}: {sources}; {seconds['total']:.1f} s ({parts})")
     if any(summary.get("failures", {}).values()):
         _show_failures(console, history, summary["failures"])
     if summary["duplicates"]:
@@ -141,18 +139,6 @@ def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) ->
         roles.setdefault(f"#{one['design']}, {one['status']}; {survival}{demoted}", []).append(one["role"])
     for described, names in roles.items():
         console.print(f"recommended, {', '.join(names)}: {described}")
-
-
-def show_refined(console: Console, refined: RefinedRun) -> None:
-    """Print what refinement added to a run."""
-    show_front(console, refined.history, refined.summary)
-    final = refined.summary["hypervolume"]["final"]
-    before = refined.before.hypervolume
-    console.print(
-        f"refined {refined.tried} designs in {refined.evaluations:,} evaluations: added {refined.added} improved "
-        f"designs; hypervolume {before[-1]:.3f} -> {final:.3f}"
-    )
-    _show_front_gap(console, refined.summary["front_gap"])
 
 
 def _show_failures(console: Console, history: History, failures: dict[str, int]) -> None:

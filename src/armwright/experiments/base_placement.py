@@ -16,17 +16,17 @@ from armwright.problem.problem import POSTURES_AT_ONCE, Problem
 from armwright.robot.arm import Arm, Joint
 from armwright.robot.mounting import Mounting, mounted, needs_turning
 from armwright.robot.urdf_reader import UrdfArm
-from armwright.search.cma_es import refine
+from armwright.search.cma_es import minimize
 from armwright.search.encoding import DesignEncoding
 from armwright.seeding import derived_seed
 from armwright.spaces.parameters import FloatParameter
 from armwright.spaces.tool_mount import with_tool
 
 RANDOM_PLACES = 300
-REFINED_PLACES = 4  # the best of the random ones
-EVALUATIONS = 300  # to refine one place
+IMPROVED_PLACES = 4  # the best of the random ones
+EVALUATIONS = 300  # to improve one place
 HARDLY = 0.01  # more torque that is accepted for a base that is not turned
-N_PLACES = RANDOM_PLACES + REFINED_PLACES * EVALUATIONS
+N_PLACES = RANDOM_PLACES + IMPROVED_PLACES * EVALUATIONS
 
 
 def with_travel(arm: Arm, travel: float) -> Arm:
@@ -99,23 +99,23 @@ def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
         parameters.append(FloatParameter("yaw", -math.pi, math.pi, "rad"))
 
     def evaluate(rows: Array) -> Array:
-        """Return losses (N, 1): from 2 if a target is missed, from 1 if a constraint is violated, else by torque."""
+        """Return losses (N,): from 2 if a target is missed, from 1 if a constraint is violated, else by torque."""
         batch = max(1, POSTURES_AT_ONCE[problem.device] // len(problem.task.target_positions))
-        losses = np.empty((len(rows), 1))
+        losses = np.empty(len(rows))
         for first in range(0, len(rows), batch):
             part = slice(first, first + batch)
             arms = [mounted(described, Mounting.of(row)).arm for row in rows[part].tolist()]
-            losses[part, 0] = _losses(problem, problem.physics_of_arms(stack_arms(arms)))
+            losses[part] = _losses(problem, problem.physics_of_arms(stack_arms(arms)))
         return losses
 
     rows = DesignEncoding(parameters).random(RANDOM_PLACES, np.random.default_rng(derived_seed(seed, 0)))
     losses = evaluate(rows)
-    best = np.argsort(losses[:, 0], kind="stable")[:REFINED_PLACES]
-    refined = refine(parameters, evaluate, rows[best], losses[best], (1.0,), EVALUATIONS, derived_seed(seed, 1))
-    chosen = refined.matrix[refined.values[:, 0].argmin()]
+    best = np.argsort(losses, kind="stable")[:IMPROVED_PLACES]
+    places, least = minimize(parameters, evaluate, rows[best], losses[best], EVALUATIONS, derived_seed(seed, 1))
+    chosen = places[least.argmin()]
     if len(chosen) > 3:
         unturned = np.array([[*chosen[:3], 0.0]])
-        if _needs_hardly_more(float(evaluate(unturned)[0, 0]), float(refined.values.min())):
+        if _needs_hardly_more(float(evaluate(unturned)[0]), float(least.min())):
             chosen = unturned[0]
     return Mounting.of(chosen.tolist())
 

@@ -63,7 +63,6 @@ class Cell:
             "n-init": self.n_init,
             "n-step": plan.n_step,
             "n-total": self.n_total,
-            "refine-every": plan.refine_every,
         }
         return ["optimize", self.task, *self._arguments(arguments), "--no-figures"]
 

@@ -49,7 +49,6 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     design: Count | None = None  # evaluations of `armwright design`, which then runs instead of a study
     sampler: str = "tpe"
     n_step: Count = 10
-    refine_every: Count | None = None
     seeds: Seeds | None = None
     against: tuple[Key, ...] = ()
     model_options: ModelOptions = ModelOptions()

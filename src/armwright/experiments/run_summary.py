@@ -36,12 +36,12 @@ class RunSummary:
 
     @cached_property
     def curve(self) -> Array:
-        """Hypervolume over the counted trials (I,), without later refinement; empty for a front search."""
+        """Hypervolume over the counted trials (I,); empty for a front search."""
         if isinstance(self.config.method, FrontMethod):
             return np.zeros(0)
-        is_stored = self._has_own_reference_point
-        curve = np.array(self.summary["hypervolume"]["history"]) if is_stored else self.history().hypervolume
-        return curve[: self.config.method.n_total]
+        if self._has_own_reference_point:
+            return np.array(self.summary["hypervolume"]["history"])
+        return self.history().hypervolume
 
     @cached_property
     def final(self) -> float:
@@ -156,8 +156,6 @@ def describe_method(config: RunConfig) -> str:
             text += f" {model}"
         if method.n_step != 10:
             text += f" (N_step {method.n_step})"
-    if method.refine_every:
-        text += f" (refine {method.refine_every})"
     if method.n_total != 200:
         text += f" ({method.n_total} trials)"
     return text

@@ -69,7 +69,6 @@ def _run(cell: Cell) -> tuple[dict[str, Any], bool]:
         n_step=plan.n_step,
         n_total=cell.n_total,
         in_flight=plan.model_options.in_flight,
-        refine_every=plan.refine_every,
         seed=cell.seed,
         out=cell.folder,
     )
@@ -101,7 +100,6 @@ def finished_before(cell: Cell) -> CellOutcome | None:
             plan.n_step,
             cell.n_total,
             plan.model_options.in_flight,
-            plan.refine_every,
         )
         check_same_run(cell.folder, read_config(cell.folder), run_config(_problem(cell), method, cell.seed))
     except ArmwrightError:

@@ -140,8 +140,7 @@ def draw_area(comparison: Comparison) -> Figure:
     )
     reference = np.array(run.reference_point)
     history = run.history()
-    counted = slice(run.config.study.n_trials)
-    values, masked = history.values[counted, :2], history.masked_objectives[counted]
+    values, masked = history.values[:, :2], history.masked_objectives
     evaluated = values[np.isfinite(values).all(axis=1)]
     inside = values[[n for n in front_indices(masked[:, :2]) if np.all(values[n] < reference[:2])]]
     figure, axes = one_panel(4.4, 3.8)

@@ -34,7 +34,7 @@ from armwright.runs.config import FrontMethod, Method, RunConfig
 from armwright.runs.datasheet.sheet import NOT_MODELLED
 from armwright.runs.folder import read_config
 from armwright.runs.front_gap import known_front
-from armwright.runs.history import REFINE, History
+from armwright.runs.history import History
 from armwright.runs.results import read_summary
 from armwright.runs.selection import bounded_numbers, numbers_of
 from armwright.runs.trials_file import TrialsReader
@@ -312,7 +312,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "is_toy": space.is_toy,
         "assumed": assumed_values(config.problem),
         "method": describe_method(config),
-        "command": repeat_command(config, folder, any(trial.source == REFINE for trial in history), spent),
+        "command": repeat_command(config, folder, spent),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
         "colours": {
             "front": FRONT,
@@ -347,7 +347,7 @@ def _result(history: History, summary: Mapping[str, Any] | None) -> dict[str, An
         "hypervolume": final if summary is None else summary["hypervolume"]["final"],
         "by_source": Counter(trial.source for trial in history),
         "seconds": search.get("seconds", sum(trial.seconds.get("total", 0.0) for trial in history)),
-        "evaluations": search.get("evaluations", sum(trial.evaluations for trial in history)),
+        "evaluations": search.get("evaluations", len(history)),
         "infeasible": search.get("infeasible", int((~history.feasible & ~history.failed).sum())),
         "failed": int(history.failed.sum()),
         "robust": (parts.get("verification") or {}).get("robust_numbers"),
@@ -366,16 +366,15 @@ def _failures(history: History, first: int) -> dict[int, str]:
 
 
 def _proposals(history: History, first: int) -> dict[int, dict[str, Any]]:
-    """Return the proposals, refinements, and failed and screened proposals among the designs from `first` on."""
+    """Return the proposals, failed and screened ones included, among the designs from `first` on."""
     return {
         trial.number: {
             "id": trial.answer,
             "reason": trial.reason,
             "expected": trial.expected,
             "fault": trial.fault,
-            "refines": trial.refines,
             "screened": None if trial.screened is None else trial.screened.describe(history.problem.objectives),
         }
         for trial in history.trials[first:]
-        if trial.answer is not None or trial.fault is not None or trial.refines is not None
+        if trial.answer is not None or trial.fault is not None
     }

@@ -16,11 +16,10 @@ from armwright.spaces.design_space import builtin_spaces, default_space, load_sp
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.tasks.catalogue import builtin_names, load_task
 
-AGAIN = "again"  # the folder of a repeated run that is refined afterwards
 DEFAULTS = {"sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200}
 
 
-def repeat_command(config: RunConfig, folder: Path, refined: bool = False, spent: int | None = None) -> str:
+def repeat_command(config: RunConfig, folder: Path, spent: int | None = None) -> str:
     """Return the shell command that repeats a run, without options at their defaults.
 
     Task and space are read from the run folder unless both are built in. Initial designs appear as DESIGN-1.json.
@@ -28,7 +27,6 @@ def repeat_command(config: RunConfig, folder: Path, refined: bool = False, spent
     Args:
         config: The settings of the run.
         folder: The run folder.
-        refined: Whether the run was refined afterwards.
         spent: Evaluations of a direct search.
 
     Returns:
@@ -61,9 +59,8 @@ def repeat_command(config: RunConfig, folder: Path, refined: bool = False, spent
     if isinstance(config.method, Method) and _is_screen_off(config.method):
         options.append("--no-screen")
     options += ["--robust"] * (config.tolerance > 0.0)
-    options += ["--seed", str(config.seed)] + ["--out", AGAIN] * refined
-    line = shlex.join(["armwright", command, name if is_named else _path_of(folder), *options])
-    return f"{line} && armwright refine {AGAIN}" if refined else line
+    options += ["--seed", str(config.seed)]
+    return shlex.join(["armwright", command, name if is_named else _path_of(folder), *options])
 
 
 def _path_of(folder: Path) -> str:
@@ -89,7 +86,6 @@ def _study_options(method: Method) -> dict[str, Any]:
         "n_init": method.n_init,
         "n_step": method.n_step,
         "n_total": method.n_total,
-        "refine_every": method.refine_every,
     }
 
 

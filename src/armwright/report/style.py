@@ -30,7 +30,6 @@ _LOOKS = {
     RANDOM: Look("random", "#9A9A9A", "x", 22),
     INITIAL_DESIGN: Look("initial design", "#111111", "P", 36),
     BBO: Look("black box", "#0072B2", "o", 20),
-    "refine": Look("refine", "#009E73", "D", 28, "...."),
     "front_search": Look("front search", "#0072B2", "o", 14),
     "rules": Look("rules", "#D55E00", "^", 44, "////"),
     "llm": Look("language model", "#CC79A7", "^", 44, "\\\\\\\\"),

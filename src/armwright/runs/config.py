@@ -41,7 +41,6 @@ class Method(BaseModel, frozen=True, extra="forbid"):
         n_step: Trials of a block; one of each block is the proposer's.
         n_total: Number of counted trials.
         in_flight: Requests to the proposer that run while black-box trials continue; None to wait for each.
-        refine_every: Counted trials between refinements of a design of the front; None for no refinement.
         initial_designs: Designs of the first of the n_init trials.
         screen: Whether the surrogate decides which proposals are evaluated.
     """
@@ -52,7 +51,6 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     n_step: int = Field(ge=1)
     n_total: int = Field(ge=1)
     in_flight: int | None = Field(default=None, ge=1)
-    refine_every: int | None = Field(default=None, ge=1)
     initial_designs: tuple[dict[str, float | str], ...] = ()
     screen: bool = False
 
@@ -158,8 +156,7 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
         """The settings of the study; RunFolderError if the run is a direct search."""
         if isinstance(self.method, FrontMethod):
             raise RunFolderError(
-                "this run is a direct search, not a study: its front needs no refinement, and `armwright design` with "
-                "a larger --budget continues it"
+                "this run is a direct search, not a study; `armwright design` with a larger --budget continues it"
             )
         return self.method
 

@@ -91,10 +91,6 @@ class RunFolder:
         stored = read_config(self.path)
         check_same_run(self.path, stored, config)
         if config.method != stored.method:  # a larger n_total
-            if count_trials(self.path / TRIALS) > stored.study.n_trials:
-                raise RunConflictError(
-                    f"{self.path} was refined, so its study cannot resume; give another --out DIR, or refine it again"
-                )
             stored = stored.model_copy(update={"method": config.method})
             self.write_config(stored)
         return stored

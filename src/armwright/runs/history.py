@@ -30,9 +30,8 @@ from armwright.spaces.parameters import Design
 RANDOM = "random"
 BBO = "bbo"
 INITIAL_DESIGN = "initial_design"  # of the user, such as an existing arm
-REFINE = "refine"  # a refined design of the front
 FRONT_SEARCH = "front_search"
-NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, REFINE, FRONT_SEARCH)
+NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, FRONT_SEARCH)
 FEW = 5  # successful trials that a reference point is chosen from
 # Properties that a longer history extends.
 CACHED = ("values", "violations", "masked_objectives", "front", "proposed", "_hypervolumes", "_first_of")

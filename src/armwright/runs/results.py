@@ -71,10 +71,8 @@ def rewrite_results(
     if isinstance(config.method, FrontMethod):
         new = {**summary, "verification": _verification_record(history, verification)}
     else:
-        known = {key: summary[key] for key in ("proposer", "proposer_bias", "refine", "surrogate") if key in summary}
+        known = {key: summary[key] for key in ("proposer", "proposer_bias", "surrogate") if key in summary}
         new = summarize(history, config, None, verification) | known
-        if new["refine"] is not None:
-            new["evaluations"] += new["refine"]["in_vain"]
     write_results(folder, history, new, verification)
     return new
 
@@ -125,23 +123,20 @@ def summarize(
 ) -> dict[str, Any]:
     """Return the content of summary.json for a study."""
     curve = history.hypervolume
-    counted = curve[: config.study.n_total]  # without refined designs
     seconds: Counter[str] = Counter()
     for trial in history:
         seconds.update(trial.seconds)
     volume = {
         "final": float(curve[-1]) if len(curve) else None,
-        "mean": float(counted.mean()) if len(counted) else None,
+        "mean": float(curve.mean()) if len(curve) else None,
         "history": curve.tolist(),
     }
     return {
         **_common_record(history, config, history.masked_objectives, volume, verification),
-        "evaluations": sum(trial.evaluations for trial in history),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **_failure_record(history, config),
         **({} if surrogate is None else {"surrogate": asdict(surrogate)}),
         **_screening_record(history, config),
-        "refine": None,
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
         "proposer_bias": None if proposer is None else asdict(proposer_bias(history, proposer.name)),

@@ -98,11 +98,6 @@ class _Proposer(_Record):
     overlap: _Overlap | None
 
 
-class _Refinement(_Record):
-    rounds: Count
-    in_vain: Count
-
-
 class _Seconds(_Record):
     total: float
     sampling: float
@@ -150,12 +145,10 @@ class StudySummary(_Summary):
     """Summary of a study."""
 
     hypervolume: _Curve
-    evaluations: Count
     duplicates: Count
     failures: dict[str, Count] = {}
     surrogate: SurrogateSummary | None = None
     screened_out: dict[str, Count] = {}
-    refine: _Refinement | None
     attribution: dict[str, Attribution]
     proposer: _Proposer | None
     proposer_bias: ProposerBias | None

@@ -60,7 +60,7 @@ class FinishedTrial:
 
     Attributes:
         number: of the trial in its run, from 0.
-        source: `random`, `initial_design`, `bbo`, `refine`, `front_search`, or the name of the proposer.
+        source: `random`, `initial_design`, `bbo`, `front_search`, or the name of the proposer.
         design: what was evaluated.
         values: the objectives; infinite if its evaluation failed, and left out of its line.
         proposal: the proposal's id, if a proposer made the design.
@@ -69,9 +69,7 @@ class FinishedTrial:
         fault: why a trial that was a proposer's became a black-box one.
         asked: the trial that the proposal was asked for, if another one.
         feedback: how many finished trials the proposer knew, if not all before this one.
-        refines: the trial whose design was refined for this one.
-        evaluations: designs that were evaluated to find it: many for a refined one, none for a duplicate.
-        duplicate_of: the earlier trial with an equal design, whose values it has.
+        duplicate_of: the earlier trial with an equal design, whose values it has; it was not evaluated again.
         seconds: wall time by part (total, proposing, sampling, evaluation).
         sampler_notes: attributes that the sampler set on its trial and study, needed to resume.
         violations: of each constraint; satisfied at <= 0.
@@ -91,8 +89,6 @@ class FinishedTrial:
     fault: str | None = None
     asked: int | None = None
     feedback: int | None = None
-    refines: int | None = None
-    evaluations: Count = 1
     duplicate_of: int | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])

@@ -45,7 +45,7 @@ class TrialsReader:
         self._inode = 0
 
     def read_on(self) -> bool:
-        """Read new trials; return whether those read before were replaced, as by a refinement."""
+        """Read new trials; return whether those read before were replaced, as by a longer direct search."""
         with suppress(OSError, RunFolderError), self._path.open("rb") as file:  # read_trials raises them again
             status = os.fstat(file.fileno())
             is_same, self._inode = status.st_ino == self._inode, status.st_ino

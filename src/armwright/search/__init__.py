@@ -1,1 +1,1 @@
-"""Algorithms that generate designs: Optuna samplers, front search and refinement."""
+"""Algorithms that generate designs: Optuna samplers and the front search."""

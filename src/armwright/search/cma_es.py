@@ -1,85 +1,54 @@
-"""CMA-ES for many designs at once: one small strategy per design tunes its real parameters, categories stay.
+"""CMA-ES from several starts at once: one small strategy for each, side by side.
 
-Hansen, The CMA Evolution Strategy: A Tutorial, 2016 (arXiv:1604.00772), with its default constants. A design is
-replaced only by one that is better in every objective.
+Hansen, The CMA Evolution Strategy: A Tutorial, 2016 (arXiv:1604.00772), with its default constants.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.search.encoding import DesignEncoding
-from armwright.spaces.parameters import Parameter
+from armwright.spaces.parameters import FloatParameter
 
-POPULATION = 12  # samples per design and generation
+POPULATION = 12  # samples per start and generation
 INITIAL_STEP = 0.05  # of a parameter's range
 MAX_STEP = 0.3
 
 
-@dataclass(frozen=True)
-class Refined:
-    """N refined designs.
-
-    Attributes:
-        matrix: (N, P) designs, unchanged if none better was found.
-        values: (N, M) their objective values.
-        improved: (N,) whether a better one was found.
-        evaluations: number of evaluations spent in all.
-    """
-
-    matrix: Array
-    values: Array
-    improved: NDArray[np.bool_]
-    evaluations: int
-
-
-def refine(
-    parameters: Sequence[Parameter],
+def minimize(
+    parameters: Sequence[FloatParameter],
     evaluate: Callable[[Array], Array],
     matrix: Array,
-    values: Array,
-    scale: Sequence[float],
+    losses: Array,
     budget: int,
     seed: int,
-) -> Refined:
-    """Search for designs that are better than the given ones in every objective.
-
-    The loss is the largest increase of an objective, relative to its scale.
+) -> tuple[Array, Array]:
+    """Return the best points found from each start, (N, P), and their losses, (N,): the start itself if none is better.
 
     Args:
-        parameters: P parameters of the design space.
-        evaluate: maps an (N, P) matrix of designs to (N, M) values, all minimised.
-        matrix: (N, P) designs.
-        values: (N, M) values of `matrix`.
-        scale: (M,) amounts that weigh the same in each objective, such as the reference point.
-        budget: evaluations per design.
+        parameters: the P parameters.
+        evaluate: maps points (N, P) to losses (N,).
+        matrix: (N, P) starts.
+        losses: (N,) losses of the starts.
+        budget: evaluations per start.
         seed: of all random numbers.
     """
     encoding = DesignEncoding(parameters)
-    if not len(encoding.real):
-        return Refined(matrix, values, np.zeros(len(matrix), dtype=bool), 0)
-    best_matrix, best_values = matrix.copy(), values.copy()
-    best_loss = np.zeros(len(matrix))
+    best, best_loss = matrix.copy(), losses.copy()
     strategies = _Strategies(encoding.units(matrix), np.random.default_rng(seed))
-    generations = budget // POPULATION
     every = np.arange(len(matrix))
-    for _ in range(generations):
-        units = strategies.ask()  # (N, K, R)
-        samples = np.repeat(matrix[:, None], POPULATION, axis=1)
-        samples[..., encoding.real] = encoding.from_units(units)
-        sampled = evaluate(samples.reshape(-1, matrix.shape[1])).reshape(len(matrix), POPULATION, -1)
-        loss = np.max((sampled - values[:, None]) / np.asarray(scale), axis=-1)  # (N, K)
+    for _ in range(budget // POPULATION):
+        units = strategies.ask()  # (N, K, P)
+        samples = encoding.from_units(units)
+        loss = evaluate(samples.reshape(-1, matrix.shape[1])).reshape(len(matrix), POPULATION)
         first = loss.argmin(axis=1)
         better = loss[every, first] < best_loss
         best_loss[better] = loss[every, first][better]
-        best_matrix[better] = samples[every, first][better]
-        best_values[better] = sampled[every, first][better]
+        best[better] = samples[every, first][better]
         strategies.tell(units, loss)
-    return Refined(best_matrix, best_values, best_loss < 0.0, generations * POPULATION * len(matrix))
+    return best, best_loss
 
 
 class _Strategies:

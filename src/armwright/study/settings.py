@@ -43,7 +43,6 @@ def study_method(
     n_step: int,
     n_total: int,
     in_flight: int | None,
-    refine_every: int | None,
     initial_designs: Sequence[Design] = (),
     screen: bool = True,
 ) -> Method:
@@ -66,7 +65,6 @@ def study_method(
         n_step=check_integer("n_step", n_step, 1),
         n_total=check_integer("n_total", n_total, 1),
         in_flight=None if in_flight is None else check_integer("in_flight", in_flight, 1),
-        refine_every=None if refine_every is None else check_integer("refine_every", refine_every, 1),
         initial_designs=tuple(dict(design.params) for design in initial_designs),
         screen=screen and proposer is not None and isinstance(sampler, SurrogateFactory),
     )
@@ -103,8 +101,6 @@ def check_settings(problem: Problem, method: Method, evaluation: EvaluationOptio
         raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
     for design in method.initial_designs:
         problem.space.design(design)
-    if problem.evaluator is not None and method.refine_every is not None:
-        raise SettingsError("--refine-every does not go with an evaluator: a refinement takes a thousand evaluations")
     _check_timeout(problem, evaluation.timeout)
     if evaluation.workers is not None and method.in_flight is not None:
         raise SettingsError("in_flight does not go with --workers, which evaluate while a question is asked anyway")

@@ -22,11 +22,10 @@ from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
-from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, REFINE, History
+from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
 from armwright.runs.results import complete_summary, discard_results, summarize, write_results
 from armwright.runs.surrogate_summary import SurrogateSummary
 from armwright.runs.verification import verify_front
-from armwright.search.refine import Refinement, refine_one
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for
 from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.search.surrogate.findings import summarize_surrogate
@@ -63,7 +62,6 @@ def optimize(
     n_step: int = 10,
     n_total: int = 200,
     in_flight: int | None = None,
-    refine_every: int | None = None,
     initial_designs: Sequence[Design] = (),
     screen: bool = True,
     on_model_failure: str = "stop",
@@ -87,7 +85,6 @@ def optimize(
         n_step: trials of a block; its first is the proposer's.
         n_total: counted trials.
         in_flight: requests to the proposer that run while black-box trials go on; None: the study waits for each.
-        refine_every: after so many counted trials, the next free one refines a design of the front.
         initial_designs: designs of the first of the n_init trials, such as an existing arm.
         screen: whether the surrogate decides which proposals are evaluated; the sampler replaces the others.
         on_model_failure: if the model fails before the first trial, "stop" raises ModelError, and "continue" runs
@@ -118,7 +115,7 @@ def optimize(
     """
     proposer = check_proposer(proposer)
     sampler = sampler_for(problem, sampler, features)
-    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs, screen)
+    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, initial_designs, screen)
     evaluation = EvaluationOptions(workers, evaluation_timeout, allow_failures)
     check_settings(problem, method, evaluation, on_model_failure)
     refuse_unread_parameters(problem)
@@ -169,7 +166,6 @@ class Study:
             self._first_of.setdefault(trial.design, trial.number)
         self._failures = FailureWatch(self._trials, self._method.n_trials)
         self._faults = Counter(trial.fault for trial in self._trials if trial.fault)
-        self._n_refined = sum(trial.refines is not None for trial in self._trials)
         self._latest = History(problem, (), self._method.n_init, config.reference_point, self._method)
         self._tracker = FrontTracker(n_objectives, config.reference_point)
         self._is_frozen = problem.reference_point is not None
@@ -289,15 +285,12 @@ class Study:
         slot = self._screened(self._schedule.next(number), number)
         self._channel.report("evaluating", number, None if slot is None else slot.fault_message)
         proposed = time.perf_counter()
-        refinement = self._refine_next(number) if slot is None else None
-        optuna_trial, design, source = self._choose_design(number, slot, refinement)
+        optuna_trial, design, source = self._choose_design(number, slot)
         sampled = time.perf_counter()
         first = self._first_of.setdefault(design, number)
         trial = new_trial(number, source, design, slot)
         if first != number:
-            trial = replace(trial, duplicate_of=first, evaluations=0)
-        if refinement is not None:
-            trial = replace(trial, refines=refinement.refines, evaluations=trial.evaluations + refinement.evaluations)
+            trial = replace(trial, duplicate_of=first)
         pending = PendingTrial(optuna_trial, trial, slot, proposed - started, sampled - proposed)
         self._pending[number] = pending
         if first == number:
@@ -317,25 +310,10 @@ class Study:
             return slot
         return slot.screened_out(self._proposer.name, rejection, self._problem.objectives)
 
-    def _refine_next(self, number: int) -> Refinement | None:
-        """Refine a design of the front, if one is due."""
-        every = self._method.refine_every
-        if every is None or self._n_refined >= (number - self._method.n_init) // every:
-            return None
-        history = self._history()
-        if not history.front:  # nothing is feasible yet
-            return None
-        self._n_refined += 1
-        return refine_one(history, self._config.seed)
-
-    def _choose_design(
-        self, number: int, slot: ProposalSlot | None, refinement: Refinement | None
-    ) -> tuple[Any, Design, str]:
+    def _choose_design(self, number: int, slot: ProposalSlot | None) -> tuple[Any, Design, str]:
         """Return Optuna's trial, the design to evaluate, and its source."""
         source, proposal_id = RANDOM if number < self._method.n_init else BBO, None
-        if refinement is not None and refinement.design is not None:
-            source, given = REFINE, refinement.design
-        elif slot is not None and slot.proposal is not None:
+        if slot is not None and slot.proposal is not None:
             assert self._proposer is not None
             source, given, proposal_id = self._proposer.name, slot.proposal.design, slot.proposal.id
         elif number < len(self._method.initial_designs):

@@ -171,7 +171,7 @@ def test_without_a_screen_all_proposals_are_evaluated() -> None:
 @pytest.mark.parametrize("screen", [True, False])
 def test_repeat_command_states_that_the_screen_was_off(screen: bool) -> None:
     p = Problem(aw.load_task("target-1"), aw.paper_space())
-    method = study_method(RulesProposer(), sampler_for(p, "surrogate"), 5, 5, 5, None, None, screen=screen)
+    method = study_method(RulesProposer(), sampler_for(p, "surrogate"), 5, 5, 5, None, screen=screen)
     assert ("--no-screen" in repeat_command(run_config(p, method, 0), Path("run"))) is not screen
 
 

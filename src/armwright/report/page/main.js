@@ -74,7 +74,7 @@ function take(buffer) {
     open();
     return;
   }
-  const isAnother = content.n < known || content.head.designs_from === 0; // the run was restarted or refined
+  const isAnother = content.n < known || content.head.designs_from === 0; // the trials were replaced
   if (isAnother) {
     forget();
     set({ design: Math.min(state.design ?? 0, content.n - 1), compared: null });

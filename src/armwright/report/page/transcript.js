@@ -31,7 +31,6 @@ export function drawTranscript() {
 function describeProposal() {
   const i = state.design, proposal = content.proposals[i];
   if (i === null) return "Select a design.";
-  if (proposal?.refines !== null && proposal?.refines !== undefined) return `#${i} is design #${proposal.refines}, refined.`;
   if (proposal?.fault) return `The proposal for #${i} failed (${proposal.fault}); the black box replaced it.`;
   if (proposal?.screened) return `${proposal.screened}. #${i} is the black box's design instead.`;
   if (!proposal) return `#${i}, source: ${content.look(i).label}; no reason is given.`;
