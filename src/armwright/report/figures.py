@@ -28,7 +28,6 @@ from armwright.report.drawing import (
 )
 from armwright.report.point_labels import PointLabel, place_labels, place_legend
 from armwright.report.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
-from armwright.report.surrogate_figure import draw_surrogate
 from armwright.runs.attribution import front_by_source, gained_by_source
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import read_run
@@ -52,17 +51,14 @@ def write_figures(folder: str | Path, has_time: Callable[[float], bool] = lambda
     """
     folder = Path(folder)
     config, history = read_run(folder)
-    is_study = not isinstance(config.method, FrontMethod)
-    summary = read_summary(folder) or {}
-    search, learned = (None, summary.get("surrogate")) if is_study else (summary.get("search"), None)
+    search = (read_summary(folder) or {}).get("search") if isinstance(config.method, FrontMethod) else None
     existing = read_existing_arms(folder, len(config.objectives))
-    return write_drawn(folder / FIGURES, _figures(history, search, learned, existing, has_time))
+    return write_drawn(folder / FIGURES, _figures(history, search, existing, has_time))
 
 
 def _figures(
     history: History,
     search: Mapping[str, Any] | None,
-    learned: Mapping[str, Any] | None,
     existing: Sequence[ComparedArm],
     has_time: Callable[[float], bool],
 ) -> Iterator[tuple[str, Figure]]:
@@ -71,7 +67,6 @@ def _figures(
     Args:
         history: The trials.
         search: The record of a direct search, whose trials are its front.
-        learned: What the surrogate of a study learned.
         existing: Arms to compare with.
         has_time: As for `write_figures`.
     """
@@ -85,8 +80,6 @@ def _figures(
         if is_plane:
             yield "samples", draw_samples(history)
         yield "attribution", draw_attribution(history)
-    if learned is not None:
-        yield "surrogate", draw_surrogate(history, learned)
     if is_plane:
         yield "front", draw_front(history, existing)
     chosen = chosen_members(history)
