@@ -47,21 +47,6 @@ def hypervolume_gains(history: History) -> Array | None:
     return np.diff(history.hypervolumes, prepend=0.0)
 
 
-def gained_by_source(history: History) -> dict[str, Array] | None:
-    """Return for each source (I + 1,) the hypervolume that its trials gained after 0, 1, …, I counted iterations.
-
-    None without a reference point.
-    """
-    gains = hypervolume_gains(history)
-    if gains is None:
-        return None
-    last = _last_trials(history)
-    return {
-        source: np.concatenate([[0.0], np.cumsum(np.where(mine, gains, 0.0))])[last]
-        for source, mine in masks_by_source(history).items()
-    }
-
-
 def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
     """Return for each source (I + 1,) its number of trials on the front after 0, 1, …, I counted iterations."""
     first, *_ = last = _last_trials(history).tolist()
