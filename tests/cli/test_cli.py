@@ -97,7 +97,7 @@ def test_missing_results_of_a_finished_run_are_rewritten(in_folder: Path) -> Non
     armwright("optimize", "target-1", *DRAWN, "--out", "run")
     run = in_folder / "run"
     before = {path.relative_to(run) for path in run.rglob("*")}
-    for name in ("hypervolume", "samples", "attribution", "front", "arms"):
+    for name in ("hypervolume", "front", "arms"):
         assert {Path("figures", f"{name}.png"), Path("figures", f"{name}.pdf")} <= before
     shutil.rmtree(run / "figures")
     shutil.rmtree(run / "designs")

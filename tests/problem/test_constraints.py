@@ -30,7 +30,7 @@ from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.proposers.for_optuna.proposer import study_history
 from armwright.proposers.replay import ReplayProposer
-from armwright.report.figures import write_figures
+from armwright.report.figures import chosen_members, write_figures
 from armwright.runs.attribution import attribution_by_source
 from armwright.runs.folder import read_run
 from armwright.runs.front_gap import known_front
@@ -357,7 +357,10 @@ def test_run_without_a_feasible_design_reports_the_nearest(tmp_path: Path) -> No
 def test_run_without_a_feasible_design_draws_the_nearest(tmp_path: Path) -> None:
     run = optimize(Problem(task(*IMPOSSIBLE)), proposer="rules", n_total=6, seed=1, out=tmp_path / "run")
     nearest = run.summary["feasibility"]["nearest"]["number"]
-    assert {file.name for file in write_figures(tmp_path / "run")} >= {"front.png", f"arm-{nearest:04d}.png"}
+    assert {file.name for file in write_figures(tmp_path / "run")} >= {"front.png", "arms.png"}
+    assert [(title, member.number) for title, member in chosen_members(run.history)] == [
+        ("Nearest to feasible", nearest)
+    ]
 
 
 def test_reference_point_comes_from_feasible_designs() -> None:

@@ -114,7 +114,7 @@ def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path, proble
     assert [member.values for member in history.front] == [member.values for member in run.front]
     assert history.hypervolume == pytest.approx(run.hypervolume)
     drawn = {path.stem for path in write_figures(tmp_path / "run")}
-    assert {"hypervolume", "attribution", "arms"} <= drawn
+    assert {"hypervolume", "arms"} <= drawn
     assert ("front" in drawn) == (len(names) > 1)
     titles = [title for title, _ in chosen_members(history)]
     assert all("position error" in title or "spread" in title or "nee" in title for title in titles)

@@ -4,7 +4,6 @@ import csv
 import io
 import json
 import re
-import shutil
 from base64 import b64encode
 from collections.abc import Iterator
 from pathlib import Path
@@ -97,42 +96,6 @@ def test_page_sends_nothing(run: Path, tab: Tab) -> None:
     )
     assert len(names) > 20
     assert not [name for name in names if re.search("share|cloud|upload|edit in", name, re.IGNORECASE)]
-
-
-def test_what_the_surrogate_learned_is_a_table(run: Path, tab: Tab, tmp_path: Path) -> None:
-    tab.open(run / "report.html")
-    assert tab.page.locator("#surrogate-box").is_hidden()
-    copy = shutil.copytree(run, tmp_path / "run")
-    summary = json.loads((copy / "summary.json").read_text())
-    effects = [{"name": "peak_torque", "share": 0.89}]
-    work: dict[str, Any] = {
-        "name": "work",
-        "explained": 0.93,
-        "relative_error": 0.0123,
-        "inputs": "physics",
-        "effects": effects,
-        "predicted": [1.0] * 30,
-        "log_shift": 0.1,
-    }
-    constant: dict[str, Any] = {
-        "name": "steps",
-        "explained": None,
-        "relative_error": None,
-        "inputs": "parameters",
-        "effects": [],
-        "predicted": [3.0] * 30,
-        "log_shift": None,
-    }
-    objectives = [work | {"correction": "work is 1.4 times our peak torque"}, constant | {"correction": ""}]
-    summary["surrogate"] = {"designs": 30, "trials": list(range(30)), "objectives": objectives}
-    (copy / "summary.json").write_text(json.dumps(summary))
-    tab.open(write_report(copy))
-    rows = tab.page.locator("#surrogate tbody tr").all()
-    cells = [[cell.inner_text() for cell in row.locator("td").all()] for row in rows]
-    assert cells[0] == ["work", "93 %", "1.2 %", "peak torque (89 %)", "work is 1.4 times our peak torque"]
-    assert cells[1] == ["steps", "constant", "–", "–", "–"]
-    assert "30 designs" in tab.text("#surrogate-note")
-    assert tab.faults == []
 
 
 def test_playback_continues_after_a_selection(run: Path, tab: Tab) -> None:

@@ -16,8 +16,12 @@ from playwright.sync_api import Browser
 import armwright as aw
 from armwright.experiments.compare_arms import compare_arms
 from armwright.report import drawing
-from armwright.report.figures import write_figures
+from armwright.report.arm_figures import draw_arm
+from armwright.report.drawing import write_drawn
+from armwright.report.figures import chosen_members, draw_samples, write_figures
 from armwright.report.page import write_report
+from armwright.runs.config import FrontMethod
+from armwright.runs.folder import read_run
 from tests.support.browser import Tab
 from tests.support.robots import robot
 from tests.support.text_boxes import TOUCHING, check_texts, overlap
@@ -97,9 +101,19 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> dict[str, Drawn]:
     return found
 
 
+def figures_of_experiments(run: Path) -> Iterator[tuple[str, Figure]]:
+    """Yield the figures that experiments draw of a run."""
+    config, history = read_run(run)
+    if not isinstance(config.method, FrontMethod):
+        yield "samples", draw_samples(history)
+    for title, member in chosen_members(history):
+        yield f"arm-{member.number}", draw_arm(history, title, member)
+
+
 def test_texts_of_figures_are_whole_and_apart(run: Path, drawn: dict[str, Drawn]) -> None:
     write_figures(run)
-    assert len(drawn) >= 3
+    write_drawn(run / "of-experiments", figures_of_experiments(run))
+    assert len(drawn) >= 4
     for name, one in drawn.items():
         figure, texts = one.figure, one.texts
         assert len(texts) > 5

@@ -1,7 +1,6 @@
 """Commands that search designs: design, optimize."""
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -105,7 +104,7 @@ def design(
                 out=folder,
                 watch=watch,
             )
-        drawn = _draw(folder, lambda seconds: plan.left >= seconds) if figures else []
+        drawn = _draw(folder) if figures else []
     except KeyboardInterrupt:
         exit_interrupted(console, f"the search is saved in {folder}/")
     if json_:
@@ -271,13 +270,8 @@ def optimize(
         raise typer.Exit(1)
 
 
-def _draw(folder: Path, has_time: Callable[[float], bool] = lambda _: True) -> list[Path]:
-    """Return the figures of a finished run; draw them and the page if they are missing.
-
-    Args:
-        folder: The run folder.
-        has_time: Returns whether there is time for another figure of so many seconds.
-    """
+def _draw(folder: Path) -> list[Path]:
+    """Return the figures of a finished run; draw them and the page if they are missing."""
     from armwright.report.figures import write_figures
     from armwright.report.page import write_report
     from armwright.runs.folder import RunFolder
@@ -287,4 +281,4 @@ def _draw(folder: Path, has_time: Callable[[float], bool] = lambda _: True) -> l
         existing = sorted((folder / FIGURES).glob("*.png"))
         if not (folder / REPORT).is_file():
             write_report(folder)
-        return existing or write_figures(folder, has_time)
+        return existing or write_figures(folder)

@@ -47,7 +47,7 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
             f"{summary['duplicates']} trial{'s' * (summary['duplicates'] > 1)} repeated the design of an earlier one, "
             "without another evaluation"
         )
-    _show_learned(console, summary.get("surrogate"))
+    _show_surrogate(console, summary.get("surrogate"))
     if summary["proposer"] is not None:
         _show_proposer(console, summary["proposer"])
     is_scaled = TORQUE in problem.objectives
@@ -61,24 +61,15 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
     _show_files(console, run.folder, figures)
 
 
-def _show_learned(console: Console, surrogate: Mapping[str, Any] | None) -> None:
-    """Print how well the surrogate predicts each objective, by what, and how it corrects the built-in physics."""
+def _show_surrogate(console: Console, surrogate: Mapping[str, Any] | None) -> None:
+    """Print how well the surrogate predicts each objective."""
     if surrogate is None:
         return
-    console.print(f"the surrogate's predictions of {surrogate['designs']} designs, each left out in turn:")
-    for one in surrogate["objectives"]:
-        console.print(f"  {_describe_learned(one)}", highlight=False)
-
-
-def _describe_learned(objective: Mapping[str, Any]) -> str:
-    """Return what the surrogate learned of an objective in one sentence."""
-    explained, error, name = objective["explained"], objective["relative_error"], objective["name"]
-    if explained is None:
-        return f"{name}: constant"
-    by = ", ".join(effect["name"].replace("_", " ") for effect in objective["effects"])
-    parts = [f"{name}: {100 * explained:.0f} % of the variance explained" + (f", most by {by}" if by else "")]
-    parts += [] if error is None else [f"median error {100 * error:.2g} %"]
-    return "; ".join([*parts, *filter(None, [objective["correction"]])])
+    errors: dict[str, float | None] = surrogate["errors"]
+    console.print(
+        f"leave-one-out error of the surrogate over {surrogate['designs']} designs, in standard deviations: "
+        + ", ".join(f"{name} {'constant' if error is None else f'{error:.2g}'}" for name, error in errors.items())
+    )
 
 
 def show_front(console: Console, history: History, summary: dict[str, Any]) -> None:

@@ -1,7 +1,6 @@
 """Figures of one run, written to its folder as PNG and PDF."""
 
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,14 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.experiments.compare_arms import ComparedArm, read_existing_arms
 from armwright.pareto import front_indices, hypervolume, knee_index, paper_solution_indices
-from armwright.report.arm_figures import draw_arm, draw_arms
+from armwright.report.arm_figures import draw_arms
 from armwright.report.drawing import (
     draw_dominated,
     frame_plane,
@@ -28,8 +26,6 @@ from armwright.report.drawing import (
 )
 from armwright.report.point_labels import PointLabel, place_labels, place_legend
 from armwright.report.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
-from armwright.report.surrogate_figure import draw_surrogate
-from armwright.runs.attribution import front_by_source, gained_by_source
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import read_run
 from armwright.runs.front_gap import front_gap
@@ -42,61 +38,31 @@ OVERLAP = 0.01  # of the limits of the axes: marks that are nearer to each other
 MARK_PAD = 0.08  # [inch] around a panel with marks on its edge
 
 
-def write_figures(folder: str | Path, has_time: Callable[[float], bool] = lambda _: True) -> list[Path]:
-    """Draw the figures of a run folder and return the PNG files.
-
-    Args:
-        folder: The run folder.
-        has_time: Returns whether there is time for another figure of so many seconds. If not, figures of single
-            designs are left out.
-    """
+def write_figures(folder: str | Path) -> list[Path]:
+    """Draw hypervolume, front and chosen arms of a run folder, and return the PNG files."""
     folder = Path(folder)
     config, history = read_run(folder)
-    is_study = not isinstance(config.method, FrontMethod)
-    summary = read_summary(folder) or {}
-    search, learned = (None, summary.get("surrogate")) if is_study else (summary.get("search"), None)
+    search = (read_summary(folder) or {}).get("search") if isinstance(config.method, FrontMethod) else None
     existing = read_existing_arms(folder, len(config.objectives))
-    return write_drawn(folder / FIGURES, _figures(history, search, learned, existing, has_time))
+    return write_drawn(folder / FIGURES, _figures(history, search, existing))
 
 
 def _figures(
-    history: History,
-    search: Mapping[str, Any] | None,
-    learned: Mapping[str, Any] | None,
-    existing: Sequence[ComparedArm],
-    has_time: Callable[[float], bool],
+    history: History, search: Mapping[str, Any] | None, existing: Sequence[ComparedArm]
 ) -> Iterator[tuple[str, Figure]]:
     """Yield figures by name.
 
     Args:
         history: The trials.
         search: The record of a direct search, whose trials are its front.
-        learned: What the surrogate of a study learned.
         existing: Arms to compare with.
-        has_time: As for `write_figures`.
     """
     if len(history) and history.failed.all():
         return  # there is nothing to draw
-    is_plane = len(history.problem.objectives) > 1  # figures of the first two objectives
-    if search is not None:
-        yield "hypervolume", draw_search(history, search)
-    else:
-        yield "hypervolume", draw_hypervolume(history)
-        if is_plane:
-            yield "samples", draw_samples(history)
-        yield "attribution", draw_attribution(history)
-    if learned is not None:
-        yield "surrogate", draw_surrogate(history, learned)
-    if is_plane:
+    yield "hypervolume", draw_hypervolume(history) if search is None else draw_search(history, search)
+    if len(history.problem.objectives) > 1:
         yield "front", draw_front(history, existing)
-    chosen = chosen_members(history)
-    started = time.monotonic()
-    yield "arms", draw_arms(history, chosen)
-    seconds = time.monotonic() - started  # about as long as for a single design
-    for title, member in chosen:
-        if not has_time(seconds):
-            return
-        yield f"arm-{member.number:04d}", draw_arm(history, title, member)
+    yield "arms", draw_arms(history, chosen_members(history))
 
 
 def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
@@ -189,23 +155,6 @@ def draw_samples(history: History) -> Figure:
     return figure
 
 
-def draw_attribution(history: History) -> Figure:
-    """Draw hypervolume gained and designs on the front over the counted trials, stacked by source."""
-    figure = several_panels(8.4, 3.4)
-    volume, members = figure.subplots(1, 2)
-    _stack(volume, gained_by_source(history) or {})
-    _stack(members, front_by_source(history))
-    x_label = f"Iteration (after {history.n_init} random trials)"
-    volume.set(xlabel=x_label, ylabel="Hypervolume gained", title=_title(history))
-    members.set(xlabel=x_label, ylabel="Designs on the front")
-    members.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
-    if not np.any(history.hypervolume > 0.0):
-        _explain_empty(volume, history)
-    areas = [Patch(**look(source).fill, label=look(source).label) for source in reversed(_sources(history))]
-    figure.legend(handles=areas, loc="outside right center", title="found by", alignment="left")
-    return figure
-
-
 def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure:
     """Draw the final front by source, with the chosen designs labelled and existing arms for comparison."""
     figure, axes = one_panel(5.2, 4.2, MARK_PAD if existing else None)
@@ -284,20 +233,6 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], limits: Ar
     frame_plane(axes, history.problem, reference, limits)
     if not len(inside):
         _explain_empty(axes, history)
-
-
-def _stack(axes: Any, layers: Mapping[str, np.ndarray]) -> None:
-    """Stack the values of each source after 0, 1, …, I iterations, (I + 1,) each."""
-    n = max(map(len, layers.values()), default=1)
-    iterations, lower = np.arange(n), np.zeros(n)
-    for source, numbers in layers.items():
-        upper = lower + numbers
-        axes.fill_between(iterations, lower, upper, step="post", **look(source).fill, linewidth=0)
-        axes.step(iterations, upper, where="post", color="white", linewidth=0.8)
-        lower = upper
-    axes.step(iterations, lower, where="post", color=FRONT, linewidth=1.2)
-    axes.set_xlim(0, max(1, n - 1))
-    axes.set_ylim(bottom=0)
 
 
 def _sources(history: History) -> list[str]:

@@ -352,7 +352,6 @@ def _result(history: History, summary: Mapping[str, Any] | None) -> dict[str, An
         "failed": int(history.failed.sum()),
         "robust": (parts.get("verification") or {}).get("robust_numbers"),
         "search": search.get("hypervolume_history"),
-        "surrogate": parts.get("surrogate"),
     }
 
 

@@ -13,7 +13,7 @@ from armwright.experiments.statistics import Interval, least_p
 from armwright.report.table_cells import format_seeds
 
 # Biases of proposers that tables show.
-BIASES = ("lengths_5_cm", "lengths_1_cm", "base_on_symmetry_plane", "near_repeats", "equal_neighbours")
+BIASES = ("lengths_5_cm", "lengths_1_cm", "base_on_symmetry_plane", "equal_neighbours")
 
 
 def row_records(comparison: Comparison, published: Published = NOTHING_PUBLISHED) -> Iterable[dict[str, Any]]:

@@ -264,10 +264,10 @@ def _proposer_section(comparison: Comparison) -> Section:
     """Return the table of the proposals and their biases."""
     caption = (
         "Means over the runs. 5 cm, 1 cm: designs whose link lengths are all multiples of it. In plane: bases on a "
-        "symmetry plane of the targets. Repeats: designs with the joint types of an earlier one and no number more "
-        "than 1 mm from it. Equal neighbours: pairs of consecutive joints with one type. In brackets: the black box."
+        "symmetry plane of the targets. Equal neighbours: pairs of consecutive joints with one type. In brackets: the "
+        "black box."
     )
-    biases = ["5 cm", "1 cm", "in plane", "repeats", "equal neighbours"]
+    biases = ["5 cm", "1 cm", "in plane", "equal neighbours"]
     head = ["task", "method", "proposals", *biases, "calls", "USD"]
     rows = [
         [

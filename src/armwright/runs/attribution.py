@@ -30,7 +30,7 @@ def attribution_by_source(history: History) -> dict[str, Attribution]:
     """Return the attribution of each source, in the order of their first trials."""
     gains, on_front = hypervolume_gains(history), front_mask(history.masked_objectives)
     attribution: dict[str, Attribution] = {}
-    for source, mine in masks_by_source(history).items():
+    for source, mine in _masks_by_source(history).items():
         gained = None if gains is None else float(gains[mine].sum())
         attribution[source] = Attribution(int(mine.sum()), int(on_front[mine].sum()), gained)
     return attribution
@@ -47,42 +47,7 @@ def hypervolume_gains(history: History) -> Array | None:
     return np.diff(history.hypervolumes, prepend=0.0)
 
 
-def gained_by_source(history: History) -> dict[str, Array] | None:
-    """Return for each source (I + 1,) the hypervolume that its trials gained after 0, 1, …, I counted iterations.
-
-    None without a reference point.
-    """
-    gains = hypervolume_gains(history)
-    if gains is None:
-        return None
-    last = _last_trials(history)
-    return {
-        source: np.concatenate([[0.0], np.cumsum(np.where(mine, gains, 0.0))])[last]
-        for source, mine in masks_by_source(history).items()
-    }
-
-
-def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
-    """Return for each source (I + 1,) its number of trials on the front after 0, 1, …, I counted iterations."""
-    first, *_ = last = _last_trials(history).tolist()
-    on_front = np.flatnonzero(front_mask(history.masked_objectives[:first]))
-    fronts = [on_front]
-    for number in range(first, last[-1]):  # one more trial; a design that has left the front never returns
-        on_front = np.append(on_front, number)
-        on_front = on_front[front_mask(history.masked_objectives[on_front])]
-        fronts.append(on_front)
-    return {
-        source: np.array([np.count_nonzero(mine[front]) for front in fronts])
-        for source, mine in masks_by_source(history).items()
-    }
-
-
-def masks_by_source(history: History) -> dict[str, NDArray[np.bool_]]:
+def _masks_by_source(history: History) -> dict[str, NDArray[np.bool_]]:
     """Return for each source (N,) a mask of its trials, in the order of the first trials."""
     sources = np.array([trial.source for trial in history], dtype=object)
     return {source: sources == source for source in dict.fromkeys(sources.tolist())}
-
-
-def _last_trials(history: History) -> NDArray[np.int_]:
-    """Return (I + 1,) the number of trials after 0, 1, …, I counted iterations."""
-    return np.arange(min(history.n_init, len(history)), len(history) + 1)

@@ -30,7 +30,6 @@ from armwright.runs.infeasibility import ViolationTally, feasibility_record
 from armwright.runs.proposer_bias import proposer_bias
 from armwright.runs.recommendation import HasTime, recommend, unlimited
 from armwright.runs.summary import ProposerSummary, parse_summary
-from armwright.runs.surrogate_summary import SurrogateSummary
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify_front
 
@@ -119,7 +118,7 @@ def summarize(
     config: RunConfig,
     proposer: ProposerSummary | None,
     verification: Verification | None = None,
-    surrogate: SurrogateSummary | None = None,
+    surrogate: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a study."""
     curve = history.hypervolume
@@ -135,7 +134,7 @@ def summarize(
         **_common_record(history, config, history.masked_objectives, volume, verification),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **_failure_record(history, config),
-        **({} if surrogate is None else {"surrogate": asdict(surrogate)}),
+        **({} if surrogate is None else {"surrogate": surrogate}),
         **_screening_record(history, config),
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),

@@ -11,7 +11,6 @@ from armwright.files import replace_surrogates
 from armwright.runs.attribution import Attribution
 from armwright.runs.front_gap import FrontGap
 from armwright.runs.proposer_bias import ProposerBias
-from armwright.runs.surrogate_summary import SurrogateSummary
 from armwright.runs.trial import Count
 
 
@@ -98,6 +97,11 @@ class _Proposer(_Record):
     overlap: _Overlap | None
 
 
+class _Surrogate(_Record):
+    designs: Count
+    errors: dict[str, float | None]
+
+
 class _Seconds(_Record):
     total: float
     sampling: float
@@ -147,7 +151,7 @@ class StudySummary(_Summary):
     hypervolume: _Curve
     duplicates: Count
     failures: dict[str, Count] = {}
-    surrogate: SurrogateSummary | None = None
+    surrogate: _Surrogate | None = None
     screened_out: dict[str, Count] = {}
     attribution: dict[str, Attribution]
     proposer: _Proposer | None

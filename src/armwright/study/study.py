@@ -24,11 +24,10 @@ from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
 from armwright.runs.results import complete_summary, discard_results, summarize, write_results
-from armwright.runs.surrogate_summary import SurrogateSummary
 from armwright.runs.verification import verify_front
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for
 from armwright.search.surrogate.cheap_features import FeatureFunction
-from armwright.search.surrogate.findings import summarize_surrogate
+from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
@@ -447,17 +446,17 @@ class Study:
         history = self._history()
         record = None if self._proposer is None else self._proposer.summary()
         if self._folder is None:
-            summary = summarize(history, self._config, record, surrogate=self._learned(history))
+            summary = summarize(history, self._config, record, surrogate=self._surrogate_errors(history))
             return StudyResult(history, self._config, summary, None, resumed)
         summary = complete_summary(self._folder.path, history)
         if summary is None:
             verification = verify_front(history) if verify else None
-            summary = summarize(history, self._config, record, verification, self._learned(history))
+            summary = summarize(history, self._config, record, verification, self._surrogate_errors(history))
             write_results(self._folder, history, summary, verification)
         return StudyResult(history, self._config, summary, self._folder.path, resumed)
 
-    def _learned(self, history: History) -> SurrogateSummary | None:
-        """Return what the surrogate learned; None with another sampler."""
+    def _surrogate_errors(self, history: History) -> dict[str, Any] | None:
+        """Return the errors of the surrogate's predictions; None with another sampler."""
         if not isinstance(self._sampler, SurrogateFactory):
             return None
-        return summarize_surrogate(self._sampler.surrogate, history)
+        return left_out_errors(self._sampler.surrogate, history)

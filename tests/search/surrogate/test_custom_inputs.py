@@ -12,6 +12,7 @@ from armwright.search.surrogate import candidates
 from armwright.search.surrogate.cheap_features import CheapFeatures
 from armwright.search.surrogate.custom_inputs import CustomInputs
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
+from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.yaml_documents import check_document
 
 CUSTOM: dict[str, Any] = {
@@ -40,8 +41,10 @@ def columns_of(space: aw.DesignSpace, n: int, **values: list[float | str]) -> di
     for name, given in values.items():
         column = [p.name for p in space.parameters].index(name)
         matrix[:, column] = [space.parameters[column].encode(value) for value in given]
-    custom = CustomInputs(space)
-    return dict(zip(custom.names, custom(space.normalised(matrix)).T, strict=True))
+    custom = [p for p in space.parameters if p.name in space.custom_names]
+    names = [p.name for p in custom if isinstance(p, FloatParameter)]
+    names += [f"{p.name} {choice}" for p in custom if isinstance(p, CategoricalParameter) for choice in p.choices]
+    return dict(zip(names, CustomInputs(space)(space.normalised(matrix)).T, strict=True))
 
 
 @pytest.fixture(autouse=True)
@@ -73,15 +76,16 @@ def test_parameters_of_joints_that_do_not_exist_are_zero() -> None:
 
 def test_space_without_custom_parameters_has_no_custom_inputs() -> None:
     space = aw.paper_space(3)
-    assert CustomInputs(space).names == ()
     assert CustomInputs(space)(space.matrix(space.sample(4, 0))).shape == (4, 0)
 
 
 def test_custom_parameters_are_among_the_inputs_of_the_physics() -> None:
-    names = CheapFeatures(Problem(TASK, space_of(), evaluator=lag)).names["physics"]
-    assert {"kp", "cells", "belt gt2", "gear_1", "oil_1 thin"} <= set(names)
-    assert "oil_1 thick" not in names  # the same as "not thin"
-    assert "torque" in names
+    def count(space: aw.DesignSpace) -> int:
+        described = CheapFeatures(Problem(TASK, space, evaluator=lag)).describe(space.matrix(space.sample(5, 0)))
+        return described.inputs["physics"].shape[1]
+
+    # cells, gear_1 to gear_3, three belts, and thin or thick oil in each joint: "thick" is the same as "not thin"
+    assert count(space_of()) - count(space_of({"kp": CUSTOM["kp"]})) == 1 + 3 + 3 + 3
 
 
 def test_objective_of_a_custom_parameter_is_predicted_with_the_physics() -> None:

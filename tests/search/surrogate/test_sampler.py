@@ -14,10 +14,12 @@ from armwright.cli.show_results import show_result
 from armwright.exceptions import SettingsError
 from armwright.problem.evaluators import Evaluator
 from armwright.problem.problem import Problem
-from armwright.runs.history import BBO, RANDOM
+from armwright.runs.history import BBO, RANDOM, History
 from armwright.runs.results import read_summary
+from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_factory, sampler_for, sampler_name
 from armwright.search.surrogate import candidates
+from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.sampler import surrogate_sampler
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
 from armwright.spaces.design_space import DesignSpace, load_space, paper_space
@@ -75,20 +77,55 @@ def test_resumed_run_equals_uninterrupted_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_summary_and_terminal_report_what_was_learned(tmp_path: Path) -> None:
+def test_summary_and_terminal_state_the_errors_of_predictions(tmp_path: Path) -> None:
     run = aw.optimize(problem(), proposer="none", n_init=10, n_total=2, out=tmp_path)
     summary = read_summary(tmp_path)
     assert summary is not None
-    assert summary["surrogate"]["designs"] == 12
-    assert [one["name"] for one in summary["surrogate"]["objectives"]] == ["height", "span"]
+    assert summary["surrogate"] == left_out_errors(Surrogate(problem()), run.history)
     output = io.StringIO()
     show_result(Console(file=output, width=200), run, [])
-    assert "span: " in output.getvalue()
-    assert "% of the variance explained, most by " in output.getvalue()
+    assert "leave-one-out error of the surrogate over 12 designs, in standard deviations: height " in output.getvalue()
+    assert f", span {summary['surrogate']['errors']['span']:.2g}\n" in output.getvalue()
+
+
+def history_of(problem: Problem, values: np.ndarray) -> History:
+    """Return random trials of designs with these values (N, M)."""
+    designs = problem.space.sample(len(values), 3)
+    pairs = enumerate(zip(designs, values.tolist(), strict=True))
+    return History(problem, [FinishedTrial(i, RANDOM, design, tuple(row)) for i, (design, row) in pairs], len(values))
 
 
 @pytest.mark.slow
-def test_other_samplers_learn_nothing() -> None:
+def test_errors_tell_what_is_predictable_from_what_is_not() -> None:
+    designs = problem().space.sample(40, 3)
+    length = np.array([sum(design.links) for design in designs])
+    noise = 2.0 + np.sin(1e4 * length)
+    found = left_out_errors(Surrogate(problem()), history_of(problem(), np.column_stack([noise, length])))
+    assert found is not None
+    assert found["errors"]["span"] < 0.1
+    assert found["errors"]["height"] > 0.8
+
+
+def test_constant_objective_has_no_error() -> None:
+    values = np.column_stack([np.full(12, 3.0), np.random.default_rng(8).uniform(1.0, 2.0, 12)])
+    found = left_out_errors(Surrogate(problem()), history_of(problem(), values))
+    assert found is not None
+    assert found["errors"]["height"] is None
+
+
+def test_few_designs_have_no_errors() -> None:
+    assert left_out_errors(Surrogate(problem()), history_of(problem(), np.ones((9, 2)))) is None
+
+
+def test_repeated_designs_do_not_count() -> None:
+    whole = history_of(problem(), np.random.default_rng(7).uniform(1.0, 2.0, (12, 2)))
+    copies = [FinishedTrial(12 + i, RANDOM, whole.trials[0].design, (1.0, 1.0), duplicate_of=0) for i in range(3)]
+    more = History(whole.problem, [*whole.trials, *copies], 12)
+    assert left_out_errors(Surrogate(problem()), more) == left_out_errors(Surrogate(problem()), whole)
+
+
+@pytest.mark.slow
+def test_other_samplers_state_no_errors() -> None:
     run = aw.optimize(problem(), proposer="none", sampler="tpe", n_init=10, n_total=2)
     assert "surrogate" not in run.summary
 
@@ -118,8 +155,11 @@ def longest_link(design: Design) -> list[float]:
 
 
 def test_custom_features_are_inputs() -> None:
-    names = Surrogate(problem(), longest_link).input_names["physics"]
-    assert names[-1] == "feature 1"
+    designs = problem().space.sample(6, 0)
+    matrix = problem().space.matrix(designs)
+    found = Surrogate(problem(), longest_link).describe(matrix).inputs["physics"]
+    assert found.shape[1] == Surrogate(problem()).describe(matrix).inputs["physics"].shape[1] + 1
+    assert np.corrcoef(found[:, -1], [max(design.links) for design in designs])[0, 1] == pytest.approx(1.0)
 
 
 def test_features_of_optimize_are_those_of_the_surrogate() -> None:
@@ -155,7 +195,7 @@ def test_lambdas_as_features_are_told_apart() -> None:
 @pytest.mark.parametrize("value", [[np.nan], [np.inf, 1.0], [[1.0]]])
 def test_features_that_are_not_finite_numbers_are_refused(value: list[float]) -> None:
     with pytest.raises(SettingsError, match=r"features: expected \d finite numbers for every design, got"):
-        _ = Surrogate(problem(), lambda design: value).input_names
+        Surrogate(problem(), lambda design: value).describe(observed(problem(), 2).matrix)
 
 
 @pytest.mark.parametrize("value", ["long", {"length": 1.0}, [1.0, [2.0]], [None]])
@@ -165,8 +205,10 @@ def test_features_that_are_no_numbers_are_refused(value: object) -> None:
 
 
 def test_features_of_varying_length_are_refused() -> None:
-    with pytest.raises(SettingsError, match="expected 4 finite numbers for every design"):
-        _ = Surrogate(problem(load_space("desk-sorting")), lambda design: design.links).input_names
+    p = problem(load_space("desk-sorting"))
+    matrix = p.space.matrix(p.space.sample(20, 0))
+    with pytest.raises(SettingsError, match=r"expected \d finite numbers for every design"):
+        Surrogate(p, lambda design: design.links).describe(matrix)
 
 
 def test_unknown_name_lists_the_surrogate() -> None:

@@ -14,7 +14,6 @@ import { drawPick, forget, openPick, ranked } from "./pick.js";
 import { drawReach, openReach } from "./reach.js";
 import { arrange, drawRecommended, openRecommended } from "./recommended.js";
 import { fromAddress, keepAddress, set, state } from "./state.js";
-import { drawSurrogate } from "./surrogate.js";
 import { drawTable, openTable } from "./table.js";
 import { drawTranscript, openTranscript } from "./transcript.js";
 import { $ } from "./format.js";
@@ -39,7 +38,6 @@ function open() {
   openPareto(content);
   openTable(content);
   openPick(content);
-  drawSurrogate(content);
   openTranscript(content);
   keepAddress();
   begin();
@@ -59,7 +57,6 @@ function grow() {
   growPareto();
   drawTable();
   drawPick();
-  drawSurrogate(content);
   drawTranscript();
   drawConfiguration();
   drawReach();

@@ -24,7 +24,7 @@ export function openRecommended(shownContent) {
 // Puts the search in numbers after the designs of a task with constraints; for the paper's tasks it comes first.
 export function arrange(head) {
   if (!isForEngineers(head)) return;
-  for (const id of ["curve-box", "surrogate-box", "transcript-box", "configuration-box"]) {
+  for (const id of ["curve-box", "transcript-box", "configuration-box"]) {
     $(id).parentElement.append($(id));
   }
   $("curve-box").classList.add("wide");

@@ -124,28 +124,6 @@ class CheapFeatures:
         columns, violations = self._columns(matrix)
         return Description({name: self._scalings[name](table) for name, table in columns.items()}, violations)
 
-    def quantities(self, matrix: Array) -> Mapping[Objective, Array]:
-        """Return (N,) each quantity of the built-in physics of designs (N, P), not scaled."""
-        values, _ = self._values(matrix)
-        return dict(zip((*self._quantities, *DYNAMIC_QUANTITIES), values.T, strict=True))
-
-    @cached_property
-    def names(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of the columns of each set of inputs."""
-        parameters = self._problem.space.parameters
-        real = [parameters[column].name for column in self._encoding.real]
-        categorical = [p for p in parameters if isinstance(p, CategoricalParameter)]
-        base = [parameters[column].name for column in self._base]
-        counts = [f"{letter} joints" for letter in self._problem.space.joint_types]
-        features = [f"feature {i + 1}" for i in range(self._features(self._probes[:1]).shape[1])]
-        names: dict[str, list[str]] = {
-            PHYSICS: [*(q.name for q in self._quantities), *base, *counts, *self._custom.names, *features],
-            DYNAMICS: [*(q.name for q in DYNAMIC_QUANTITIES), *self._custom.names, *features],
-            PARAMETERS: [*real, *(f"{p.name} {choice}" for p in categorical for choice in p.choices)],
-        }
-        kept: dict[str, list[int]] = {name: scaling.kept.tolist() for name, scaling in self._scalings.items()}
-        return {name: tuple(every[column] for column in kept[name]) for name, every in names.items()}
-
     def _columns(self, matrix: Array) -> tuple[dict[str, Array], Array]:
         """Return the unscaled inputs of designs in each set, and their violations (N, C)."""
         values, violations = self._values(matrix)

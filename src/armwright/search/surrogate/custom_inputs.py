@@ -22,12 +22,6 @@ class CustomInputs:
         self._choices = [(i, p) for i, p in custom if isinstance(p, CategoricalParameter)]
         self._encoding = DesignEncoding([p for _, p in self._numbers])
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        numbers = [p.name for _, p in self._numbers]
-        return (*numbers, *(f"{p.name} {choice}" for _, p in self._choices for choice in p.choices))
-
     def __call__(self, matrix: Array) -> Array:
         """Return the (N, K) inputs of designs (N, P).
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.pareto import feasible_mask, total_violation
-from armwright.problem.objective import Objective
 from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import stated_bounds, with_bounds
 from armwright.search.surrogate.acquisition import Forecast, expected_gain
@@ -69,15 +68,6 @@ class Surrogate:
         """Prepare inputs and sources of candidates."""
         self._features = CheapFeatures(self.problem, self.function)
         self._candidates = Candidates(self.problem)
-
-    @property
-    def input_names(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of the inputs of each set."""
-        return self._features.names
-
-    def quantities(self, matrix: Array) -> Mapping[Objective, Array]:
-        """Return (N,) each quantity of the built-in physics of designs (N, P)."""
-        return self._features.quantities(matrix)
 
     def choose(self, observations: Observations, seed: int) -> Array:
         """Return the (P,) design to evaluate next."""
