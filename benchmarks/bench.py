@@ -2,7 +2,7 @@
 
     python benchmarks/bench.py          # some 25 minutes on two cores
 
-rules.py and overlap.py take long and are run by themselves.
+rules.py takes long and is run by itself.
 """
 
 import os

@@ -11,12 +11,10 @@ Set OMP_NUM_THREADS=1 for `gp` and `botorch`: their threads only get in each oth
 Each finished run is one line of OUT/runs.jsonl. All methods of a seed begin with the same 10 random designs, which
 count as evaluations. Hypervolumes are bounded by the point of `reference_point`.
 
-`gp`, `botorch` (qNEHVI) and `smt` (hierarchical Gaussian processes by SBArchOpt and SMT) need packages that armwright
-does not bring, best in an environment of their own. `botorch` and `smt` take seconds a trial, so they run only if they
-are named by --methods.
+`gp` and `botorch` (qNEHVI) need packages that armwright does not bring, best in an environment of their own. `botorch`
+takes seconds a trial, so it runs only if it is named by --methods.
 
     pip install -e '.[gp]' mujoco optuna-integration==5.0.0 botorch==0.18.1
-    pip install sb-arch-opt==1.7.1 smt==2.15.0 numba==0.68.1
 
 | evaluator | objectives | time |
 |---|---|---|
@@ -39,7 +37,6 @@ from typing import Any
 
 import expensive_evaluators
 import numpy as np
-from hierarchical_gp import hierarchical_gp
 
 import armwright as aw
 from armwright.arrays import Array
@@ -82,10 +79,9 @@ METHODS: Mapping[str, dict[str, Any]] = {
     "nsga2": {"sampler": "nsga2", "proposer": "none"},
     "gp": {"sampler": "gp", "proposer": "none"},
     "botorch": {"sampler": botorch, "proposer": "none"},
-    "smt": {"proposer": "none"},  # its sampler depends on the problem
     "surrogate": {"sampler": "surrogate", "proposer": "none"},
 }
-SLOW = ("botorch", "smt")
+SLOW = ("botorch",)
 OURS, MAIN = "surrogate", ("tpe", "tpe-rules", "surrogate")
 SEEDS_OF_MAIN, SEEDS_OF_OTHERS = 20, 5
 
@@ -177,8 +173,6 @@ def plan(options: argparse.Namespace) -> Iterator[tuple[Cell, str, int]]:
 def execute(cell: Cell, method: str, seed: int, evaluations: int) -> Run:
     """Run a search."""
     problem, settings = problem_of(cell), METHODS[method]
-    if method == "smt":
-        settings: dict[str, Any] = settings | {"sampler": hierarchical_gp(problem, N_INIT)}
     started = time.perf_counter()
     found = aw.optimize(
         problem, **settings, n_init=N_INIT, n_total=evaluations - N_INIT, seed=seed, allow_failures=True

@@ -63,7 +63,7 @@ def compare(name: str, budgets: list[int], options: argparse.Namespace) -> None:
     reference_point = reference_point_of(problem)
     known = known_front(problem)
     assert known is not None
-    best = hypervolume(known.values, reference_point)
+    best = known.hypervolume(reference_point)
     row(name, [ours(problem, reference_point, seed, budgets[-1]) for seed in range(options.seeds)], budgets, best)
     for population in options.populations:
         runs = [pymoo(problem, reference_point, seed, population, budgets) for seed in range(options.seeds)]

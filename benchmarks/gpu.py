@@ -27,7 +27,6 @@ from armwright.exceptions import SettingsError
 from armwright.kinematics.arm_arrays import Precision
 from armwright.kinematics.devices import Device, compilation, cores, resolve_device
 from armwright.kinematics.ik import solve_postures
-from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.front_gap import known_front
 from armwright.search.screening import Screen, pays
@@ -151,7 +150,7 @@ def fronts(name: str, evaluations: int, seeds: int) -> None:
                 search.step()
             found.append((search.hypervolume, time.perf_counter() - began - (compilation.seconds - compiled)))
         known = known_front(problem_on(name, "cpu"))
-        best = found[0][0] if known is None else hypervolume(known.values, reference)
+        best = found[0][0] if known is None else known.hypervolume(reference)
         cells = "".join(f"{volume / best:12.2%}{seconds:6.1f} s" for volume, seconds in found)
         print(f"  {f'{name}, {evaluations:,d}, seed {seed}':34s}{cells}", flush=True)
 

@@ -2,7 +2,8 @@
 
 Of each task the union of: our search with several seeds; in the paper's space, our search within each joint sequence by
 itself, which no other sequence can crowd out; pymoo's NSGA-II; and what was known before. So a run of this script never
-makes a front worse. Tasks with a cycle are searched in the spaces of their names, with fewer evaluations.
+makes a front worse. Tasks with a cycle are searched in the spaces of their names, with fewer evaluations. A file states
+the hypervolume of the union, and contains the designs that keep 99.9 % of it.
 
     python benchmarks/reference_fronts.py [TASK ...]      # some 45 minutes on two idle cores for all
 """
@@ -13,6 +14,7 @@ import sys
 import time
 from pathlib import Path
 
+import moocore
 import numpy as np
 from peers import Nsga2
 from searches import by_sequence, reference_point_of, searched
@@ -21,8 +23,8 @@ import armwright
 from armwright.arrays import Array
 from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
-from armwright.runs.front_gap import known_front
-from armwright.search.survival import front, thinned
+from armwright.runs.front_gap import VOLUME_LINE, known_front
+from armwright.search.survival import front
 from armwright.spaces.design_space import default_space
 from armwright.tasks.catalogue import builtin_tasks
 
@@ -30,7 +32,7 @@ SEEDS, CYCLE_SEEDS = range(3), range(2)  # cycles take a hundred times as long t
 EVALUATIONS, CYCLE_EVALUATIONS = 250_000, 10_000  # for each seed
 PER_SEQUENCE = 2_000
 PYMOO_EVALUATIONS, PYMOO_CYCLE_EVALUATIONS = 30_000, 3_000
-MOST = 1000  # designs of a shipped front
+KEPT = 0.999  # of a front's hypervolume, by its designs in the file
 DECIMALS = 9  # of its parameters: a nanometre, as a micrometre already costs 0.1 % of target-2's hypervolume
 PLACE = Path(armwright.__file__).parent / "runs" / "best_known_fronts"
 
@@ -76,13 +78,27 @@ def make(problem: Problem) -> None:
     everything = np.round(np.vstack(rows), DECIMALS)
     worth = problem.evaluate_matrix(everything).penalised
     on_front = front(worth, np.asarray(reference))
-    kept = on_front[thinned(worth[on_front], np.asarray(reference), MOST)]
-    kept = kept[np.argsort(worth[kept, 0])]
-    words.append(f"all together, at most {MOST} designs kept: {hypervolume(worth[kept], reference):.4f}")
-    print(f"  {problem.task.name}: {words[-1]} in {time.perf_counter() - started:.0f} s", flush=True)
-    before = 0.0 if known is None else hypervolume(values[1], reference)
-    if hypervolume(worth[kept], reference) > before:
-        write(problem, everything[kept], worth[kept], reference, words)
+    volume = hypervolume(worth[on_front], reference)
+    print(f"  {problem.task.name}: together {volume:.4f} in {time.perf_counter() - started:.0f} s", flush=True)
+    if known is None or volume > known.volume:
+        kept = on_front[reduced(worth[on_front], reference)]
+        kept = kept[np.argsort(worth[kept, 0])]
+        write(problem, everything[kept], worth[kept], reference, words, volume)
+
+
+def reduced(values: Array, reference: tuple[float, ...]) -> Array:
+    """Return the indices of points of a front (K, M) that keep KEPT of its hypervolume, among them its ends.
+
+    The point that contributes least is left out, again and again.
+    """
+    kept, least = np.arange(len(values)), KEPT * hypervolume(values, reference)
+    while True:
+        contributions = moocore.hv_contributions(values[kept], ref=list(reference))
+        contributions[np.argmin(values[kept], axis=0)] = np.inf
+        rest = np.delete(kept, np.argmin(contributions))
+        if np.isinf(contributions).all() or hypervolume(values[rest], reference) < least:
+            return kept
+        kept = rest
 
 
 def within_sequences(problem: Problem, reference: tuple[float, ...]) -> tuple[Array, Array]:
@@ -96,12 +112,15 @@ def within_sequences(problem: Problem, reference: tuple[float, ...]) -> tuple[Ar
     return np.vstack(rows), np.vstack(values)
 
 
-def write(problem: Problem, rows: Array, values: Array, reference: tuple[float, ...], words: list[str]) -> None:
+def write(
+    problem: Problem, rows: Array, values: Array, reference: tuple[float, ...], words: list[str], volume: float
+) -> None:
     text = io.StringIO()
     text.write(f"# The best known front of {problem.task.name} in the design space {problem.space.name}.\n")
     text.write("# The union of these searches, to which benchmarks/reference_fronts.py adds; hypervolumes within ")
     text.write(f"({', '.join(f'{value:.4g}' for value in reference)}):\n")
     text.writelines(f"#   {line}\n" for line in words)
+    text.write(f"{VOLUME_LINE}{volume!r} of the whole front; the designs below keep {KEPT:.1%} of it\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([p.name for p in problem.space.parameters] + [o.name for o in problem.objectives])
     for design, row in zip(problem.space.designs(rows), values.tolist(), strict=True):

@@ -43,7 +43,7 @@ def main() -> None:
         known = known_front(problem)
         assert known is not None
         assert problem.reference_point is not None
-        best = hypervolume(known.values, problem.reference_point)
+        best = known.hypervolume(problem.reference_point)
         for method, run in METHODS.items():
             row(f"{name} {method}", [run(problem, seed) for seed in SEEDS], best)
 

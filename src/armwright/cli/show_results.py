@@ -172,11 +172,8 @@ def _show_front_gap(console: Console, gap: dict[str, Any] | None) -> None:
     if gap is None:
         return
     console.print(f"{gap['share']:.1%} of the best known hypervolume ({gap['hypervolume']:.3f})")
-    if gap["beyond"]:
-        console.print(
-            f"NEW: {gap['beyond']} designs dominate or extend the best known front; they add "
-            f"{gap['gain']:.4%} to its hypervolume"
-        )
+    if gap["gain"]:
+        console.print(f"NEW: the front adds at least {gap['gain']:.4%} to the best known hypervolume")
 
 
 def _show_files(console: Console, folder: Path | None, figures: Sequence[Path]) -> None:

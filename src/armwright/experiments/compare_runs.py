@@ -13,7 +13,6 @@ from armwright.exceptions import SettingsError
 from armwright.experiments.run_list import read_finished_runs
 from armwright.experiments.run_summary import RunSummary
 from armwright.experiments.statistics import Interval, PairedTest, can_reject, holm, interval, paired_test
-from armwright.pareto import hypervolume
 from armwright.runs.front_gap import known_front
 
 LEVELS = (0.5, 0.75, 0.9, 0.95)  # shares of the best known hypervolume, for times to target
@@ -146,7 +145,7 @@ class Comparison:
     def best_known(self, task: str) -> float | None:
         """Return the best known hypervolume of a task within the common reference point; None if unknown."""
         known = known_front(self.first_run(task).config.problem)
-        return None if known is None else hypervolume(known.values, self.reference_point(task))
+        return None if known is None else known.hypervolume(self.reference_point(task))
 
     def first_run(self, task: str) -> RunSummary:
         """Return one of the runs on a task, for what they have in common."""

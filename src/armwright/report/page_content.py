@@ -313,7 +313,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "assumed": assumed_values(config.problem),
         "method": describe_method(config),
         "command": repeat_command(config, folder, spent),
-        "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
+        "best_known": None if known is None or reference is None else known.hypervolume(reference),
         "colours": {
             "front": FRONT,
             "missed": MISSED,
