@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.test_cli import SHORT
+from tests.cli.test_cli import DRAWN, SHORT
 from tests.support.command_line import armwright, refused
 
 
@@ -41,7 +41,7 @@ def test_design_continues_its_run_and_starts_from_another(in_folder: Path) -> No
 @pytest.mark.slow
 def test_design_and_optimize_draw_their_figures(in_folder: Path) -> None:
     armwright("design", "target-1", "--evaluations", "1000", "--out", "front")
-    armwright("optimize", "target-1", *SHORT, "--out", "mine")
+    armwright("optimize", "target-1", *DRAWN, "--out", "mine")
     for folder in ("front", "mine"):
         drawn = {path.name for path in (in_folder / folder / "figures").iterdir()}
         assert {"hypervolume.png", "front.png", "arms.pdf"} <= drawn
