@@ -78,9 +78,9 @@ def _watch_signals() -> int:
 
 def _end_late(reader: int) -> None:
     while True:
-        if os.read(reader, 1)[0] not in _SIGNALS:
+        number, installed = os.read(reader, 1)[0], _installed
+        if number not in _SIGNALS or not _is_ending(installed):  # a server that handles signals gets this one
             continue
-        installed = _installed
         for stream in (1, 2):
             if os.isatty(stream):
                 _write(stream, _SHOW_CURSOR)
