@@ -18,6 +18,7 @@ from armwright.runs.optuna_export import export_study
 from armwright.search.samplers import SAMPLERS
 from armwright.study import evaluation_process
 from armwright.study.progress import Progress
+from tests.torture.short import armwright
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 SPACE = aw.paper_space(joints=3)
@@ -246,3 +247,63 @@ def test_timeout_ends_code_that_holds_the_lock_and_crashes_are_failures() -> Non
         assert (trial.failure.kind if trial.failure else None) == expected
     reasons = {trial.failure.reason for trial in found.trials if trial.failure}
     assert reasons == {"no result within 1 s", "the process of the evaluator was ended by SIGSEGV"}
+
+
+RAISING = """
+import armwright as aw, asyncio, os, sys
+
+class Unprintable(Exception):
+    def __str__(self):
+        raise ValueError
+
+def fork(child):
+    if os.fork() == 0:
+        child()
+
+def stop(fault):
+    raise fault
+
+FAULTS = {
+    "CancelledError": lambda: stop(asyncio.CancelledError()),
+    "GeneratorExit": lambda: stop(GeneratorExit()),
+    "SystemExit: 3": lambda: sys.exit(3),
+    "Unprintable: (its __str__ raises ValueError)": lambda: stop(Unprintable()),
+    "forked": lambda: fork(lambda: None),
+    "forked, exits": lambda: fork(sys.exit),
+    "forked, raises": lambda: fork(lambda: stop(ValueError())),
+    "none, ends its fork": lambda: fork(lambda: os._exit(0)),
+}
+
+@aw.evaluator("reach [m]", "number")
+def measure(arm, task):
+    number = int(abs(arm.base[0]) * 1e6) % len(FAULTS)
+    list(FAULTS.values())[number]()
+    return sum(link.length for link in arm.links), number + 1.0
+"""
+
+
+@pytest.mark.slow
+def test_faults_of_an_evaluator_are_failed_trials_wherever_it_runs(in_folder: Path) -> None:
+    (in_folder / "raising.py").write_text(RAISING)
+    faults: dict[str, object] = {}
+    exec(RAISING, faults)  # for the names of the faults
+    names = list(faults["FAULTS"])  # type: ignore[call-overload]
+    runs = {}
+    for place, options in (("here", []), ("process", ["--evaluation-timeout", "60"]), ("workers", ["--workers", "2"])):
+        done = armwright(
+            "optimize", "target-1", "--evaluator", "raising.py:measure", "--proposer", "none", "--sampler", "random",
+            "--n-init", "20", "--n-total", "20", "--no-figures", "--allow-failures", "--json", "--out", place, *options,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+        runs[place] = [
+            [trial["number"], trial["params"]["origin_x"], trial.get("failure", {}).get("reason", "")]
+            for trial in recorded(Path(place))
+        ]
+        assert json.loads(done.stdout)["n_trials"] == len(runs[place]) == 40
+    for number, x, reason in runs["here"]:
+        expected = names[int(abs(x) * 1e6) % len(names)]
+        if expected.startswith("forked"):
+            expected = "returned in a forked process as well; end that process with os._exit"
+        assert reason == ("" if expected.startswith("none") else expected), number
+    assert runs["here"] == runs["process"] == runs["workers"]

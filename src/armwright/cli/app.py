@@ -20,8 +20,9 @@ from armwright.cli import (
     search_commands,
     simulate_command,
 )
-from armwright.cli.signals import INTERRUPTED, install_handlers, open_closed_streams
+from armwright.cli.signals import INTERRUPTED, install_handlers
 from armwright.exceptions import ArmwrightError
+from armwright.user_code import open_closed_streams
 
 app = typer.Typer(
     no_args_is_help=True,

@@ -1,6 +1,5 @@
 """End commands in order on Ctrl-C and SIGTERM."""
 
-import os
 import signal
 import sys
 import threading
@@ -15,15 +14,6 @@ def install_handlers() -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
     sys.unraisablehook = _repeat_dropped_interrupt
-
-
-def open_closed_streams() -> None:
-    """Open stdin, stdout and stderr if they are closed, so that no file of a run gets their number."""
-    for number in range(3):
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
 
 
 def _interrupt(*_: object) -> None:
