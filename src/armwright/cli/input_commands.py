@@ -21,7 +21,7 @@ from armwright.cli.options import (
     load_problem,
 )
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json
+from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -52,7 +52,7 @@ def init(
     task = parse_document(text, Task, TaskError, str(file))
     with naming_write_errors(file, error=FailureError):
         file.write_text(text, encoding="utf-8")
-    print(
+    print_text(
         f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
     )
 
@@ -73,7 +73,7 @@ def edit(
     from armwright.editor.edited_files import EditedFiles
     from armwright.editor.server import serve_editor
 
-    serve_editor(EditedFiles(task, space), lambda address: print(address, flush=True), port, open_)
+    serve_editor(EditedFiles(task, space), print_text, port, open_)
 
 
 def check(
@@ -200,7 +200,7 @@ def draft(
 
     request = " ".join(description)
     if print_prompt:
-        print(draft_prompt(request))
+        print_text(draft_prompt(request))
         print_json(draft_schema())
         return
     console = open_console(json_)
