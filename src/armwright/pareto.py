@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 
-LARGEST_OBJECTIVE = 1e60  # in magnitude; the hypervolume of five objectives stays finite
 PENALTY = 1e100  # of infeasible designs; larger than any objective
 
 

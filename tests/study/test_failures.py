@@ -249,6 +249,18 @@ def test_timeout_ends_code_that_holds_the_lock_and_crashes_are_failures() -> Non
     assert reasons == {"no result within 1 s", "the process of the evaluator was ended by SIGSEGV"}
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", [1e60, -1e60, 1e-300, 5e-324, -0.0])
+def test_values_at_the_limits_of_numbers_are_modelled_and_drawn(tmp_path: Path, scale: float) -> None:
+    """Warnings are errors."""
+    measure = aw.evaluator("reach [m]", "height [m]")(lambda arm, task: (scale * arm.base[0], scale * arm.base[2]))
+    run = aw.optimize(aw.Problem(TASK, SPACE, evaluator=measure), **SHORT, out=tmp_path / "run")
+    assert not run.history.failed.any()
+    json.dumps(run.summary, allow_nan=False, default=str)
+    assert aw.write_report(tmp_path / "run").is_file()
+    assert aw.write_figures(tmp_path / "run")
+
+
 RAISING = """
 import armwright as aw, asyncio, os, sys
 

@@ -86,7 +86,7 @@ def test_target_with_only_a_position_is_a_point() -> None:
             "target 2: expected axis or orientation, got both",
         ),
         ("{position: [0, 0, 1], orientation: [0, 0, 90]}", r"target 2: orientation: expected .* rad.*90° is 1.5708"),
-        ("{position: [0, 0, 1], tolerance: 0}", "target 2: tolerance: expected a number above 0 m, got 0"),
+        ("{position: [0, 0, 1], tolerance: 0}", "target 2: tolerance: expected a number of at least 1e-09 m, got 0"),
         ("{position: [0, 0, 1], angle_tolerance: 0.1}", "target 2: angle_tolerance needs an axis"),
         ("{position: [0, 0, 1], weight: -1}", "target 2: weight"),
         ("{position: [0, 0, 1001]}", "target 2 = .* is more than 1000 m away"),

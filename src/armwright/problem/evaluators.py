@@ -27,9 +27,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arrays import Array
+from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
-from armwright.pareto import LARGEST_OBJECTIVE
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Objective
