@@ -124,7 +124,7 @@ def test_any_exception_of_an_evaluator_is_one_line(in_folder: Path, fault: BaseE
     (trace,) = raised.value.__notes__
     assert len(trace) <= 8_000
     (in_folder / "raises.py").write_text(
-        "from tests.problem.test_evaluators import fault\nraise fault.with_traceback(None)\n"
+        "from tests.problem.test_evaluators import fault\nraise fault.with_traceback(None)\n", encoding="utf-8"
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys.modules[__name__], "fault", fault, raising=False)
@@ -189,7 +189,8 @@ def test_numpy_settings_of_a_file_hold_in_its_evaluator_only(in_folder: Path) ->
         "import armwright as aw, numpy as np\n"
         "np.seterr(all='raise')\n"
         "@aw.evaluator('energy [J]')\n"
-        "def f(arm, task): return np.float64(1.0) / 0.0\n"
+        "def f(arm, task): return np.float64(1.0) / 0.0\n",
+        encoding="utf-8",
     )
     before = np.geterr()
     strict = aw.load_evaluator("strict.py:f")
@@ -299,8 +300,8 @@ def plain(arm, task):
 
 @pytest.fixture
 def file(in_folder: Path) -> Path:
-    (in_folder / "beside.py").write_text("FACTOR = 2.0\n")
-    (in_folder / "sim.py").write_text(FILE)
+    (in_folder / "beside.py").write_text("FACTOR = 2.0\n", encoding="utf-8")
+    (in_folder / "sim.py").write_text(FILE, encoding="utf-8")
     return in_folder / "sim.py"
 
 
@@ -326,10 +327,12 @@ def test_evaluator_file_can_import_its_neighbours(file: Path) -> None:
     ],
 )
 def test_unloadable_evaluator_is_one_line(file: Path, place: str, words: str) -> None:
-    (file.parent / "broken.py").write_text("x = 1\ndef f(:\n")
-    (file.parent / "raises.py").write_text("raise RuntimeError('at once')\n")
-    (file.parent / "exits.py").write_text("raise SystemExit(3)\n")
-    (file.parent / "named.py").write_text("import armwright as aw\n@aw.evaluator('length')\ndef f(arm, task): ...\n")
+    (file.parent / "broken.py").write_text("x = 1\ndef f(:\n", encoding="utf-8")
+    (file.parent / "raises.py").write_text("raise RuntimeError('at once')\n", encoding="utf-8")
+    (file.parent / "exits.py").write_text("raise SystemExit(3)\n", encoding="utf-8")
+    (file.parent / "named.py").write_text(
+        "import armwright as aw\n@aw.evaluator('length')\ndef f(arm, task): ...\n", encoding="utf-8"
+    )
     with pytest.raises(SettingsError, match=words) as raised:
         aw.load_evaluator(place)
     assert "\n" not in str(raised.value)
@@ -345,7 +348,7 @@ def test_run_is_resumed_with_its_own_evaluator(file: Path) -> None:
         return aw.optimize(problem, proposer="rules", n_init=5, n_total=n_total, out="runs/own")
 
     first = run(5, aw.load_evaluator("sim.py:simulate"))
-    (file.parent / "sim.py").write_text(FILE + "# mended\n")
+    (file.parent / "sim.py").write_text(FILE + "# mended\n", encoding="utf-8")
     more = run(8, aw.load_evaluator("sim.py:simulate"))
     assert [t.values for t in more.trials[:10]] == [t.values for t in first.trials]
     assert [v["evaluator"] for v in more.config.earlier_versions] == [first.config.versions["evaluator"]]

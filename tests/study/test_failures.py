@@ -44,7 +44,7 @@ def never(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
 
 
 def recorded(run: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in (run / "trials.jsonl").read_text().splitlines()]
+    return [json.loads(line) for line in (run / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
 
 
 @pytest.fixture(scope="module")
@@ -79,10 +79,10 @@ def test_failed_trials_are_in_no_front_and_no_hypervolume(run: Path) -> None:
 
 
 def test_summary_counts_failures_by_kind(run: Path) -> None:
-    summary = json.loads((run / "summary.json").read_text())
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     kinds = [trial["failure"]["kind"] for trial in recorded(run) if "failure" in trial]
     assert summary["failures"] == {kind: kinds.count(kind) for kind in ("exception", "timeout", "non_finite")}
-    table = (run / "trials.csv").read_text()
+    table = (run / "trials.csv").read_text(encoding="utf-8")
     assert "inf" not in table
     assert table.splitlines()[0].endswith(",reach,height,failure")
 
@@ -296,7 +296,7 @@ def measure(arm, task):
 
 @pytest.mark.slow
 def test_faults_of_an_evaluator_are_failed_trials_wherever_it_runs(in_folder: Path) -> None:
-    (in_folder / "raising.py").write_text(RAISING)
+    (in_folder / "raising.py").write_text(RAISING, encoding="utf-8")
     faults: dict[str, object] = {}
     exec(RAISING, faults)  # for the names of the faults
     names = list(faults["FAULTS"])  # type: ignore[call-overload]

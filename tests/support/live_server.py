@@ -22,7 +22,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, int
     folder = tmp_path_factory.mktemp("served") / "run"
     aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=folder)
     addresses: queue.Queue[str] = queue.Queue()
-    reader, writer = (os.fdopen(end, mode) for end, mode in zip(os.pipe(), ("rb", "wb"), strict=True))
+    reader, writer = (os.fdopen(end, mode, encoding="utf-8") for end, mode in zip(os.pipe(), ("rb", "wb"), strict=True))
     with pytest.MonkeyPatch.context() as patch, reader, writer:
         patch.setattr(live, "LINGER", 0.1)  # not 0: it would end with its first page
         patch.setattr(live, "GRACE", 0.1)

@@ -201,7 +201,7 @@ def test_run_records_target_requirements(tmp_path: Path) -> None:
     run = optimize(problem, n_init=5, n_total=1, out=tmp_path / "run")
     assert read_config(tmp_path / "run").task == problem.task
     (first, *_) = sorted((tmp_path / "run" / "designs").glob("*/design.json"))
-    records = json.loads(first.read_text())["targets"]
+    records = json.loads(first.read_text(encoding="utf-8"))["targets"]
     assert ["angle_error" in record for record in records] == [True, False, True, False]
     number = int(first.parent.name)
     missed = problem.physics([run.history.trials[number].design]).unreached[0]

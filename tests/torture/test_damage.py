@@ -41,7 +41,9 @@ def short(folder: Path, **settings: Any) -> StudyResult:
 def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("intact") / "run"
     short(folder)
-    (folder / "control.json").write_text('{"paused": false, "stop": false, "hints": [{"id": 1, "text": "a hint"}]}')
+    (folder / "control.json").write_text(
+        '{"paused": false, "stop": false, "hints": [{"id": 1, "text": "a hint"}]}', encoding="utf-8"
+    )
     return folder
 
 
@@ -222,11 +224,11 @@ def test_numbers_at_the_limits_are_read_drawn_and_extended(
 
 
 def test_config_truncated_at_any_line_is_refused_or_harmless(tmp_path: Path, intact: Path) -> None:
-    lines = (intact / "config.yaml").read_text().splitlines(keepends=True)
+    lines = (intact / "config.yaml").read_text(encoding="utf-8").splitlines(keepends=True)
     for n in range(len(lines)):
         folder = tmp_path / f"run{n}"
         shutil.copytree(intact, folder)
-        (folder / "config.yaml").write_text("".join(lines[:n]))
+        (folder / "config.yaml").write_text("".join(lines[:n]), encoding="utf-8")
         if resume(folder, "config.yaml", short) == "resumed":
             assert n > len(lines) - 12, lines[n]  # versions that are not told
             assert trials(folder) == trials(intact)
@@ -313,8 +315,8 @@ def test_run_of_a_newer_version_is_refused(tmp_path: Path, intact: Path) -> None
     folder = tmp_path / "run"
     shutil.copytree(intact, folder)
     ours = read_config(intact).versions["armwright"]
-    text = (folder / "config.yaml").read_text().replace(f"armwright: {ours}", "armwright: 99.1.0")
-    (folder / "config.yaml").write_text(f"wheels: 4\n{text}")
+    text = (folder / "config.yaml").read_text(encoding="utf-8").replace(f"armwright: {ours}", "armwright: 99.1.0")
+    (folder / "config.yaml").write_text(f"wheels: 4\n{text}", encoding="utf-8")
     with pytest.raises(ArmwrightError, match=rf'"wheels".*\(written by armwright 99\.1\.0; this is {ours}\)'):
         short(folder)
 
@@ -322,7 +324,9 @@ def test_run_of_a_newer_version_is_refused(tmp_path: Path, intact: Path) -> None
 def test_trial_of_a_newer_version_is_refused(tmp_path: Path, intact: Path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(intact, folder)
-    first, *others = (folder / "trials.jsonl").read_text().splitlines(keepends=True)
-    (folder / "trials.jsonl").write_text(json.dumps({**json.loads(first), "wheels": 4}) + "\n" + "".join(others))
+    first, *others = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
+    (folder / "trials.jsonl").write_text(
+        json.dumps({**json.loads(first), "wheels": 4}) + "\n" + "".join(others), encoding="utf-8"
+    )
     with pytest.raises(ArmwrightError, match="line 1 is damaged"):
         short(folder)

@@ -17,7 +17,7 @@ def test_closed_output_pipe_ends_the_command(tmp_path: Path, whole: Path) -> Non
     """As with `| head -1`."""
     folder = tmp_path / "run"
     process = subprocess.Popen(
-        command(folder, "--no-figures"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command(folder, "--no-figures"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"
     )
     with process:
         assert process.stdout is not None
@@ -42,7 +42,7 @@ def test_closed_standard_streams(tmp_path: Path, whole: Path, closed: str) -> No
 
 
 def test_error_without_a_stderr(tmp_path: Path) -> None:
-    (tmp_path / "run").write_text("")
+    (tmp_path / "run").write_text("", encoding="utf-8")
     done = run(["sh", "-c", 'exec "$@" 2>&-', "sh", *command(tmp_path / "run")])
     assert (done.returncode, done.stderr) == (1, "")
 
@@ -74,7 +74,7 @@ def test_terminal_that_disappears(tmp_path: Path, whole: Path) -> None:
 
 
 def test_error_is_one_line_on_any_stream(tmp_path: Path) -> None:
-    (tmp_path / "run").write_text("")
+    (tmp_path / "run").write_text("", encoding="utf-8")
     assert "cannot write" in one_line(armwright("optimize", "target-1", "--out", tmp_path / "run"))
 
 
@@ -118,7 +118,7 @@ def redirects(arm, task):
 
 @pytest.mark.parametrize("function", ["chats", "closes", "redirects"])
 def test_output_is_ours_alone_whatever_an_evaluator_does(in_folder: Path, function: str) -> None:
-    Path("chatty.py").write_text(CHATTY)
+    Path("chatty.py").write_text(CHATTY, encoding="utf-8")
     study = (
         "optimize", "target-1", "--evaluator", f"chatty.py:{function}", "--proposer", "none", "--no-figures",
         "--n-init", "2", "--n-total", "8", "--out", "run",
@@ -166,7 +166,12 @@ def test_closed_pipe_is_one_line(in_folder: Path, arguments: list[str]) -> None:
     os.close(reader)
     with os.fdopen(writer, "wb") as pipe:
         process = subprocess.run(
-            [sys.executable, "-m", "armwright", *arguments], stdout=pipe, stderr=subprocess.PIPE, text=True, check=False
+            [sys.executable, "-m", "armwright", *arguments],
+            stdout=pipe,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            encoding="utf-8",
         )
     assert process.returncode == 1
     assert process.stderr == "armwright: output pipe closed; rerun the same command to resume an unfinished run\n"

@@ -34,8 +34,9 @@ class DesignRun:
         command = [sys.executable, "-P", "-m", "armwright", "design", *options, "--", str(task)]
         # A session of its own: Ctrl-C in the terminal reaches the editor, which then ends the search in order.
         self._process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            errors="replace", start_new_session=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            encoding="utf-8", errors="replace", start_new_session=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8"},
         )  # fmt: skip
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
