@@ -28,7 +28,7 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
     assert "improved designs" in refined.stdout
     assert " refine " in refined.stdout
     assert "from other initial postures" in refined.stdout
-    refined_summary = json.loads((in_folder / "mine" / "summary.json").read_text())
+    refined_summary = json.loads((in_folder / "mine" / "summary.json").read_text(encoding="utf-8"))
     record = refined_summary["verification"]
     assert record["robust"] + record["sensitive"] == refined_summary["front_size"]
     again = armwright("optimize", "target-1", *SHORT, "--proposer", "none", "--out", "mine")
@@ -59,7 +59,7 @@ def test_robust_and_refine_every(in_folder: Path) -> None:
     summary = json.loads(done.stdout)
     assert summary["evaluations"] > summary["n_trials"]
     assert summary["front_gap"] is None
-    config = (in_folder / "r" / "config.yaml").read_text()
+    config = (in_folder / "r" / "config.yaml").read_text(encoding="utf-8")
     assert "tolerance: 0.001" in config
     assert "refine_every: 3" in config
     line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--refine-every", "3", "--out", "r")
@@ -76,7 +76,8 @@ def test_run_without_a_successful_evaluation_ends_with_an_error(in_folder: Path)
         '    return float("nan"), 1.0\n\n\n'
         '@aw.evaluator("reach [m]", "height [m]")\n'
         "def sometimes(arm, task):\n"
-        '    return (float("nan") if arm.base[0] > 0.0 else 1.0), 1.0\n'
+        '    return (float("nan") if arm.base[0] > 0.0 else 1.0), 1.0\n',
+        encoding="utf-8",
     )
     for name, code in (("never", 1), ("sometimes", 0)):
         for form in ((), ("--json",)):
@@ -129,8 +130,8 @@ def test_optimize_and_refine_reject_a_design_run(in_folder: Path) -> None:
 
 def test_optimize_names_design_for_tasks_with_constraints(in_folder: Path) -> None:
     task = ("name: near", "targets: [[0.3, 0.0, 0.3], [0.2, 0.1, 0.4]]", "reference_point: [1, 1]")
-    (in_folder / "free.yaml").write_text("\n".join(task))
-    (in_folder / "bound.yaml").write_text("\n".join([*task, "constraints: [worst_error <= 0.01]"]))
+    (in_folder / "free.yaml").write_text("\n".join(task), encoding="utf-8")
+    (in_folder / "bound.yaml").write_text("\n".join([*task, "constraints: [worst_error <= 0.01]"]), encoding="utf-8")
     line = "`armwright design bound.yaml` suits this task better"
     short = (*SHORT, "--no-figures")
     assert line in armwright("optimize", "bound.yaml", *short, "--out", "a").stdout

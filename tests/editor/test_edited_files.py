@@ -38,32 +38,32 @@ def test_new_files_begin_with_templates_and_are_written_by_save(tmp_path: Path) 
 def test_a_file_that_changed_on_disk_is_kept(tmp_path: Path) -> None:
     files = EditedFiles(tmp_path / "new.yaml")
     files.save(files.texts())
-    (tmp_path / "new.yaml").write_text("name: theirs\n")
+    (tmp_path / "new.yaml").write_text("name: theirs\n", encoding="utf-8")
     mine = Texts("name: mine\n", files.texts().space)
     with pytest.raises(ChangedOnDiskError, match=r"new\.yaml has changed"):
         files.save(mine)
-    assert (tmp_path / "new.yaml").read_text() == "name: theirs\n"
+    assert (tmp_path / "new.yaml").read_text(encoding="utf-8") == "name: theirs\n"
     files.save(mine, overwrite=True)
-    assert (tmp_path / "new.yaml").read_text() == "name: mine\n"
+    assert (tmp_path / "new.yaml").read_text(encoding="utf-8") == "name: mine\n"
     files.save(Texts("name: later\n", mine.space))
 
 
 def test_a_file_that_appeared_meanwhile_is_kept(tmp_path: Path) -> None:
     files = EditedFiles(tmp_path / "new.yaml")
-    (tmp_path / "new-space.yaml").write_text("name: theirs\n")
+    (tmp_path / "new-space.yaml").write_text("name: theirs\n", encoding="utf-8")
     with pytest.raises(ChangedOnDiskError, match=r"new-space\.yaml"):
         files.save(files.texts())
     assert not (tmp_path / "new.yaml").exists()
 
 
 def test_links_and_modes_stay(tmp_path: Path) -> None:
-    (tmp_path / "real.yaml").write_text("name: one\n")
+    (tmp_path / "real.yaml").write_text("name: one\n", encoding="utf-8")
     (tmp_path / "real.yaml").chmod(0o600)
     (tmp_path / "link.yaml").symlink_to(tmp_path / "real.yaml")
     files = EditedFiles(tmp_path / "link.yaml")
     files.save(Texts("name: two\n", files.texts().space))
     assert (tmp_path / "link.yaml").is_symlink()
-    assert (tmp_path / "real.yaml").read_text() == "name: two\n"
+    assert (tmp_path / "real.yaml").read_text(encoding="utf-8") == "name: two\n"
     assert stat.S_IMODE((tmp_path / "real.yaml").stat().st_mode) == 0o600
 
 

@@ -126,11 +126,11 @@ def test_constant_objective_is_drawn(value: float) -> None:
 def test_figure_is_redrawn_from_the_run_folder(tmp_path: Path) -> None:
     run = optimize(Problem(load_task("target-1")), proposer="none", n_init=4, n_total=8, out=tmp_path)
     assert tmp_path / "figures" / "surrogate.png" not in write_figures(tmp_path)
-    summary = json.loads((tmp_path / "summary.json").read_text())
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     found = {"relative_error": 0.1, "inputs": "physics", "correction": ""}
     record = learned(run.history.values)
     record["objectives"] = [{"name": name} | found | one for name, one in zip("ab", record["objectives"], strict=True)]
-    (tmp_path / "summary.json").write_text(json.dumps(summary | {"surrogate": record}))
+    (tmp_path / "summary.json").write_text(json.dumps(summary | {"surrogate": record}), encoding="utf-8")
     first = {path.name: path.read_bytes() for path in write_figures(tmp_path)}
     assert "surrogate.png" in first
     assert {path.name: path.read_bytes() for path in write_figures(tmp_path)} == first

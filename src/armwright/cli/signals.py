@@ -42,15 +42,6 @@ def install_handlers() -> None:
     sys.unraisablehook = _repeat_dropped_interrupt
 
 
-def open_closed_streams() -> None:
-    """Open stdin, stdout and stderr if they are closed, so that no file of a run gets their number."""
-    for number in range(3):
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
-
-
 def _interrupt(*_: object) -> None:
     """Raise KeyboardInterrupt; a second signal ends the process at once, as kill -9 may at any moment."""
     for number in _SIGNALS:
