@@ -18,7 +18,7 @@ def check(folder: Path) -> list[str]:
     """Return why a design fails; nothing if it passes."""
     model = mujoco.MjModel.from_xml_path(str(folder / "arm.xml"))
     data = mujoco.MjData(model)
-    with (folder / "trajectory.csv").open() as file:
+    with (folder / "trajectory.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     n = model.nu // 2
     q, tau = (np.array([[float(r[f"{x}_{k + 1}"]) for k in range(n)] for r in rows]) for x in ("q", "tau"))

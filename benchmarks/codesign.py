@@ -190,7 +190,7 @@ def compare_engines(file: Path, most: int) -> None:
 
 
 def read(file: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
 
 
 def summarize(file: Path) -> None:
@@ -234,7 +234,7 @@ def main() -> None:
     done = {(line["method"], line["budget"], line["seed"]) for line in read(options.file)}
     for seed, budget, method in itertools.product(range(options.seeds), options.budgets, METHODS):
         if (method, budget, seed) not in done:
-            with options.file.open("a") as file:
+            with options.file.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(record(Cell(method, budget, seed, options.sampler))) + "\n")
     summarize(options.file)
 

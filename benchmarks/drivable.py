@@ -139,7 +139,7 @@ def problem(name: str) -> aw.Problem:
 def independent(member: SimulatedMember, folder: Path) -> list[str]:
     """Return why a design fails by the check that knows its files only."""
     for name, content in member.files.items():
-        (folder / name).write_text(content)
+        (folder / name).write_text(content, encoding="utf-8")
     return check_simulation.check(folder)
 
 

@@ -42,12 +42,16 @@ def show(folder: Path, task: str, budget: int, *options: str, environment: dict[
     command = [sys.executable, "-m", "armwright", "design", task, "--budget", f"{budget}s", "--no-stall", *options]
     started = time.monotonic()
     done = subprocess.run(
-        [*command, "--out", str(folder)], env={**os.environ, **(environment or {})}, capture_output=True, text=True
+        [*command, "--out", str(folder)],
+        env={**os.environ, **(environment or {})},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
     )
     wall = time.monotonic() - started
     if done.returncode:
         sys.exit(done.stdout + done.stderr)
-    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text())
+    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     allowed = budget + max(3.0, 0.1 * budget) + COMPILATION * bool(environment)
     figures = len(list((folder / "figures").glob("*.png")))
     recommended = summary.get("recommended", [])

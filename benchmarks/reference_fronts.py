@@ -127,7 +127,7 @@ def write(
         params = [design.params.get(parameter.name, "") for parameter in problem.space.parameters]
         writer.writerow([*params, *(f"{value:.9g}" for value in row)])
     PLACE.mkdir(exist_ok=True)
-    (PLACE / f"{problem.task.name}.csv").write_text(text.getvalue())
+    (PLACE / f"{problem.task.name}.csv").write_text(text.getvalue(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -179,7 +179,7 @@ def main() -> None:
 
 def in_process(part: str, n: int, folder: Path) -> list[Look]:
     command = [sys.executable, __file__, "--part", part, str(n), str(folder)]
-    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, encoding="utf-8")
     return [Look(**look) for look in json.loads(done.stdout.splitlines()[-1])]
 
 

@@ -59,7 +59,7 @@ def planted(in_folder: Path) -> Path:
     """A working folder with modules that leave a note when they are imported."""
     for name in PLANTED:
         (in_folder / f"{name}.py").write_text(
-            f'open("{in_folder}/note", "a").write("{name}\\n")\nraise SystemExit(3)\n'
+            f'open("{in_folder}/note", "a").write("{name}\\n")\nraise SystemExit(3)\n', encoding="utf-8"
         )
     return in_folder
 
@@ -68,8 +68,8 @@ def planted(in_folder: Path) -> Path:
 @pytest.mark.parametrize("name", COMMANDS)
 def test_planted_modules_are_not_imported(planted: Path, tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
     there = tmp_path_factory.mktemp("there")
-    (there / "ev.py").write_text(EVALUATOR)
-    (there / "plan.yaml").write_text(PLAN + "n_init: 2\nn_total: 2\n")
+    (there / "ev.py").write_text(EVALUATOR, encoding="utf-8")
+    (there / "plan.yaml").write_text(PLAN + "n_init: 2\nn_total: 2\n", encoding="utf-8")
     arguments = [argument.format(there=there) for argument in COMMANDS[name]]
     with started(*arguments) as process:
         _, errors = process.communicate(timeout=PATIENCE)
@@ -79,10 +79,10 @@ def test_planted_modules_are_not_imported(planted: Path, tmp_path_factory: pytes
 
 @pytest.mark.slow
 def test_modules_beside_an_evaluator_hide_none_of_pythons_own(in_folder: Path) -> None:
-    (in_folder / "ev.py").write_text(f"import helper\n{EVALUATOR}")
-    (in_folder / "helper.py").write_text("")
+    (in_folder / "ev.py").write_text(f"import helper\n{EVALUATOR}", encoding="utf-8")
+    (in_folder / "helper.py").write_text("", encoding="utf-8")
     for name in ("json", "queue", "pickle", "secrets", "statistics"):
-        (in_folder / f"{name}.py").write_text(f'open("{in_folder}/note", "a").write("{name}\\n")\n')
+        (in_folder / f"{name}.py").write_text(f'open("{in_folder}/note", "a").write("{name}\\n")\n', encoding="utf-8")
     how = ("--evaluator", "ev.py:reach", "--evaluation-timeout", "60", "--workers", "2")
     with started("optimize", "target-1", *SHORT, *how) as process:
         _, errors = process.communicate(timeout=PATIENCE)
@@ -110,7 +110,12 @@ def started(*arguments: str) -> Iterator[subprocess.Popen[Any]]:
     heed: Callable[[], object] = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
     command = [sys.executable, "-P", "-m", "armwright", *arguments]
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        preexec_fn=heed,
     ) as process:
         yield process
         process.kill()

@@ -59,7 +59,7 @@ def test_replaced_file_is_never_read_in_part(tmp_path: Path) -> None:
 def test_files_of_the_user_survive(tmp_path: Path) -> None:
     names = ["x.part", ".x.part", "x.old", ".x.0123456789abcdef.part", ".x.1-0123456789abcdef.part"]
     for name in names:
-        (tmp_path / name).write_text("mine")
+        (tmp_path / name).write_text("mine", encoding="utf-8")
     replace_file(tmp_path / "x", b"new")
     (tmp_path / "folder").mkdir()
     replace_folder(tmp_path / "folder", None)
@@ -96,12 +96,16 @@ def test_private_file_is_private_from_the_start(tmp_path: Path, monkeypatch: pyt
 
 def test_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
     victim, link = tmp_path / "victim", tmp_path / "link"
-    victim.write_text("before")
+    victim.write_text("before", encoding="utf-8")
     link.symlink_to(victim)
     with pytest.raises(OSError, match="symbolic links"):
         open_to_append(link)
     replace_file(link, b"after")
-    assert (victim.read_text(), link.read_text(), link.is_symlink()) == ("before", "after", False)
+    assert (victim.read_text(encoding="utf-8"), link.read_text(encoding="utf-8"), link.is_symlink()) == (
+        "before",
+        "after",
+        False,
+    )
 
 
 def test_failed_replacement_leaves_nothing(tmp_path: Path) -> None:
@@ -123,13 +127,13 @@ def test_pipes_are_refused(tmp_path: Path) -> None:
 def test_old_names_of_next_contents_lead_nowhere(run: Path, tmp_path: Path, command: str) -> None:
     """An unpacked run holds `trials.csv.part -> ../.bashrc`, and the like for every file that a command may write."""
     victim = tmp_path / "victim"
-    victim.write_text("export PATH")
+    victim.write_text("export PATH", encoding="utf-8")
     for path in [run, *run.rglob("*")]:
         if path.is_file():
             path.with_name(f"{path.name}.part").symlink_to(victim)
     line = refused(1, *WRITERS[command], run)
     assert ".part is a link; remove it" in line
-    assert victim.read_text() == "export PATH"
+    assert victim.read_text(encoding="utf-8") == "export PATH"
 
 
 NAMES = (
@@ -148,7 +152,7 @@ def test_links_among_the_files_of_a_run_are_refused(run: Path, tmp_path: Path, c
     elif name in ("designs", "figures", "artifacts", "reach-maps", "datasheets"):
         outside.mkdir()
     else:
-        outside.write_text("")
+        outside.write_text("", encoding="utf-8")
     before = {path: path.read_bytes() for path in [outside, *outside.rglob("*")] if path.is_file()}
     place.symlink_to(outside)
     assert f"{place} is a link; remove it, or put the file itself in its place" in refused(1, *WRITERS[command], run)
@@ -157,7 +161,10 @@ def test_links_among_the_files_of_a_run_are_refused(run: Path, tmp_path: Path, c
 
 def test_links_in_the_folder_of_an_experiment_are_refused(tmp_path: Path) -> None:
     plan, out, outside = tmp_path / "plan.yaml", tmp_path / "out", tmp_path / "outside"
-    plan.write_text("name: small\ntasks: [target-1]\nmethods: {tpe: {label: TPE}}\nseeds: 1\nn_init: 2\nn_total: 2\n")
+    plan.write_text(
+        "name: small\ntasks: [target-1]\nmethods: {tpe: {label: TPE}}\nseeds: 1\nn_init: 2\nn_total: 2\n",
+        encoding="utf-8",
+    )
     outside.mkdir()
     out.mkdir()
     (out / "target-1").symlink_to(outside)

@@ -69,7 +69,7 @@ from tests.fuzz.run_targets import a_run, looked_at
 )
 def test_hostile_documents_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "task.yaml"
-    file.write_text(text)
+    file.write_text(text, encoding="utf-8")
     with pytest.raises(TaskError, match=words) as refusal:
         load_task(file)
     assert str(refusal.value).isprintable()
@@ -90,13 +90,13 @@ def test_endless_and_huge_files_are_refused(tmp_path: Path) -> None:
 def test_task_with_ten_thousand_targets_is_read(tmp_path: Path) -> None:
     record = "{position: [0.1, 0.2, 0.3], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}"
     file = tmp_path / "task.yaml"
-    file.write_text("name: many\ntargets:\n" + f"  - {record}\n" * 10_000)
+    file.write_text("name: many\ntargets:\n" + f"  - {record}\n" * 10_000, encoding="utf-8")
     assert len(load_task(file).targets) == 10_000
 
 
 def test_experiment_with_too_many_cells_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
-    file.write_text("name: x\ntasks: all\nseeds: 10000\nmethods: {a: {label: A}}\n")
+    file.write_text("name: x\ntasks: all\nseeds: 10000\nmethods: {a: {label: A}}\n", encoding="utf-8")
     with pytest.raises(SettingsError, match="310,000 cells"):
         plan_cells(*load_experiment(str(file)), tmp_path)
 
@@ -104,7 +104,7 @@ def test_experiment_with_too_many_cells_is_refused(tmp_path: Path) -> None:
 def test_experiment_with_line_breaks_in_its_commands_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     method = '{label: A, proposer: llm, model_options: {prompt: "a\\n"}}'
-    file.write_text(f"name: x\ntasks: [target-1]\nseeds: 1\nmethods: {{a: {method}}}\n")
+    file.write_text(f"name: x\ntasks: [target-1]\nseeds: 1\nmethods: {{a: {method}}}\n", encoding="utf-8")
     with pytest.raises(SettingsError, match="is not printable") as refusal:
         plan_cells(*load_experiment(str(file)), tmp_path)
     assert str(refusal.value).isprintable()
@@ -112,7 +112,7 @@ def test_experiment_with_line_breaks_in_its_commands_is_refused(tmp_path: Path) 
 
 def test_range_from_zero_to_minus_zero_is_one_value(tmp_path: Path) -> None:
     file = tmp_path / "space.yaml"
-    file.write_text("name: x\norigin_z: [0.0, -0.0]\n")
+    file.write_text("name: x\norigin_z: [0.0, -0.0]\n", encoding="utf-8")
     assert [design.origin[2] for design in load_space(file).sample(3, 0)] == [0.0] * 3
 
 
@@ -141,21 +141,21 @@ def run(tmp_path: Path) -> Path:
 )  # fmt: skip
 @pytest.mark.fast_cases(3)
 def test_damaged_summary_is_made_again(run: Path, place: tuple[str, ...], value: object) -> None:
-    summary = json.loads((run / "summary.json").read_text())
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     within = summary
     for key in place[:-1]:
         within = within[key]
     within[place[-1]] = value
-    (run / "summary.json").write_text(json.dumps(summary))
+    (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     assert read_summary(run) is None
     looked_at(run)
 
 
 def remove_setting(run: Path, field: str) -> None:
-    text = (run / "config.yaml").read_text()
+    text = (run / "config.yaml").read_text(encoding="utf-8")
     assert f"    {field}: " in text
     lines = [line for line in text.splitlines() if not line.startswith(f"    {field}: ")]
-    (run / "config.yaml").write_text("\n".join(lines))
+    (run / "config.yaml").write_text("\n".join(lines), encoding="utf-8")
 
 
 @pytest.mark.parametrize("field", ["proposals", "memory", "answer", "name"])
@@ -172,18 +172,18 @@ def test_config_without_a_prompt_is_read(run: Path) -> None:
 
 @pytest.mark.parametrize("values", [[], [1.0], [1.0, 2.0, 3.0], [float("nan"), 1.0]], ids=str)
 def test_existing_arms_with_other_objectives_are_refused(run: Path, values: list[float]) -> None:
-    arms = json.loads((run / "existing_arms.json").read_text())
+    arms = json.loads((run / "existing_arms.json").read_text(encoding="utf-8"))
     arms[0]["values"] = values
-    (run / "existing_arms.json").write_text(json.dumps(arms))
+    (run / "existing_arms.json").write_text(json.dumps(arms), encoding="utf-8")
     with pytest.raises(RunFolderError, match="compare the arms again"):
         write_report(run)
 
 
 @pytest.mark.parametrize("value", ["x", "llm-", "llm-x", "llm-9999999999", "-1\n"])
 def test_transcript_with_an_invalid_proposal_is_refused(run: Path, value: str) -> None:
-    calls = [json.loads(line) for line in (run / "transcripts.jsonl").read_text().splitlines()]
+    calls = [json.loads(line) for line in (run / "transcripts.jsonl").read_text(encoding="utf-8").splitlines()]
     calls[1]["proposal"] = value
-    (run / "transcripts.jsonl").write_text("".join(f"{json.dumps(call)}\n" for call in calls))
+    (run / "transcripts.jsonl").write_text("".join(f"{json.dumps(call)}\n" for call in calls), encoding="utf-8")
     with pytest.raises(RunFolderError, match="line 2 is damaged"):
         Transcript(run / "transcripts.jsonl")
 
@@ -215,7 +215,7 @@ def test_invalid_server_address_is_refused(url: str) -> None:
 def test_hostile_urdf_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
     """No entity is declared, nothing is fetched, and xacro is not expanded."""
     file = tmp_path / "arm.urdf"
-    file.write_text(text)
+    file.write_text(text, encoding="utf-8")
     with pytest.raises(ArmwrightError) as refusal:
         read_urdf(file)
     assert str(refusal.value).isprintable()
@@ -224,12 +224,12 @@ def test_hostile_urdf_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
 @pytest.mark.parametrize("text", ["{{ " + "(" * 300 + "1" + ")" * 300 + " }}", "{{ " + "-" * 300 + "1 }}"])
 def test_deeply_nested_template_is_read_or_refused(tmp_path: Path, text: str) -> None:
     """Python refuses what jinja makes of it."""
-    (tmp_path / "mine.md.j2").write_text(text)
+    (tmp_path / "mine.md.j2").write_text(text, encoding="utf-8")
     with suppress(SettingsError):
         load_prompt(tmp_path / "mine.md.j2")
 
 
 def test_template_with_too_many_digits_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "mine.md.j2").write_text("{{ " + "9" * 5000 + " }}")
+    (tmp_path / "mine.md.j2").write_text("{{ " + "9" * 5000 + " }}", encoding="utf-8")
     with pytest.raises(SettingsError, match="cannot be read: Exceeds the limit"):
         load_prompt(tmp_path / "mine.md.j2")

@@ -66,7 +66,7 @@ def reads_in_time(pattern: Pattern, seconds: float = SECONDS) -> bool:
     given = json.dumps([pattern.text, pattern.flags, pattern.searches, units, ends, LETTERS])
     command = [sys.executable, "-I", "-c", MATCH]
     try:
-        subprocess.run(command, input=given, text=True, timeout=seconds, check=True)
+        subprocess.run(command, input=given, encoding="utf-8", timeout=seconds, check=True)
     except subprocess.TimeoutExpired:
         return False
     return True

@@ -14,7 +14,7 @@ from tests import ROOT
 
 
 def test_public_names_match_the_stub() -> None:
-    stub = ast.parse(Path(str(aw.__file__)).with_suffix(".pyi").read_text())
+    stub = ast.parse(Path(str(aw.__file__)).with_suffix(".pyi").read_text(encoding="utf-8"))
     imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
     exported = {alias.asname: node.module for node in imports for alias in node.names}
     assert aw.__all__ == dir(aw) == sorted(exported)
@@ -27,7 +27,7 @@ def test_public_names_match_the_stub() -> None:
 
 @pytest.mark.slow
 def test_python_code_of_the_readme_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    readme = (ROOT / "README.md").read_text()
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
     names: dict[str, Any] = {}
     exec(code, names)

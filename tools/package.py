@@ -46,7 +46,9 @@ def build() -> tuple[Path, Path]:
 
 def check_sdist(sdist: Path) -> None:
     """Check that the sdist holds exactly the files of git."""
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    listed = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True, encoding="utf-8"
+    ).stdout
     tracked = {name for name in listed.splitlines() if not name.startswith(NOT_PACKED)}
     with tarfile.open(sdist) as archive:
         packed = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
@@ -55,7 +57,9 @@ def check_sdist(sdist: Path) -> None:
 
 def check_wheel(wheel: Path) -> None:
     """Check that the wheel holds src/armwright, its metadata and the licences, and nothing else."""
-    listed = subprocess.run(["git", "ls-files", "src"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    listed = subprocess.run(
+        ["git", "ls-files", "src"], cwd=ROOT, check=True, capture_output=True, text=True, encoding="utf-8"
+    ).stdout
     tracked = {name.removeprefix("src/") for name in listed.splitlines()}
     info = "-".join(wheel.name.split("-")[:2]) + ".dist-info/"
     licences = {f"{info}licenses/{name}" for name in listed.splitlines() if name.endswith("LICENSE")}

@@ -87,8 +87,8 @@ def engineer(size: tuple[int, int]) -> Shot:
 def infeasible_report(folder: Path, page: Page, file: Path) -> None:
     """Show the report of a task that asks too much."""
     task = folder / "strict.yaml"
-    text = (EXAMPLES / "8-stiffness-task.yaml").read_text()
-    task.write_text(text.replace("deflection <= 0.001", "deflection <= 0.0002"))
+    text = (EXAMPLES / "8-stiffness-task.yaml").read_text(encoding="utf-8")
+    task.write_text(text.replace("deflection <= 0.001", "deflection <= 0.0002"), encoding="utf-8")
     command = ("design", task, "--space", EXAMPLES / "8-stiffness-space.yaml", "--evaluations", 1000)
     open_report(page, once(folder, "runs/strict", *command), (1280, 700))
     page.screenshot(path=file)
@@ -97,7 +97,9 @@ def infeasible_report(folder: Path, page: Page, file: Path) -> None:
 def live_report(folder: Path, page: Page, file: Path) -> None:
     """Show a run in progress."""
     command = [Path(sys.executable).with_name("armwright"), "optimize", "target-3", "--n-total", "2000", "--live"]
-    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as study:
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8"
+    ) as study:
         assert study.stdout is not None
         address = next(found[0] for line in study.stdout if (found := re.search(r"http://\S+", line)))
         page.set_viewport_size({"width": 900, "height": 760})
@@ -112,10 +114,10 @@ def live_report(folder: Path, page: Page, file: Path) -> None:
 
 def tutorial(folder: Path, page: Page, file: Path) -> None:
     """Show the report of the tutorial's second search."""
-    text = (DOCS / "tutorial.md").read_text()
+    text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
     for name, key in (("feeder.yaml", "name: feeder"), ("space.yaml", "name: servo-arm")):
         block = next(b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if b.startswith(key))
-        (folder / name).write_text(block)
+        (folder / name).write_text(block, encoding="utf-8")
     command = ["design", "feeder.yaml", "--space", "space.yaml", "--evaluations", 8000, "--seed", 1]
     open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=1&target=3")
     page.screenshot(path=file)
@@ -204,7 +206,7 @@ def editor(folder: Path, page: Page, file: Path) -> None:
     for part in ("task", "space"):
         shutil.copy(EXAMPLES / f"2-assembly-{part}.yaml", folder)
     command = [Path(sys.executable).with_name("armwright"), "edit", "2-assembly-task.yaml"]
-    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True, encoding="utf-8") as server:
         assert server.stdout is not None
         page.set_viewport_size({"width": 1280, "height": 1480})
         page.emulate_media(color_scheme="light")

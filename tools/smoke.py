@@ -119,7 +119,7 @@ def main(folder: Path) -> None:
 
     armwright("design", "target-1", "--evaluations", "100000", "--out", "front")
     armwright("check", "target-1")
-    Path("two-methods.yaml").write_text(EXPERIMENT)
+    Path("two-methods.yaml").write_text(EXPERIMENT, encoding="utf-8")
     told = json.loads(armwright("experiment", "two-methods.yaml", "--out", "cells", "--json").stdout)
     assert told
     armwright("compare", "cells", "--out", "compared")
@@ -129,7 +129,7 @@ def main(folder: Path) -> None:
     armwright("actuators")
     armwright("init", "mine.yaml")
     armwright("optimize", "mine.yaml", "--n-total", "10", "--no-figures", "--robust", "--space", "slideopt")
-    Path("driven.yaml").write_text(CYCLE)
+    Path("driven.yaml").write_text(CYCLE, encoding="utf-8")
     armwright("optimize", "driven.yaml", "--n-init", "2", "--n-total", "2", "--no-figures", "--out", "driven")
     armwright("prompt", "target-1")
     armwright(
@@ -141,14 +141,14 @@ def main(folder: Path) -> None:
     assert health.count("-- extra") == 6, health
     assert 'pip install "armwright[llm]"' in armwright("doctor", "--model", "openai-chat:gpt-4o", code=1).stdout
 
-    Path("gp.yaml").write_text(EXPERIMENT.replace("proposer: none", "proposer: none, sampler: gp"))
+    Path("gp.yaml").write_text(EXPERIMENT.replace("proposer: none", "proposer: none, sampler: gp"), encoding="utf-8")
     for extra, *asked in NEEDS:
         done = armwright(*asked, code=2, OPENAI_API_KEY="sk-none")
         (line,) = [line for line in done.stderr.splitlines() if "Warning" not in line and not line.startswith("  ")]
         assert line.startswith("armwright: "), line
         assert f'pip install "armwright[{extra}]"' in line, line
 
-    Path("script.py").write_text(PYTHON)
+    Path("script.py").write_text(PYTHON, encoding="utf-8")
     python("script.py")
     print(f"all of it works on Python {sys.version.split()[0]}, in {folder}")
 

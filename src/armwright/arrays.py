@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+LARGEST_OBJECTIVE = 1e60  # in magnitude; the hypervolume of five objectives stays finite
 MAX_ARRAYS = 1024 * 1024 * 1024  # [bytes] of a file's arrays, which may be packed a thousandfold
 
 

@@ -27,9 +27,12 @@ def test_check_describes_a_builtin_task_and_the_default_space() -> None:
 
 def test_check_prints_json(in_folder: Path) -> None:
     (in_folder / "task.yaml").write_text(
-        yaml.safe_dump({"name": "far", "targets": [[0.2, 0.0, 0.1], [9.0, 0.0, 0.0]], "obstacles": [BOX]})
+        yaml.safe_dump({"name": "far", "targets": [[0.2, 0.0, 0.1], [9.0, 0.0, 0.0]], "obstacles": [BOX]}),
+        encoding="utf-8",
     )
-    (in_folder / "space.yaml").write_text("joints: 3\nrestrict: {joint_1: Y}\ntie: {link_3: link_2}\n")
+    (in_folder / "space.yaml").write_text(
+        "joints: 3\nrestrict: {joint_1: Y}\ntie: {link_3: link_2}\n", encoding="utf-8"
+    )
     done = armwright("check", "task.yaml", "--space", "space.yaml", "--json")
     record = json.loads(done.stdout)
     assert done.returncode == 2
@@ -51,7 +54,7 @@ def test_check_prints_json(in_folder: Path) -> None:
     ],
 )
 def test_check_reports_an_invalid_task_in_one_line(in_folder: Path, text: str, reason: str) -> None:
-    (in_folder / "bad.yaml").write_text(text)
+    (in_folder / "bad.yaml").write_text(text, encoding="utf-8")
     assert reason in refused(2, "check", "bad.yaml")
 
 
@@ -67,9 +70,10 @@ def test_cycle_is_shown_with_its_durations_and_constraints(in_folder: Path) -> N
         "name: cell\ntargets: [{name: bin, position: [0.2, 0, 0.3], axis: [0, 0, -1]}, "
         "{position: [0, 0.2, 0.3], axis: [0, 0, -1]}]\n"
         f"cycle: {{dwell: 0.2, time: 1.5, tolerance: {{path: 0.003}}, steps: {steps}}}\n"
-        "constraints: [clearance >= 0.01]\n"
+        "constraints: [clearance >= 0.01]\n",
+        encoding="utf-8",
     )
-    (in_folder / "space.yaml").write_text("joints: 5\nactuators: [XM430-W350]\n")
+    (in_folder / "space.yaml").write_text("joints: 5\nactuators: [XM430-W350]\n", encoding="utf-8")
     bounds = ["unreached_targets <= 0", "path_error <= 0.003", "path_angle <= 0.02", "jumps <= 0"]
     drives = ["dynamic_utilisation <= 1", "speed_utilisation <= 1", "thermal_utilisation <= 1", "voltages <= 1"]
     shown = armwright("tasks", "task.yaml").stdout
@@ -89,7 +93,7 @@ def test_cycle_is_shown_with_its_durations_and_constraints(in_folder: Path) -> N
 
 def write(folder: Path, **keys: object) -> str:
     """Write a task file and return its name."""
-    (folder / "task.yaml").write_text(yaml.safe_dump({"name": "mine", **keys}))
+    (folder / "task.yaml").write_text(yaml.safe_dump({"name": "mine", **keys}), encoding="utf-8")
     return "task.yaml"
 
 
@@ -133,7 +137,9 @@ def test_every_proven_fault_is_reported_in_a_line_of_its_own(in_folder: Path) ->
 
 
 def test_decimal_comma_is_warned_of_where_the_target_is_in_reach(in_folder: Path) -> None:
-    (in_folder / "task.yaml").write_text("name: mine\ntargets:\n  - [0,1, 0.4]\n  - [0.4, 0.2, 0.3]\n")
+    (in_folder / "task.yaml").write_text(
+        "name: mine\ntargets:\n  - [0,1, 0.4]\n  - [0.4, 0.2, 0.3]\n", encoding="utf-8"
+    )
     done = armwright("check", "task.yaml", "--no-picture")
     assert done.returncode == 0, done.stderr
     assert "warning: task.yaml, line 3: [0,1, 0.4] is a list of 3 numbers; if 0,1 was meant as one" in done.stdout
@@ -141,7 +147,7 @@ def test_decimal_comma_is_warned_of_where_the_target_is_in_reach(in_folder: Path
 
 
 def test_decimal_comma_that_makes_four_numbers_is_refused(in_folder: Path) -> None:
-    (in_folder / "task.yaml").write_text("name: mine\ntargets:\n  - [0,4, 0.1, 0.2]\n")
+    (in_folder / "task.yaml").write_text("name: mine\ntargets:\n  - [0,4, 0.1, 0.2]\n", encoding="utf-8")
     line = refused(2, "check", "task.yaml")
     assert "target 1: expected three numbers x, y, z [m], got 4: [0, 4, 0.1, 0.2]; write decimals with a point" in line
 
@@ -185,7 +191,7 @@ def test_picture_has_a_known_format(in_folder: Path) -> None:
         workspace={"low": [0, 0, 0], "high": [0.5, 0.5, 0.5]},
     )
     assert armwright("check", task, "--out", "mine.svg").returncode == 0
-    assert (in_folder / "mine.svg").read_text().startswith("<?xml")
+    assert (in_folder / "mine.svg").read_text(encoding="utf-8").startswith("<?xml")
     assert "expected a name that ends in .png, .pdf, .svg" in refused(2, "check", task, "--out", "mine.doc")
 
 

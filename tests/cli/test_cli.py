@@ -114,15 +114,18 @@ def test_json_output_is_alone_on_stdout(in_folder: Path) -> None:
 
 
 def test_optimize_accepts_task_and_space_files(in_folder: Path) -> None:
-    (in_folder / "points.csv").write_text("id;z;y;x\n7;100;0;450\n8;300;200;450\n")
+    (in_folder / "points.csv").write_text("id;z;y;x\n7;100;0;450\n8;300;200;450\n", encoding="utf-8")
     made = armwright("init", "shelf.yaml", "--from", "points.csv", "--unit", "mm", "--offset", "0", "0", "0.5")
     assert made.returncode == 0, made.stderr
     assert made.stdout.startswith("note: points.csv: columns not used: 'id'\n")
-    assert yaml.safe_load((in_folder / "shelf.yaml").read_text())["targets"] == [[0.45, 0.0, 0.6], [0.45, 0.2, 0.8]]
-    (in_folder / "space.yaml").write_text("joints: 3\nmass: {kind: per_link, kg: 0.002}\n")
+    assert yaml.safe_load((in_folder / "shelf.yaml").read_text(encoding="utf-8"))["targets"] == [
+        [0.45, 0.0, 0.6],
+        [0.45, 0.2, 0.8],
+    ]
+    (in_folder / "space.yaml").write_text("joints: 3\nmass: {kind: per_link, kg: 0.002}\n", encoding="utf-8")
     done = armwright("optimize", "shelf.yaml", "--space", "space.yaml", "--sampler", "random", *SHORT)
     assert done.returncode == 0, done.stderr
-    config = yaml.safe_load((in_folder / "runs/shelf-seed0/config.yaml").read_text())
+    config = yaml.safe_load((in_folder / "runs/shelf-seed0/config.yaml").read_text(encoding="utf-8"))
     assert config["space"]["joints"] == 3
     assert config["reference_point"] is not None
 
@@ -139,32 +142,36 @@ def test_model_is_configured_by_option_environment_and_file(chat_server: ChatSer
     assert "named by ARMWRIGHT_MODEL" in by_environment
     config = in_folder / "config" / "armwright" / "config.yaml"
     config.parent.mkdir(parents=True)
-    config.write_text(f"model: m\nbase_url: {chat_server.url}\n")
+    config.write_text(f"model: m\nbase_url: {chat_server.url}\n", encoding="utf-8")
     by_file = first_line("--out", "c", XDG_CONFIG_HOME=str(in_folder / "config"))
     assert f"named by {config}" in by_file
     options = in_folder / "options.yaml"
-    options.write_text(f"base_url: {chat_server.url}\nmodel: other\nprompt: minus\ntemperature: 0.5\n")
+    options.write_text(
+        f"base_url: {chat_server.url}\nmodel: other\nprompt: minus\ntemperature: 0.5\n", encoding="utf-8"
+    )
     by_file = first_line("--out", "e", "--model", "m", "--model-options", str(options))
     assert by_file == f"proposer: llm (m at {chat_server.url}, named by --model; prompt minus)"
     assert chat_server.requests[-1]["temperature"] == 0.5
-    config.write_text("temperature: 0.25\nbase_url: http://127.0.0.1:9\n")  # defaults for a model named elsewhere
+    config.write_text(
+        "temperature: 0.25\nbase_url: http://127.0.0.1:9\n", encoding="utf-8"
+    )  # defaults for a model named elsewhere
     where = model_options(base_url=chat_server.url)
     first_line("--out", "f", "--model", "m", *where, XDG_CONFIG_HOME=str(in_folder / "config"))
     assert chat_server.requests[-1]["temperature"] == 0.25
-    config.write_text("temprature: 0\n")
+    config.write_text("temprature: 0\n", encoding="utf-8")
     wrong = refused(2, "optimize", "target-1", "--model", "m", *where, XDG_CONFIG_HOME=str(in_folder / "config"))
     assert f'{config}: unknown key "temprature"' in wrong
     assert 'Did you mean "temperature"?' in wrong
     assert "proposer: rules" in first_line("--out", "d", OPENAI_API_KEY="sk-lying-about")  # a key alone spends nothing
-    assert len((in_folder / "a" / "transcripts.jsonl").read_text().splitlines()) == 5
+    assert len((in_folder / "a" / "transcripts.jsonl").read_text(encoding="utf-8").splitlines()) == 5
 
 
 def test_init_writes_a_template_and_overwrites_nothing(in_folder: Path) -> None:
     assert "3 targets" in armwright("init", "my-task.yaml").stdout
-    text = (in_folder / "my-task.yaml").read_text()
+    text = (in_folder / "my-task.yaml").read_text(encoding="utf-8")
     assert "# " in text
     assert "already exists" in refused(2, "init", "my-task.yaml")
-    assert (in_folder / "my-task.yaml").read_text() == text
+    assert (in_folder / "my-task.yaml").read_text(encoding="utf-8") == text
     assert "ends in .yaml" in refused(2, "init", "my-task.txt")
     assert "cannot read" in refused(2, "init", "other.yaml", "--from", "nothing.csv")
 
@@ -298,11 +305,11 @@ def test_optimize_shows_its_options_in_groups() -> None:
     ],
 )
 def test_usage_errors_are_one_line_and_exit_with_2(in_folder: Path, args: tuple[str, ...], words: str) -> None:
-    (in_folder / "bad.yaml").write_text("name: a\ntarget: [[0, 0, 0]]")
-    (in_folder / "nan.yaml").write_text("name: a\ntargets: [[0, 0, .nan]]")
-    (in_folder / "empty.yaml").write_text("name: a\ntargets: []")
-    (in_folder / "turns.yaml").write_text("joint_range: [-10, 10]")
-    (in_folder / "upside.yaml").write_text("link: [0.3, 0.03]")
+    (in_folder / "bad.yaml").write_text("name: a\ntarget: [[0, 0, 0]]", encoding="utf-8")
+    (in_folder / "nan.yaml").write_text("name: a\ntargets: [[0, 0, .nan]]", encoding="utf-8")
+    (in_folder / "empty.yaml").write_text("name: a\ntargets: []", encoding="utf-8")
+    (in_folder / "turns.yaml").write_text("joint_range: [-10, 10]", encoding="utf-8")
+    (in_folder / "upside.yaml").write_text("link: [0.3, 0.03]", encoding="utf-8")
     assert words in refused(2, "optimize", *args)
     assert not (in_folder / "runs").exists()
 
@@ -352,19 +359,21 @@ def test_doctor_shows_the_configuration_without_keys(chat_server: ChatServer, in
 
 def test_damaged_run_folder_exits_with_1(in_folder: Path) -> None:
     armwright("optimize", "target-1", *SHORT, "--out", "run")
-    (in_folder / "run" / "trials.jsonl").write_text("garbage\n")
+    (in_folder / "run" / "trials.jsonl").write_text("garbage\n", encoding="utf-8")
     assert "line 1 is damaged" in refused(1, "optimize", "target-1", *SHORT, "--out", "run")
 
 
 @pytest.mark.parametrize("place", ["file/run", "/proc/armwright"])
 def test_unwritable_output_folder_exits_with_1(in_folder: Path, place: str) -> None:
     """This also holds for root, who may write to read-only folders."""
-    (in_folder / "file").write_text("")
+    (in_folder / "file").write_text("", encoding="utf-8")
     assert f"cannot write {place}" in refused(1, "optimize", "target-1", *SHORT, "--out", place)
 
 
 def test_terminal_without_unicode_shows_the_remaining_text(in_folder: Path) -> None:
-    (in_folder / "space.yaml").write_text("link_section: {tubes: [[0.03, 0.002]], material: aluminium}")
+    (in_folder / "space.yaml").write_text(
+        "link_section: {tubes: [[0.03, 0.002]], material: aluminium}", encoding="utf-8"
+    )
     done = armwright("optimize", "target-1", "--space", "space.yaml", *SHORT, encoding="ascii")
     assert done.returncode == 0, done.stderr
     assert "kg/m?" in done.stdout
@@ -373,9 +382,13 @@ def test_terminal_without_unicode_shows_the_remaining_text(in_folder: Path) -> N
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [("tasks",), ("optimize", "target-1", *SHORT)])
 def test_unwritable_output_is_one_line(in_folder: Path, command: tuple[str, ...]) -> None:
-    with open("/dev/full", "w") as full:
+    with open("/dev/full", "w", encoding="utf-8") as full:
         done = subprocess.run(
-            [sys.executable, "-m", "armwright", *command], stdout=full, stderr=subprocess.PIPE, text=True
+            [sys.executable, "-m", "armwright", *command],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
         )
     assert done.returncode == 1
     assert done.stderr.strip().splitlines() == ["armwright: No space left on device: the output"]
@@ -398,17 +411,17 @@ def test_unknown_option_exits_with_2() -> None:
 
 
 def test_ctrl_c_leaves_a_resumable_run(in_folder: Path) -> None:
-    (in_folder / "mine.py").write_text(INTERRUPTING)
+    (in_folder / "mine.py").write_text(INTERRUPTING, encoding="utf-8")
     settings = ["optimize", "target-1", "--proposer", "none", "--sampler", "random", "--n-total", "20"]
     settings += ["--no-figures", "--evaluator", "mine.py:measure", "--out", "run"]
     stopped = armwright(*settings)
     assert (stopped.returncode, stopped.stderr) == (130, "")
     assert f"Resume with:\n  python -m armwright {' '.join(settings)}" in stopped.stdout
-    kept = (in_folder / "run" / "trials.jsonl").read_text()
+    kept = (in_folder / "run" / "trials.jsonl").read_text(encoding="utf-8")
     assert len(kept.splitlines()) == 14
     done = armwright(*settings)
     assert "resumed at trial 14 of 30" in done.stdout
-    assert (in_folder / "run" / "trials.jsonl").read_text().startswith(kept)
+    assert (in_folder / "run" / "trials.jsonl").read_text(encoding="utf-8").startswith(kept)
 
 
 @pytest.mark.parametrize("in_flight", [None, 1], ids=["waiting", "overlap"])
@@ -435,7 +448,7 @@ def test_ctrl_c_cancels_model_calls_in_flight(
     released.set()
     assert (done.returncode, done.stderr) == (130, "")
     assert "Resume with:" in done.stdout
-    transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text().splitlines()
+    transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text(encoding="utf-8").splitlines()
     kept = [(call["step"], call["requests"], call["fault"]) for call in map(json.loads, transcript)]
     assert kept == [("check", 1, None), ("reasoning", 1, None), ("parameters", 1, "cancelled")][: 2 + refused]
 
@@ -463,7 +476,9 @@ cli.main()
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_interrupt_dropped_by_python_still_ends_the_command(name: str) -> None:
     """This happens in finalisers and library callbacks, where exceptions cannot propagate."""
-    done = subprocess.run([sys.executable, "-c", DROPPED.format(name=name)], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", DROPPED.format(name=name)], capture_output=True, text=True, encoding="utf-8"
+    )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
@@ -494,5 +509,5 @@ def test_reasons_of_a_model_are_shown_as_they_enter() -> None:
 def test_help_imports_no_heavy_package() -> None:
     heavy = {"warp", "optuna", "matplotlib", "moocore", "numpy", "pydantic", "pydantic_ai"}
     code = f"import sys; import armwright.cli.app; sys.exit(', '.join({heavy!r} & set(sys.modules)) or 0)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, encoding="utf-8")
     assert done.returncode == 0, done.stderr

@@ -21,7 +21,7 @@ def urdf(in_folder: Path) -> Path:
     joints = tuple(Joint("revolute", axis, -2.5, 2.5) for axis in ("z", "y", "y"))
     links = tuple(uniform_link((0.0, 0.0, length), 0.5, 0.02) for length in (0.2, 0.3, 0.3))
     file = in_folder / "bare.urdf"
-    file.write_text(aw.to_urdf(Arm((0.0, 0.0, 0.0), joints, links)))
+    file.write_text(aw.to_urdf(Arm((0.0, 0.0, 0.0), joints, links)), encoding="utf-8")
     return file
 
 
@@ -80,7 +80,8 @@ def test_invalid_options_are_refused(urdf: Path, options: tuple[str, ...], messa
 @pytest.mark.slow
 def test_design_of_a_run_is_mapped_among_its_obstacles(in_folder: Path) -> None:
     (in_folder / "bench.yaml").write_text(
-        "name: bench\ntargets: [[0.3, 0.1, 0.2], [0.3, -0.1, 0.3]]\nobstacles: [{kind: ground, z: 0}]\n"
+        "name: bench\ntargets: [[0.3, 0.1, 0.2], [0.3, -0.1, 0.3]]\nobstacles: [{kind: ground, z: 0}]\n",
+        encoding="utf-8",
     )
     CliRunner().invoke(app, ["optimize", "bench.yaml", "--n-total", "20", "--no-figures", "--out", "run"])
     done = CliRunner().invoke(app, ["reach-map", "run", "--obstacles", *SMALL])

@@ -52,7 +52,7 @@ def test_robust_run_is_resumed_by_a_robust_command_only(in_folder: Path) -> None
     done = armwright("optimize", "target-1", *SHORT, "--robust", "--proposer", "none", "--out", "r", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["front_gap"] is None
-    assert "tolerance: 0.001" in (in_folder / "r" / "config.yaml").read_text()
+    assert "tolerance: 0.001" in (in_folder / "r" / "config.yaml").read_text(encoding="utf-8")
     line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--out", "r")
     assert "tolerance: 0.001 stored, 0.0 requested" in line
 
@@ -67,7 +67,8 @@ def test_run_without_a_successful_evaluation_ends_with_an_error(in_folder: Path)
         '    return float("nan"), 1.0\n\n\n'
         '@aw.evaluator("reach [m]", "height [m]")\n'
         "def sometimes(arm, task):\n"
-        '    return (float("nan") if arm.base[0] > 0.0 else 1.0), 1.0\n'
+        '    return (float("nan") if arm.base[0] > 0.0 else 1.0), 1.0\n',
+        encoding="utf-8",
     )
     for name, code in (("never", 1), ("sometimes", 0)):
         for form in ((), ("--json",)):
@@ -117,8 +118,8 @@ def test_optimize_and_prompt_reject_a_design_run(in_folder: Path) -> None:
 
 def test_optimize_names_design_for_tasks_with_constraints(in_folder: Path) -> None:
     task = ("name: near", "targets: [[0.3, 0.0, 0.3], [0.2, 0.1, 0.4]]", "reference_point: [1, 1]")
-    (in_folder / "free.yaml").write_text("\n".join(task))
-    (in_folder / "bound.yaml").write_text("\n".join([*task, "constraints: [worst_error <= 0.01]"]))
+    (in_folder / "free.yaml").write_text("\n".join(task), encoding="utf-8")
+    (in_folder / "bound.yaml").write_text("\n".join([*task, "constraints: [worst_error <= 0.01]"]), encoding="utf-8")
     line = "`armwright design bound.yaml` suits this task better"
     short = (*SHORT, "--no-figures")
     assert line in armwright("optimize", "bound.yaml", *short, "--out", "a").stdout

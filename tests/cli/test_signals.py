@@ -42,7 +42,7 @@ HOLDS_LOCK = "sum(range(10**15))"  # C code that neither lets other threads run 
 def begun(*arguments: object, until: str, **environment: str) -> Iterator[subprocess.Popen[str]]:
     """A command in its own process that has reached a line of its output, or made a file of this name."""
     with subprocess.Popen(
-        [sys.executable, "-m", "armwright", *map(str, arguments)], stdin=subprocess.DEVNULL, text=True,
+        [sys.executable, "-m", "armwright", *map(str, arguments)], stdin=subprocess.DEVNULL, encoding="utf-8",
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, "PYTHONUNBUFFERED": "1", **environment},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:  # fmt: skip
@@ -68,7 +68,7 @@ def is_resumed(folder: Path, *options: str) -> bool:
 
 @pytest.fixture
 def evaluator(in_folder: Path, request: pytest.FixtureRequest) -> tuple[str, ...]:
-    (in_folder / "ev.py").write_text(EVALUATOR.format(bad=request.param))
+    (in_folder / "ev.py").write_text(EVALUATOR.format(bad=request.param), encoding="utf-8")
     return "--evaluator", "ev.py:measure"
 
 

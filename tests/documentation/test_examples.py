@@ -34,7 +34,7 @@ TASKS = example_tasks()
 
 def run(example: str, *options: str) -> str:
     command = [sys.executable, "-W", "error", EXAMPLES / example, *options]
-    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, encoding="utf-8").stdout
 
 
 def told(server: ChatServer) -> tuple[str, ...]:
@@ -133,7 +133,7 @@ def test_example_without_a_model_falls_back_to_rules() -> None:
 def test_python_code_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = optimize(Problem(load_task("target-1")), proposer="rules", n_total=20, out="runs/target-1-seed0")
     export_study(Path("runs/target-1-seed0"))
-    page = (EXAMPLES.parent / "docs" / "optuna.md").read_text()
+    page = (EXAMPLES.parent / "docs" / "optuna.md").read_text(encoding="utf-8")
     asking, *others = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     compile(asking, "optuna.md", "exec")  # needs a model
     assert len(others) == 5

@@ -103,8 +103,8 @@ def parsed(arguments: Sequence[str]) -> None:
 @pytest.mark.parametrize("page", FOLLOWED)
 @pytest.mark.fast_cases(3)
 def test_documented_commands_and_options_exist(page: str) -> None:
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
     for command in commands(page):
         program, *arguments = shlex.split(command.text.split(" > ")[0].split(" < ")[0])
         match Path(program).name:
@@ -128,7 +128,7 @@ def test_every_excuse_matches_a_documented_command() -> None:
     for pattern in NOT_RUN:
         assert any(re.fullmatch(pattern, command) for command in shown), pattern
     for page, file in PROGRAMS_RUN_IN.items():
-        assert Path(page).name in next((ROOT / "tests").rglob(file)).read_text(), page
+        assert Path(page).name in next((ROOT / "tests").rglob(file)).read_text(encoding="utf-8"), page
 
 
 def test_options_named_in_sentences_exist() -> None:
@@ -136,7 +136,9 @@ def test_options_named_in_sentences_exist() -> None:
     options = {
         name: {o for p in command.params for o in (*p.opts, *p.secondary_opts)} for name, command in cli().items()
     }
-    scripts = "".join(file.read_text() for place in ("benchmarks", "tests") for file in (ROOT / place).rglob("*.py"))
+    scripts = "".join(
+        file.read_text(encoding="utf-8") for place in ("benchmarks", "tests") for file in (ROOT / place).rglob("*.py")
+    )
     ours = set(re.findall(r'add(?:_argument|option)\(\s*"(--[a-z-]+)"', scripts))
     known = set[str]().union(*options.values()) | {"--version", "--help"} | ours
     checked = 0
@@ -169,7 +171,7 @@ def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[st
     program = folder / ".bin" / "armwright"
     if not program.is_file():
         program.parent.mkdir()
-        program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m armwright "$@"\n')
+        program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m armwright "$@"\n', encoding="utf-8")
         program.chmod(0o755)
     path = os.pathsep.join([str(program.parent), str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PATH": path, "PYTHONWARNINGS": "error"}
@@ -181,6 +183,7 @@ def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[st
         text=True,
         stdin=subprocess.DEVNULL,
         timeout=MAX_WAIT,
+        encoding="utf-8",
     )
     assert done.returncode == 0, f"{where}: {line}\n{done.stdout}{done.stderr}"
     assert "Traceback" not in done.stderr, f"{where}: {line}\n{done.stderr}"
@@ -258,7 +261,7 @@ def follow(page: str, shown: Sequence[Block], in_folder: Path) -> None:
     for name, file in (("ur3", "ur3_robot"), ("so101", "so101")):
         shutil.copy(robot(file), in_folder / f"{name}.urdf")
     for name, text in FILES.get(page, {}).items():
-        (in_folder / name).write_text(text)
+        (in_folder / name).write_text(text, encoding="utf-8")
     for line in BEFORE.get(page, ()):
         shell(line, in_folder, page)
     run = {command.where: command for command in commands(page)}
@@ -269,12 +272,12 @@ def follow(page: str, shown: Sequence[Block], in_folder: Path) -> None:
             if command is not None:
                 said = run_command(command, in_folder)
         if block.language in ("yaml", "csv", "python") and (name := file_of(block)):
-            (in_folder / name).write_text(block.text)
+            (in_folder / name).write_text(block.text, encoding="utf-8")
         if block.language == "python" and page not in PROGRAMS_RUN_IN:
-            (in_folder / "program.py").write_text(block.text)
+            (in_folder / "program.py").write_text(block.text, encoding="utf-8")
             said = shell("python program.py", in_folder, block.where).stdout
         if block.language == "jinja":
-            (in_folder / "shown.md.j2").write_text(block.text)
+            (in_folder / "shown.md.j2").write_text(block.text, encoding="utf-8")
             shell("armwright prompt target-1 --prompt shown.md.j2", in_folder, block.where)
         if block.language == "text":
             assert letters(block.text.splitlines()[0]) in letters(said), block.where
@@ -286,25 +289,25 @@ def follow(page: str, shown: Sequence[Block], in_folder: Path) -> None:
 def test_files_shown_on_a_page_load(block: Block, in_folder: Path) -> None:
     content = yaml.safe_load(block.text)
     for name, text in FILES.get("docs/experiments.md", {}).items():
-        (in_folder / name).write_text(text)
+        (in_folder / name).write_text(text, encoding="utf-8")
     file = in_folder / "shown.yaml"
     if "methods" in content:
-        file.write_text(block.text)
+        file.write_text(block.text, encoding="utf-8")
         plan, beside = load_experiment("shown.yaml")
         cells, skipped = plan_cells(plan, beside, in_folder / "out")
         assert len(cells) + len(skipped) == len(plan.task_list) * sum(len(plan.seeds_of(key)) for key in plan.methods)
     elif content.keys() <= aw.ModelOptions.model_fields.keys():
-        file.write_text(block.text)
+        file.write_text(block.text, encoding="utf-8")
         assert load_model_options("shown.yaml").given == content
     elif content.keys() & (Task.model_fields.keys() - DesignSpace.model_fields.keys()):
         named = "" if "name" in content else "name: shown\n"  # a part of a file
         some = "" if {"targets", "workspace"} & content.keys() else "targets: [[0.3, 0.0, 0.2]]\n"
-        file.write_text(named + some + block.text)
+        file.write_text(named + some + block.text, encoding="utf-8")
         space = DesignSpace(actuators=("XL430-W250",), joints=3)  # type: ignore[arg-type]
         problem = aw.Problem(aw.load_task("shown.yaml"), space)
         assert len(problem.evaluate(problem.space.sample(2, 0)).values) == 2
     else:
-        file.write_text(block.text)
+        file.write_text(block.text, encoding="utf-8")
         assert aw.load_space("shown.yaml").parameters
 
 

@@ -62,7 +62,9 @@ def test_quantities_are_documented() -> None:
 
 
 def test_python_reference_lists_every_public_name_once() -> None:
-    listed = re.findall(r"^::: armwright\.(\w+)$", (ROOT / "docs/reference/python.md").read_text(), re.MULTILINE)
+    listed = re.findall(
+        r"^::: armwright\.(\w+)$", (ROOT / "docs/reference/python.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
     assert sorted(listed) == sorted(aw.__all__)
 
 
@@ -85,7 +87,7 @@ class Loaded(HTMLParser):
 def guide(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("guide")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(place)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8")
     assert done.returncode == 0, done.stdout + done.stderr
     return place
 

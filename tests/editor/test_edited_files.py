@@ -38,32 +38,32 @@ def test_new_files_begin_with_templates_and_are_written_by_save(tmp_path: Path) 
 def test_a_file_that_changed_on_disk_is_kept(tmp_path: Path) -> None:
     files = EditedFiles(tmp_path / "new.yaml")
     files.save(files.texts())
-    (tmp_path / "new.yaml").write_text("name: theirs\n")
+    (tmp_path / "new.yaml").write_text("name: theirs\n", encoding="utf-8")
     mine = Texts("name: mine\n", files.texts().space)
     with pytest.raises(ChangedOnDiskError, match=r"new\.yaml has changed"):
         files.save(mine)
-    assert (tmp_path / "new.yaml").read_text() == "name: theirs\n"
+    assert (tmp_path / "new.yaml").read_text(encoding="utf-8") == "name: theirs\n"
     files.save(mine, overwrite=True)
-    assert (tmp_path / "new.yaml").read_text() == "name: mine\n"
+    assert (tmp_path / "new.yaml").read_text(encoding="utf-8") == "name: mine\n"
     files.save(Texts("name: later\n", mine.space))
 
 
 def test_a_file_that_appeared_meanwhile_is_kept(tmp_path: Path) -> None:
     files = EditedFiles(tmp_path / "new.yaml")
-    (tmp_path / "new-space.yaml").write_text("name: theirs\n")
+    (tmp_path / "new-space.yaml").write_text("name: theirs\n", encoding="utf-8")
     with pytest.raises(ChangedOnDiskError, match=r"new-space\.yaml"):
         files.save(files.texts())
     assert not (tmp_path / "new.yaml").exists()
 
 
 def test_links_and_modes_stay(tmp_path: Path) -> None:
-    (tmp_path / "real.yaml").write_text("name: one\n")
+    (tmp_path / "real.yaml").write_text("name: one\n", encoding="utf-8")
     (tmp_path / "real.yaml").chmod(0o600)
     (tmp_path / "link.yaml").symlink_to(tmp_path / "real.yaml")
     files = EditedFiles(tmp_path / "link.yaml")
     files.save(Texts("name: two\n", files.texts().space))
     assert (tmp_path / "link.yaml").is_symlink()
-    assert (tmp_path / "real.yaml").read_text() == "name: two\n"
+    assert (tmp_path / "real.yaml").read_text(encoding="utf-8") == "name: two\n"
     assert stat.S_IMODE((tmp_path / "real.yaml").stat().st_mode) == 0o600
 
 
@@ -71,7 +71,7 @@ def test_links_and_modes_stay(tmp_path: Path) -> None:
 def test_hard_links_stay(tmp_path: Path, is_linked: bool) -> None:
     """Also if a link is reached by a symbolic one."""
     real, other, link = tmp_path / "real.yaml", tmp_path / "other.yaml", tmp_path / "link.yaml"
-    real.write_text("name: one, and much longer than what replaces it\n")
+    real.write_text("name: one, and much longer than what replaces it\n", encoding="utf-8")
     real.chmod(0o640)
     other.hardlink_to(real)
     link.symlink_to(real)
@@ -79,7 +79,7 @@ def test_hard_links_stay(tmp_path: Path, is_linked: bool) -> None:
     files.save(Texts("name: two\n", files.texts().space))
     assert real.samefile(other)
     assert link.is_symlink()
-    assert other.read_text() == "name: two\n"
+    assert other.read_text(encoding="utf-8") == "name: two\n"
     assert stat.S_IMODE(other.stat().st_mode) == 0o640
     space = files.space.name
     assert {file.name for file in tmp_path.iterdir()} == {"real.yaml", "other.yaml", "link.yaml", space}
@@ -88,7 +88,7 @@ def test_hard_links_stay(tmp_path: Path, is_linked: bool) -> None:
 def test_a_failed_write_through_hard_links_says_where_the_text_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "real.yaml").write_text("name: one\n")
+    (tmp_path / "real.yaml").write_text("name: one\n", encoding="utf-8")
     (tmp_path / "other.yaml").hardlink_to(tmp_path / "real.yaml")
     files = EditedFiles(tmp_path / "real.yaml")
     synced: list[int] = []
@@ -103,7 +103,7 @@ def test_a_failed_write_through_hard_links_says_where_the_text_is(
         FailureError, match=r"No space left on device; the whole text is in .*real\.yaml\..*\.new"
     ) as told:
         files.save(Texts("name: two\n", files.texts().space))
-    assert Path(str(told.value).rpartition(" is in ")[2]).read_text() == "name: two\n"
+    assert Path(str(told.value).rpartition(" is in ")[2]).read_text(encoding="utf-8") == "name: two\n"
 
 
 lines = st.text(st.characters(codec="utf-8", exclude_characters="\r\n", exclude_categories=["Cs"]), max_size=20)

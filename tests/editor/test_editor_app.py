@@ -64,12 +64,12 @@ def test_edits_are_applied_assessed_and_saved(editor: ServedEditor) -> None:
 
 def test_a_file_that_changed_on_disk_is_a_conflict(editor: ServedEditor) -> None:
     mine = texts(editor)
-    editor.task.write_text("name: theirs\n")
+    editor.task.write_text("name: theirs\n", encoding="utf-8")
     status, reason = editor.post("/save", mine)
-    assert (status, editor.task.read_text()) == (409, "name: theirs\n")
+    assert (status, editor.task.read_text(encoding="utf-8")) == (409, "name: theirs\n")
     assert b"has changed on disk" in reason
     assert editor.post("/save", {**mine, "overwrite": True})[0] == 204
-    assert editor.task.read_text() == mine["task"]
+    assert editor.task.read_text(encoding="utf-8") == mine["task"]
 
 
 def test_pasted_points_are_converted(editor: ServedEditor) -> None:

@@ -28,7 +28,7 @@ obstacles:
 @pytest.fixture
 def editor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ServedEditor]:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "cell.yaml").write_text(TASK)
+    (tmp_path / "cell.yaml").write_text(TASK, encoding="utf-8")
     with served_editor(tmp_path / "cell.yaml") as served:
         yield served
 
@@ -241,7 +241,7 @@ def test_typed_text_is_checked_and_saved(tab: Tab, editor: ServedEditor) -> None
     expect(tab.page.locator("#saved")).to_have_text("not saved")
     field.press("Control+s")
     expect(tab.page.locator("#saved")).to_have_text("saved")
-    assert "-0.25" in editor.task.read_text()
+    assert "-0.25" in editor.task.read_text(encoding="utf-8")
     press(tab, "Undo")
     assert "[0.3, -0.25" not in text(tab)
 
@@ -250,13 +250,13 @@ def test_a_file_changed_by_others_is_replaced_only_on_consent(tab: Tab, editor: 
     questions: list[str] = []
     tab.page.once("dialog", lambda dialog: (questions.append(dialog.message), dialog.dismiss()))
     fill(tab, "x of target 1", "310")
-    editor.task.write_text("name: theirs\n")
+    editor.task.write_text("name: theirs\n", encoding="utf-8")
     press(tab, "Save")
     assert "has changed on disk" in questions[0]
-    assert editor.task.read_text() == "name: theirs\n"
+    assert editor.task.read_text(encoding="utf-8") == "name: theirs\n"
     tab.page.once("dialog", lambda dialog: dialog.accept())
     press(tab, "Save")
-    assert editor.task.read_text() == text(tab)
+    assert editor.task.read_text(encoding="utf-8") == text(tab)
     tab.faults.clear()  # the browser reports the refusal
 
 
@@ -266,7 +266,8 @@ def test_names_are_text_not_markup(browser: Browser, tmp_path: Path, monkeypatch
     (tmp_path / "x.yaml").write_text(
         json.dumps(
             {"name": "x", "targets": [{"name": mark, "position": [0, 0, 0]}], "description": mark, mark: mark}, indent=1
-        )[1:-1].replace("\n ", "\n")
+        )[1:-1].replace("\n ", "\n"),
+        encoding="utf-8",
     )
     with served_editor(tmp_path / "x.yaml") as served:
         opened = Tab(browser)
@@ -284,8 +285,10 @@ def test_no_text_is_clipped(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     task = next(path for path in sorted(EXAMPLES.glob(f"{example}*.yaml")) if "space" not in path.name)
-    (tmp_path / "task.yaml").write_text(task.read_text())
-    (tmp_path / "task-space.yaml").write_text((EXAMPLES / f"{example}-space.yaml").read_text())
+    (tmp_path / "task.yaml").write_text(task.read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "task-space.yaml").write_text(
+        (EXAMPLES / f"{example}-space.yaml").read_text(encoding="utf-8"), encoding="utf-8"
+    )
     with served_editor(tmp_path / "task.yaml") as served:
         opened = Tab(browser, viewport={"width": width, "height": 900})
         opened.page.goto(served.address)

@@ -36,17 +36,20 @@ def test_the_browser_is_opened_by_a_file_that_only_its_user_reads(
     in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     browser = in_folder / "browser.sh"
-    browser.write_text('#!/bin/sh\nfile="${1#file://}"\ncp "$file" seen.html\nstat -c %a "$(dirname "$file")" > mode\n')
+    browser.write_text(
+        '#!/bin/sh\nfile="${1#file://}"\ncp "$file" seen.html\nstat -c %a "$(dirname "$file")" > mode\n',
+        encoding="utf-8",
+    )
     browser.chmod(browser.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("BROWSER", f"{browser} %s")
     editing = start("edit", "cell.yaml", "--open")
     assert editing.stdout is not None
     address = editing.stdout.readline().strip()
     mode = in_folder / "mode"
-    while not (mode.exists() and mode.read_text().strip()):
+    while not (mode.exists() and mode.read_text(encoding="utf-8").strip()):
         assert editing.poll() is None
-    assert mode.read_text().strip() == "700"
-    assert address in (in_folder / "seen.html").read_text()
+    assert mode.read_text(encoding="utf-8").strip() == "700"
+    assert address in (in_folder / "seen.html").read_text(encoding="utf-8")
     editing.send_signal(signal.SIGINT)
     editing.communicate(timeout=PATIENCE)
 
@@ -54,5 +57,5 @@ def test_the_browser_is_opened_by_a_file_that_only_its_user_reads(
 def test_what_cannot_be_edited_is_refused_in_one_line(in_folder: Path) -> None:
     assert "expected a name that ends in .yaml" in refused(2, "edit", "cell.txt")
     assert "there is no folder nowhere" in refused(2, "edit", "nowhere/cell.yaml")
-    (in_folder / "large.yaml").write_text("#" * 300_000)
+    (in_folder / "large.yaml").write_text("#" * 300_000, encoding="utf-8")
     assert "at most 256 KiB" in refused(2, "edit", "large.yaml")

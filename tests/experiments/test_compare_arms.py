@@ -264,7 +264,7 @@ def table(tab: Tab) -> dict[str, dict[str, str]]:
 
 def test_arm_name_with_markup_is_escaped_on_the_page(run: Path, tmp_path: Path, tab: Tab) -> None:
     hostile = tmp_path / "<img src=x onerror='window.hacked = 1'>.urdf"
-    hostile.write_text(UR5.read_text())
+    hostile.write_text(UR5.read_text(encoding="utf-8"), encoding="utf-8")
     compare_arms(TASK, [hostile], run, base=(0.0, 0.0, 0.0))
     tab.open(write_report(run))
     assert tab.ask("window.hacked") is None
@@ -275,7 +275,7 @@ def test_arm_name_with_markup_is_escaped_on_the_page(run: Path, tmp_path: Path, 
 def test_front_figure_without_existing_arms_and_with_a_damaged_file(run: Path, history: History) -> None:
     (run / EXISTING_ARMS).unlink(missing_ok=True)
     assert read_existing_arms(run, 2) == ()
-    (run / EXISTING_ARMS).write_text('[{"name": "x"}]')
+    (run / EXISTING_ARMS).write_text('[{"name": "x"}]', encoding="utf-8")
     with pytest.raises(RunFolderError, match=r"existing_arms.json is damaged; remove it"):
         write_figures(run)
     (run / EXISTING_ARMS).unlink()
@@ -291,7 +291,7 @@ def test_unknown_price_and_effort_are_not_compared(tmp_path: Path) -> None:
     )
     aw.optimize(problem, proposer="none", n_init=4, n_total=4, out=tmp_path / "run")
     silent = tmp_path / "silent.urdf"
-    silent.write_text(UR5.read_text().replace('effort="', 'effort="0" was="'))
+    silent.write_text(UR5.read_text(encoding="utf-8").replace('effort="', 'effort="0" was="'), encoding="utf-8")
     ur5, without = compare_arms(TASK, [UR5, silent], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
     assert (ur5.values[2], without.values[2]) == (None, None)
     assert ur5.values[3] == ur5.measures["torque_utilisation"] != None  # noqa: E711
@@ -415,7 +415,7 @@ def test_arm_names_without_network_or_package_are_refused(tmp_path: Path, monkey
 
 
 def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder: Path) -> None:
-    Path("task.yaml").write_text(json.dumps(TASK.model_dump(mode="json", exclude_none=True)))
+    Path("task.yaml").write_text(json.dumps(TASK.model_dump(mode="json", exclude_none=True)), encoding="utf-8")
     done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run, "--no-figures", "--price", "panda=15000")
     assert done.returncode == 0, done.stderr
     assert "…" not in done.stdout

@@ -59,16 +59,18 @@ def comparison(runs: Path) -> Comparison:
 
 def changed(folder: Path, change: Callable[[dict], None]) -> None:
     """Change a run's summary."""
-    summary = json.loads((folder / "summary.json").read_text())
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     change(summary)
-    (folder / "summary.json").write_text(json.dumps(summary))
+    (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
 
 
 def test_table_values_match_the_hypervolume_histories(runs: Path, comparison: Comparison) -> None:
     assert comparison.rows
     for row in comparison.rows:
         proposer = "none" if row.method.startswith("BBO (") else "rules"
-        summaries = [json.loads((runs / f"{row.task}-{proposer}-{s}/summary.json").read_text()) for s in SEEDS]
+        summaries = [
+            json.loads((runs / f"{row.task}-{proposer}-{s}/summary.json").read_text(encoding="utf-8")) for s in SEEDS
+        ]
         curves = np.array([summary["hypervolume"]["history"] for summary in summaries])
         assert curves.shape == (3, 12)
         assert row.e_hv == interval([summary["hypervolume"]["mean"] for summary in summaries])
@@ -133,7 +135,10 @@ def test_p_is_shown_and_corrected_from_six_pairs_on(runs: Path, tmp_path: Path) 
     assert by_task["target-1"].p_holm == by_task["target-1"].test.p, "the only test"
     assert by_task["random-4"].p_holm is None
     write_tables(tmp_path, comparison, "x")
-    rows = {row["task"]: row for row in csv.DictReader((tmp_path / "contrasts.csv").read_text().splitlines())}
+    rows = {
+        row["task"]: row
+        for row in csv.DictReader((tmp_path / "contrasts.csv").read_text(encoding="utf-8").splitlines())
+    }
     assert float(rows["target-1"]["p_holm"]) == by_task["target-1"].test.p
     assert (rows["random-4"]["p"], rows["random-4"]["p_holm"]) == ("", "")
 
@@ -256,8 +261,8 @@ def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: P
     published = Published({("BBO (12 trials)", "target-1"): (6.7, 2.03)}, "The Paper")
     files = write_tables(tmp_path, comparison, "All", published, ["one cell is missing"])
     assert {path.name for path in files} >= {"table.md", "table.csv", "table.tex", "contrasts.csv", "time-to.csv"}
-    text = (tmp_path / "table.md").read_text()
-    rows = list(csv.DictReader((tmp_path / "table.csv").read_text().splitlines()))
+    text = (tmp_path / "table.md").read_text(encoding="utf-8")
+    rows = list(csv.DictReader((tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(comparison.rows) == 4
     for row in rows:
         assert f"{float(row['e_hv']):.2f} ({float(row['sigma_hv']):.2f})" in text
@@ -268,7 +273,7 @@ def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: P
     table = re.findall(r"(?m)^\|.*$", text)
     assert len(table) > len(rows)
     assert all(line.endswith("|") for line in table)
-    tex = (tmp_path / "table.tex").read_text()
+    tex = (tmp_path / "table.tex").read_text(encoding="utf-8")
     parts = re.findall(r"(?s)\\begin\{tabular\}\{(\w+)\}(.*?)\\end\{tabular\}", tex)
     assert len(parts) == 2
     for columns, part in parts:
@@ -331,7 +336,7 @@ def test_unfinished_and_damaged_runs_are_listed(runs: Path, tmp_path: Path) -> N
     (half / "trials.jsonl").write_bytes(b"\n".join((half / "trials.jsonl").read_bytes().split(b"\n")[:7]) + b"\n")
     damaged = tmp_path / "b"
     damaged.mkdir()
-    (damaged / "config.yaml").write_text("a: [")
+    (damaged / "config.yaml").write_text("a: [", encoding="utf-8")
     states = [run["state"] for run in list_runs(find_runs([tmp_path]))]
     assert states == ["unfinished, 7 of 16 trials", "damaged config.yaml"]
     with pytest.raises(RunFolderError, match="there is no"):

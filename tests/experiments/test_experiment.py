@@ -53,7 +53,7 @@ def plan_of(**changes: Any) -> ExperimentPlan:
 
 def file_of(folder: Path, **changes: Any) -> Path:
     file = folder / "small.yaml"
-    file.write_text(yaml.safe_dump({**SMALL, **changes}))
+    file.write_text(yaml.safe_dump({**SMALL, **changes}), encoding="utf-8")
     return file
 
 
@@ -90,7 +90,7 @@ def test_paper_experiment_matches_the_paper() -> None:
 def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> None:
     for name, plan in builtin_experiments().items():
         file = tmp_path / f"{name}.yaml"
-        file.write_text(builtin_text(name))
+        file.write_text(builtin_text(name), encoding="utf-8")
         assert load_experiment(str(file)) == (plan, tmp_path)
     assert builtin_experiments()["suite"].task_list == suite_tasks()
     assert len(builtin_experiments()["rules"].seed_list) == 20
@@ -202,15 +202,19 @@ def test_two_runs_of_an_experiment_give_equal_tables(tmp_path: Path) -> None:
 
 
 def test_task_and_space_files_next_to_the_experiment_are_found(tmp_path: Path) -> None:
-    (tmp_path / "shelf.yaml").write_text("name: shelf\ntargets: [[0.4, 0.0, 0.2]]\nreference_point: [1.0, 1.0]\n")
-    (tmp_path / "three.yaml").write_text("joints: 3\n")
+    (tmp_path / "shelf.yaml").write_text(
+        "name: shelf\ntargets: [[0.4, 0.0, 0.2]]\nreference_point: [1.0, 1.0]\n", encoding="utf-8"
+    )
+    (tmp_path / "three.yaml").write_text("joints: 3\n", encoding="utf-8")
     plan = plan_of(tasks=["shelf.yaml"], space="three.yaml")
     cells, _ = plan_cells(plan, tmp_path, tmp_path / "out")
     assert {cell.task_name for cell in cells} == {"shelf"}
     assert all(Path(cell.task).is_absolute() and Path(str(cell.space)).is_absolute() for cell in cells)
     outcome = run_cell(cells[0])
     assert not outcome.fault
-    assert len(json.loads((cells[0].folder / "trials.jsonl").read_text().splitlines()[0])["params"]) == 9
+    assert (
+        len(json.loads((cells[0].folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()[0])["params"]) == 9
+    )
 
 
 def test_cells_without_a_model_are_skipped_with_a_reason(tmp_path: Path) -> None:
@@ -245,7 +249,7 @@ def test_experiment_command_runs_resumes_and_writes_tables(in_folder: Path) -> N
     assert "8 cells: 8 to run on 2 local workers, 0 finished before, 0 skipped" in result.output
     assert "With fewer than six seeds, no test can reject at 5 %" in result.output
     out = in_folder / "experiments" / "small"
-    rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((out / "table.csv").read_text(encoding="utf-8").splitlines()))
     assert {(row["task"], row["method"], row["runs"]) for row in rows} == {
         (task, method, "2") for task in ("target-1", "random-3") for method in ("BBO", "BBO/rules")
     }
@@ -260,8 +264,8 @@ def test_experiment_command_runs_resumes_and_writes_tables(in_folder: Path) -> N
 
 
 def test_tasks_are_checked_once_before_any_cell_runs(in_folder: Path) -> None:
-    (in_folder / "heavy.yaml").write_text("name: heavy\ntargets: [[0.3, 0.0, 0.3]]\npayload: 500\n")
-    (in_folder / "far.yaml").write_text("name: far\ntargets: [[5, 0, 0.3]]\n")
+    (in_folder / "heavy.yaml").write_text("name: heavy\ntargets: [[0.3, 0.0, 0.3]]\npayload: 500\n", encoding="utf-8")
+    (in_folder / "far.yaml").write_text("name: far\ntargets: [[5, 0, 0.3]]\n", encoding="utf-8")
     result = run_here(file_of(in_folder, tasks=["heavy.yaml"], seeds=1, n_total=1, n_init=2))
     assert result.exit_code == 0, result.output
     assert result.output.count("warning: task heavy: payload: 500 kg") == 1
@@ -285,12 +289,12 @@ def test_changed_method_does_not_reuse_an_existing_run(in_folder: Path) -> None:
 def test_failing_cell_is_reported_and_others_continue(in_folder: Path) -> None:
     blocked = in_folder / "experiments/small/runs/rules/target-1"
     blocked.mkdir(parents=True)
-    (blocked / "seed1").write_text("a file where a folder should be")
+    (blocked / "seed1").write_text("a file where a folder should be", encoding="utf-8")
     result = run_here(file_of(in_folder))
     assert result.exit_code == 1
     assert "FAILED: BBO/rules, target-1, seed 1" in result.output
     assert "Traceback" not in result.output
-    table = (in_folder / "experiments/small/table.md").read_text()
+    table = (in_folder / "experiments/small/table.md").read_text(encoding="utf-8")
     assert "FAILED: BBO/rules, target-1, seed 1" in table
     finished = list(in_folder.glob("experiments/small/runs/*/*/*/summary.json"))
     assert len(finished) == 7
@@ -330,7 +334,7 @@ def test_recorded_experiment_replays_without_a_model(in_folder: Path, chat_serve
     first = run_here(file, "--out", "first")
     assert first.exit_code == 0, first.output
     assert "2 of them ask test-model for about 4 proposals in total" in first.output
-    assert "[scripted]" in (in_folder / "first" / "table.md").read_text()
+    assert "[scripted]" in (in_folder / "first" / "table.md").read_text(encoding="utf-8")
     chat_server.requests.clear()
     again = run_here(file, "--out", "again", "--replay", "first", "--seeds", "3")
     assert again.exit_code == 0, again.output
@@ -338,7 +342,9 @@ def test_recorded_experiment_replays_without_a_model(in_folder: Path, chat_serve
     assert "skipped: BBO/LLM+, 1 cell: first has no recorded run of it" in again.output
     for seed in range(2):
         runs = [in_folder / place / f"runs/llm/random-3/seed{seed}/trials.jsonl" for place in ("first", "again")]
-        one, other = ([json.loads(line)["params"] for line in run.read_text().splitlines()] for run in runs)
+        one, other = (
+            [json.loads(line)["params"] for line in run.read_text(encoding="utf-8").splitlines()] for run in runs
+        )
         assert one == other
 
 

@@ -120,7 +120,7 @@ def with_atheris(name: str, inputs: int, seed: int) -> None:
             passed += check(target, data)
         given += 1
         if given % 100 == 0 or given >= inputs:
-            counted.write_text(json.dumps({"inputs": given, "passed": passed}))
+            counted.write_text(json.dumps({"inputs": given, "passed": passed}), encoding="utf-8")
 
     def mutate(data: bytes, most: int, number: int) -> bytes:
         if number % 4 == 0:
@@ -145,10 +145,10 @@ def in_process(name: str, engine: str, inputs: int, seed: int) -> dict[str, Any]
         started = time.perf_counter()
         done = subprocess.run(
             [*command, "--inputs", str(inputs), "--seed", str(seed)],
-            capture_output=True, text=True, errors="replace", env=environment,
+            capture_output=True, text=True, errors="replace", env=environment, encoding="utf-8",
         )  # fmt: skip
         seconds = time.perf_counter() - started
-        told = json.loads(count.read_text()) if count.exists() else {"inputs": 0, "passed": 0}
+        told = json.loads(count.read_text(encoding="utf-8")) if count.exists() else {"inputs": 0, "passed": 0}
     said = f"{done.stdout}\n{done.stderr}"
     fault = (
         ""
@@ -206,7 +206,7 @@ def alone(name: str, engine: str, inputs: int, seed: int) -> None:
         return
     told = with_hypothesis(name, inputs, seed)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20  # [GiB]
-    Path(os.environ["ARMWRIGHT_FUZZ_COUNT"]).write_text(json.dumps({**told, "peak_gib": peak}))
+    Path(os.environ["ARMWRIGHT_FUZZ_COUNT"]).write_text(json.dumps({**told, "peak_gib": peak}), encoding="utf-8")
     assert peak < LARGEST / 1024, f"{peak:.2f} GiB were taken"
 
 

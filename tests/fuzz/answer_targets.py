@@ -56,7 +56,10 @@ def run_answer(data: bytes) -> None:
 def draft_seeds() -> list[bytes]:
     rich = {"task": yaml.safe_load(RICH_TASK), "space": yaml.safe_load(RICH_SPACE)}
     names = ("task", "space")
-    plain = {name: yaml.safe_load((ROOT / "examples" / f"2-assembly-{name}.yaml").read_text()) for name in names}
+    plain = {
+        name: yaml.safe_load((ROOT / "examples" / f"2-assembly-{name}.yaml").read_text(encoding="utf-8"))
+        for name in names
+    }
     small = {"name": "drafted", "targets": [[0.4, 0, 0.1], [0.4, 0.2, 0.1]], "provenance": "made up"}
     answers = [
         {**rich, "assumptions": ["one", "two"], "questions": ["three"]},

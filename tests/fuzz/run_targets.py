@@ -39,9 +39,9 @@ def a_run() -> Path:
                 }
             ]
         )
-    )  # fmt: skip
+    , encoding="utf-8")  # fmt: skip
     hints = [{"id": 1, "text": "a SCARA arm"}, {"id": 2, "text": "lower"}]
-    (there / "control.json").write_text(json.dumps({"paused": True, "stop": False, "hints": hints}))
+    (there / "control.json").write_text(json.dumps({"paused": True, "stop": False, "hints": hints}), encoding="utf-8")
     return there
 
 

@@ -46,7 +46,9 @@ raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE)
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, encoding="utf-8"
+    )
 
 
 @pytest.mark.slow
@@ -124,10 +126,10 @@ for module in modules.values():
 def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
     """Compile to PTX with Warp's compiler; only a GPU can run the result."""
     command = [sys.executable, "-c", COMPILE_FOR_CUDA, str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, encoding="utf-8")
     assert done.returncode == 0, done.stderr
-    written = [path.read_text() for path in tmp_path.glob("*.ptx")]
-    assert len(written) == int((tmp_path / "count").read_text()) >= 17
+    written = [path.read_text(encoding="utf-8") for path in tmp_path.glob("*.ptx")]
+    assert len(written) == int((tmp_path / "count").read_text(encoding="utf-8")) >= 17
     assert all(".entry" in text and "sm_90" in text for text in written)
 
 

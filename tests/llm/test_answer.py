@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armwright.arrays import LARGEST_OBJECTIVE
 from armwright.exceptions import DesignError
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
 from armwright.llm.model_options import PromptOptions
@@ -36,7 +37,7 @@ def one(text: str) -> Answer:
     return answer
 
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = st.floats(-LARGEST_OBJECTIVE, LARGEST_OBJECTIVE)
 reasons = st.text(max_size=400)
 
 

@@ -127,8 +127,8 @@ def test_invalid_transcript_answer_is_requested_again(chat_server: ChatServer, t
     whole = run(chat_server, tmp_path / "run", n_total=1)
     for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 3)):
         file = tmp_path / "run" / name
-        text = "".join(file.read_text().splitlines(keepends=True)[:lines])
-        file.write_text(text.replace("0.2,", "9.9,"))
+        text = "".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:lines])
+        file.write_text(text.replace("0.2,", "9.9,"), encoding="utf-8")
     chat_server.requests.clear()
     assert [t.values for t in run(chat_server, tmp_path / "run", n_total=1).trials] == [t.values for t in whole.trials]
     assert len(chat_server.requests) == 2  # the check, and the parameters
@@ -148,7 +148,7 @@ def test_model_failure_before_the_first_trial_is_an_error(chat_server: ChatServe
     chat_server.answer = lambda request: (401, '{"error": {"message": "no such key"}}')
     with pytest.raises(ModelError, match=r"test-model: .*no such key"):
         run(chat_server, tmp_path / "run")
-    assert (tmp_path / "run" / "trials.jsonl").read_text() == ""
+    assert (tmp_path / "run" / "trials.jsonl").read_text(encoding="utf-8") == ""
 
 
 def test_unreachable_server_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +188,7 @@ def test_paid_answers_are_not_requested_again(chat_server: ChatServer, tmp_path:
     whole = run(chat_server, tmp_path / "whole")
     run(chat_server, tmp_path / "cut")
     trials = tmp_path / "cut" / "trials.jsonl"
-    trials.write_text("".join(trials.read_text().splitlines(keepends=True)[:7]))
+    trials.write_text("".join(trials.read_text(encoding="utf-8").splitlines(keepends=True)[:7]), encoding="utf-8")
     chat_server.requests.clear()
     again = run(chat_server, tmp_path / "cut")
     assert [trial.values for trial in again.trials] == [trial.values for trial in whole.trials]

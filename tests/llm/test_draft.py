@@ -111,7 +111,7 @@ def test_description_becomes_a_task_and_a_space(
 
 def test_draft_files_state_their_origin(chat_server: ChatServer, tmp_path: Path) -> None:
     draft = drafted(chat_server, ANSWER, tmp_path / "new folder")
-    task, space = (path.read_text() for path in draft.files)
+    task, space = (path.read_text(encoding="utf-8") for path in draft.files)
     assert yaml.safe_load(task) == TASK
     assert yaml.safe_load(space) == SPACE
     for text, body in ((task, draft.task_yaml), (space, draft.space_yaml)):
@@ -222,10 +222,14 @@ def test_invisible_characters_do_not_reach_files_and_terminal(chat_server: ChatS
         space={"name": "arm\u202etxt"},
     )
     draft = drafted(chat_server, hostile, tmp_path)
-    for text in (*(path.read_text() for path in draft.files), *draft.assumptions, json.dumps(draft.record())):
+    for text in (
+        *(path.read_text(encoding="utf-8") for path in draft.files),
+        *draft.assumptions,
+        json.dumps(draft.record()),
+    ):
         assert all(letter.isprintable() or letter == "\n" for letter in text)
     assert all(letter.isprintable() for letter in draft.task.description)
-    assert (tmp_path / DRAFTS).read_text().replace("\n", "").isprintable()
+    assert (tmp_path / DRAFTS).read_text(encoding="utf-8").replace("\n", "").isprintable()
 
 
 def test_line_breaks_in_a_description_stay_in_the_comment(chat_server: ChatServer, tmp_path: Path) -> None:
@@ -234,7 +238,9 @@ def test_line_breaks_in_a_description_stay_in_the_comment(chat_server: ChatServe
     options = ModelOptions(model="m", base_url=chat_server.url)
     draft = aw.draft(description, options, out=tmp_path / "a\nname: b")
     assert aw.load_task(draft.files[0]) == draft.task
-    assert "# From the description: paint name: evil ------------ targets: []\n" in draft.files[0].read_text()
+    assert "# From the description: paint name: evil ------------ targets: []\n" in draft.files[0].read_text(
+        encoding="utf-8"
+    )
     (prompt,) = chat_server.prompts()
     assert prompt.count("-" * 13) == 2  # the description cannot leave its lines of dashes
 
@@ -260,13 +266,13 @@ def test_taken_name_is_returned_to_the_model(chat_server: ChatServer, tmp_path: 
     for taken in ("wall.yaml", "wall-space.yaml"):
         folder = tmp_path / taken
         folder.mkdir()
-        (folder / taken).write_text("mine")
+        (folder / taken).write_text("mine", encoding="utf-8")
         other = drafted(chat_server, [ANSWER, answer_with(task={"name": "wall-2"})], folder)
         assert '"wall" is taken' in chat_server.prompts()[-1].replace("\\", "")
         assert other.files == (folder / "wall-2.yaml", folder / "wall-2-space.yaml")
         with pytest.raises(ModelError, match=rf"{taken} exists \(--force replaces it\)"):
             drafted(chat_server, ANSWER, folder)
-        assert (folder / taken).read_text() == "mine"
+        assert (folder / taken).read_text(encoding="utf-8") == "mine"
         forced = drafted(chat_server, ANSWER, folder, force=True)
         assert aw.load_task(folder / "wall.yaml") == forced.task
 
@@ -282,14 +288,14 @@ def test_file_created_during_the_call_is_kept(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.path.lexists", lambda path: False)
-    (tmp_path / "wall.yaml").write_text("mine")
+    (tmp_path / "wall.yaml").write_text("mine", encoding="utf-8")
     with pytest.raises(FailureError, match=r"cannot write .*wall\.yaml: File exists\. The answer is in"):
         drafted(chat_server, ANSWER, tmp_path)
-    assert (tmp_path / "wall.yaml").read_text() == "mine"
+    assert (tmp_path / "wall.yaml").read_text(encoding="utf-8") == "mine"
 
 
 def test_invalid_folder_is_reported_before_a_call(chat_server: ChatServer, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
+    (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(FailureError, match="cannot write"):
         drafted(chat_server, ANSWER, tmp_path / "file")
     assert chat_server.requests == []
@@ -300,7 +306,7 @@ def test_scripted_draft_is_not_attributed_to_a_model(chat_server: ChatServer, tm
     assert draft.by == "a scripted stand-in for a model (test-model)"
     assert draft.record()["origin"] == draft.usage.origin == "scripted"
     for path in draft.files:
-        assert "# Drafted by a scripted stand-in for a model (test-model) on" in path.read_text()
+        assert "# Drafted by a scripted stand-in for a model (test-model) on" in path.read_text(encoding="utf-8")
     assert [call.origin for call in Transcript(tmp_path / DRAFTS).calls] == ["scripted"]
     with pytest.raises(ValidationError, match='unknown origin "robot"'):
         drafted(chat_server, ANSWER, tmp_path, origin="robot")

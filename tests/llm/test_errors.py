@@ -117,7 +117,7 @@ def test_fault_before_the_first_trial_is_a_one_line_error(
     assert words.startswith(f"{WIRES[wire] or 'test-model'}: ")
     assert "\n" not in words
     assert "model_name" not in words  # the server's words, not a dictionary
-    assert (tmp_path / "run" / "trials.jsonl").read_text() == ""
+    assert (tmp_path / "run" / "trials.jsonl").read_text(encoding="utf-8") == ""
     (call,) = Transcript(tmp_path / "run" / "transcripts.jsonl").calls
     assert (call.step, call.fault) == ("check", kind)
 
@@ -137,7 +137,7 @@ def test_later_fault_becomes_a_counted_black_box_trial(
     run, shown = ask(wire, slow_at=7 if name in ENDLESS else None)
     assert sources(run) == ["llm", "bbo", "bbo"] + ["bbo"] * 3
     assert [trial.fault for trial in run.trials[4:]] == [None, None, None, kind, None, None]
-    summary = json.loads((tmp_path / "run" / "summary.json").read_text())["proposer"]
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))["proposer"]
     assert (summary["failures"], summary["call_failures"]) == ({kind: 1}, {kind: 1})
     assert (summary["fallback_share"], summary["flagged"]) == (0.5, True)
     assert (shown[-1].faults, shown[-1].fault) == ({kind: 1}, None)

@@ -27,7 +27,7 @@ def experiment(url: str) -> tuple[str, ...]:
     options = json.dumps({"model": "m", "base_url": url, "answer": "one-step"})
     method = f"{{llm: {{label: LLM, proposer: llm, model_options: {options}}}}}"
     Path("plan.yaml").write_text(
-        f"name: theirs\ntasks: [target-1]\nseeds: 1\nn_init: 2\nn_total: 2\nmethods: {method}\n"
+        f"name: theirs\ntasks: [target-1]\nseeds: 1\nn_init: 2\nn_total: 2\nmethods: {method}\n", encoding="utf-8"
     )
     return "experiment", "plan.yaml", "--no-figures", "--out", "out"
 
@@ -46,7 +46,7 @@ def test_file_of_an_experiment_gets_no_key(server: ChatServer, in_folder: Path) 
 
 
 def test_file_of_options_gets_no_key(server: ChatServer, in_folder: Path) -> None:
-    Path("options.yaml").write_text(f"base_url: {server.url}\nanswer: one-step\n")
+    Path("options.yaml").write_text(f"base_url: {server.url}\nanswer: one-step\n", encoding="utf-8")
     done = armwright(*STUDY, "--model", "m", "--model-options", "options.yaml", **KEY)
     assert done.returncode == 0, done.stderr
     assert sent_keys(server) == {"Bearer no-key"}
@@ -76,7 +76,7 @@ def test_address_of_the_users_configuration_gets_the_key(
 ) -> None:
     own = in_folder / "armwright" / "config.yaml"
     own.parent.mkdir()
-    own.write_text(f"model: m\nbase_url: {server.url}\n")
+    own.write_text(f"model: m\nbase_url: {server.url}\n", encoding="utf-8")
     monkeypatch.setenv("XDG_CONFIG_HOME", str(in_folder))
     for command in (experiment(server.url), STUDY):
         done = armwright(*command, **KEY)

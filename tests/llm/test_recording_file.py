@@ -59,7 +59,7 @@ def test_files_that_are_no_recording_are_one_error(tmp_path: Path) -> None:
     with pytest.raises(ReplayError, match="cannot read the recording"):
         find_recording(str(tmp_path / f"none{ENDING}"))
     text = tmp_path / f"text{ENDING}"
-    text.write_text("no xz")
+    text.write_text("no xz", encoding="utf-8")
     with pytest.raises(ReplayError, match="cannot read the recording"):
         find_recording(str(text))
 

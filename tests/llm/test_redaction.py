@@ -40,7 +40,7 @@ def run_alone(server: ChatServer, *arguments: str, **environment: str) -> subpro
     """The same in a process of its own, in which libraries read what they log."""
     command = [sys.executable, "-m", "armwright", *arguments]
     env = {**os.environ, **wires.environment(server), **environment}
-    return subprocess.run(command, capture_output=True, text=True, env=env, stdin=subprocess.DEVNULL)
+    return subprocess.run(command, capture_output=True, text=True, env=env, stdin=subprocess.DEVNULL, encoding="utf-8")
 
 
 def model_of(wire: str, server: ChatServer, **options: str) -> tuple[str, ...]:
@@ -129,7 +129,7 @@ def check_for_keys(
 ) -> None:
     """No key in what the study shows and writes, whatever the server answered."""
     assert done.returncode == 0, done.stderr
-    summary = json.loads((in_folder / "run" / "summary.json").read_text())
+    summary = json.loads((in_folder / "run" / "summary.json").read_text(encoding="utf-8"))
     assert summary["proposer"]["failures"] == {"rejected": 1, "answer": 1, "server": 1, "key": 2}
     assert sent_key(chat_server) in KEYS
     files = [path for path in in_folder.rglob("*") if path.is_file()]
@@ -137,7 +137,7 @@ def check_for_keys(
     for path in files:
         no_key_in(words_of(path))
     no_key_in(done.stdout + done.stderr)
-    assert "_API_KEY>" in (in_folder / "run" / "transcripts.jsonl").read_text()
+    assert "_API_KEY>" in (in_folder / "run" / "transcripts.jsonl").read_text(encoding="utf-8")
     assert "iteration 6/6" in shown
     assert "failed 5" in shown
     assert shown.count("no usable proposal") == 4  # the last fault is told once

@@ -20,7 +20,9 @@ from armwright.runs.simulation import mujoco_version
 from tests import ROOT
 from tests.support.extras import NEEDS_GP
 
-STATED: dict[str, list[str]] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+STATED: dict[str, list[str]] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+    "optional-dependencies"
+]
 
 
 def plain(name: str) -> str:

@@ -19,7 +19,7 @@ from tests.support.chat_server import ChatServer
 REGISTRY = ROOT / "optunahub" / "package"
 NAME = "callbacks/armwright_proposals"
 FOLDER = REGISTRY / NAME
-README = (FOLDER / "README.md").read_text()
+README = (FOLDER / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -65,8 +65,8 @@ def test_package_meets_the_registry_requirements() -> None:
     assert {path.name for path in FOLDER.iterdir()} - {"__pycache__"} == {
         *("README.md", "__init__.py", "LICENSE", "example.py", "requirements.txt")
     }
-    assert "MIT License" in (FOLDER / "LICENSE").read_text()
-    assert (FOLDER / "requirements.txt").read_text() == "armwright[llm]\n"
+    assert "MIT License" in (FOLDER / "LICENSE").read_text(encoding="utf-8")
+    assert (FOLDER / "requirements.txt").read_text(encoding="utf-8") == "armwright[llm]\n"
 
 
 def test_readme_names_the_public_api(module: ModuleType) -> None:
@@ -91,7 +91,7 @@ def test_readme_example_runs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
 @pytest.mark.slow
 def test_example_script_runs() -> None:
     command = [sys.executable, "-W", "error", FOLDER / "example.py", "--n-trials", "30"]
-    said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+    said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, encoding="utf-8").stdout
     assert said.startswith("6 proposals by rules, faults: none\n")
 
 

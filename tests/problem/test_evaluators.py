@@ -1,8 +1,12 @@
 """Custom evaluators."""
 
+import asyncio
 import math
 import os
+import signal
+import sys
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +73,9 @@ def test_evaluator_combines_with_builtin_objectives_and_constraints() -> None:
         (lambda arm, task: math.nan, "expected finite numbers, got energy = nan"),
         (lambda arm, task: np.array([np.inf]), "expected finite numbers, got energy = inf"),
         (lambda arm, task: 10**400, "expected finite numbers, got energy = inf"),
+        (lambda arm, task: -1e308, r"expected numbers within ±1e\+60, got energy = -1e\+308"),
+        (lambda arm, task: {"energy": 1.0}, "got {'energy': 1.0}"),
+        (lambda arm, task: [1.0] * 10**6, r"got \[1.0, 1.0, .{60,75} \(test_evaluators.py"),
         (lambda arm, task: 1 / 0, r": ZeroDivisionError: division by zero \(test_evaluators.py, line \d+\)"),
     ],
 )
@@ -84,6 +91,112 @@ def test_system_exit_in_an_evaluator_is_a_failure() -> None:
         raising(MemoryError())(ARM, TASK)
     with pytest.raises(KeyboardInterrupt):
         raising(KeyboardInterrupt())(ARM, TASK)
+
+
+class Panic(BaseException):
+    """As PyO3 raises it for a panic in Rust."""
+
+
+class UnprintableError(Exception):
+    def __init__(self, show: Callable[[], str]) -> None:
+        self.show = show
+
+    def __str__(self) -> str:
+        return self.show()
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (asyncio.CancelledError("stop"), "CancelledError: stop"),
+        (GeneratorExit(), "GeneratorExit"),
+        (Panic("index out of bounds"), "Panic: index out of bounds"),
+        (UnprintableError(lambda: 1 / 0), r"UnprintableError: \(its __str__ raises ZeroDivisionError\)"),
+        (UnprintableError(lambda: sys.exit()), r"UnprintableError: \(its __str__ raises SystemExit\)"),
+        (UnprintableError(lambda: 3), r"UnprintableError: \(its __str__ raises TypeError\)"),
+        (ValueError("much\n" * 2_000_000), "ValueError: (much ){50,}m …"),
+    ],
+)
+def test_any_exception_of_an_evaluator_is_one_line(in_folder: Path, fault: BaseException, words: str) -> None:
+    with pytest.raises(EvaluatorError, match=rf": {words} \(test_evaluators.py, line \d+\)\n") as raised:
+        raising(fault)(ARM, TASK)
+    (trace,) = raised.value.__notes__
+    assert len(trace) <= 8_000
+    (in_folder / "raises.py").write_text(
+        "from tests.problem.test_evaluators import fault\nraise fault.with_traceback(None)\n", encoding="utf-8"
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys.modules[__name__], "fault", fault, raising=False)
+        with pytest.raises(SettingsError, match=rf"^cannot load raises.py: {words} \(raises.py, line 2\)$"):
+            aw.load_evaluator("raises.py:f")
+
+
+class NoNumber(Fraction):
+    def __float__(self) -> float:
+        raise ValueError("no number")
+
+
+class NoText:
+    def __repr__(self) -> str:
+        raise asyncio.CancelledError("no text")
+
+
+@pytest.mark.parametrize(
+    ("made", "words"), [(NoNumber(1), "ValueError: no number"), ([NoText()], "CancelledError: no text")]
+)
+def test_methods_of_a_result_may_raise(made: object, words: str) -> None:
+    with pytest.raises(EvaluatorError, match=words):
+        aw.evaluator("energy [J]")(lambda arm, task: made)(ARM, TASK)
+
+
+def test_state_of_the_process_is_restored_after_an_evaluation() -> None:
+    def current() -> list[object]:
+        streams = [os.fstat(number).st_ino for number in (0, 1, 2)]
+        return [Path.cwd(), np.geterr(), sys.getrecursionlimit(), signal.getsignal(signal.SIGTERM), streams]
+
+    @aw.evaluator("energy [J]")
+    def careless(arm: aw.Arm, task: aw.Task) -> float:
+        os.chdir("/")
+        np.seterr(all="raise")
+        sys.setrecursionlimit(100_000)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        return 1.0
+
+    before = current()
+    assert careless(ARM, TASK) == (1.0,)
+    assert current() == before
+
+
+def test_first_interrupt_stays_the_last_that_an_evaluator_can_catch() -> None:
+    """The handler of Ctrl-C sets SIG_DFL, so that a second one ends the process."""
+    handler = signal.getsignal(signal.SIGINT)
+
+    @aw.evaluator("energy [J]")
+    def interrupted(arm: aw.Arm, task: aw.Task) -> float:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        return 1.0
+
+    try:
+        interrupted(ARM, TASK)
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def test_numpy_settings_of_a_file_hold_in_its_evaluator_only(in_folder: Path) -> None:
+    (in_folder / "strict.py").write_text(
+        "import armwright as aw, numpy as np\n"
+        "np.seterr(all='raise')\n"
+        "@aw.evaluator('energy [J]')\n"
+        "def f(arm, task): return np.float64(1.0) / 0.0\n",
+        encoding="utf-8",
+    )
+    before = np.geterr()
+    strict = aw.load_evaluator("strict.py:f")
+    assert np.geterr() == before
+    with pytest.raises(EvaluatorError, match="FloatingPointError: divide by zero"):
+        strict(ARM, TASK)
+    assert np.geterr() == before
 
 
 def test_working_folder_is_restored_after_an_evaluation(in_folder: Path) -> None:
@@ -175,8 +288,8 @@ def plain(arm, task):
 
 @pytest.fixture
 def file(in_folder: Path) -> Path:
-    (in_folder / "beside.py").write_text("FACTOR = 2.0\n")
-    (in_folder / "sim.py").write_text(FILE)
+    (in_folder / "beside.py").write_text("FACTOR = 2.0\n", encoding="utf-8")
+    (in_folder / "sim.py").write_text(FILE, encoding="utf-8")
     return in_folder / "sim.py"
 
 
@@ -202,10 +315,12 @@ def test_evaluator_file_can_import_its_neighbours(file: Path) -> None:
     ],
 )
 def test_unloadable_evaluator_is_one_line(file: Path, place: str, words: str) -> None:
-    (file.parent / "broken.py").write_text("x = 1\ndef f(:\n")
-    (file.parent / "raises.py").write_text("raise RuntimeError('at once')\n")
-    (file.parent / "exits.py").write_text("raise SystemExit(3)\n")
-    (file.parent / "named.py").write_text("import armwright as aw\n@aw.evaluator('length')\ndef f(arm, task): ...\n")
+    (file.parent / "broken.py").write_text("x = 1\ndef f(:\n", encoding="utf-8")
+    (file.parent / "raises.py").write_text("raise RuntimeError('at once')\n", encoding="utf-8")
+    (file.parent / "exits.py").write_text("raise SystemExit(3)\n", encoding="utf-8")
+    (file.parent / "named.py").write_text(
+        "import armwright as aw\n@aw.evaluator('length')\ndef f(arm, task): ...\n", encoding="utf-8"
+    )
     with pytest.raises(SettingsError, match=words) as raised:
         aw.load_evaluator(place)
     assert "\n" not in str(raised.value)
@@ -221,7 +336,7 @@ def test_run_is_resumed_with_its_own_evaluator(file: Path) -> None:
         return aw.optimize(problem, proposer="rules", n_init=5, n_total=n_total, out="runs/own")
 
     first = run(5, aw.load_evaluator("sim.py:simulate"))
-    (file.parent / "sim.py").write_text(FILE + "# mended\n")
+    (file.parent / "sim.py").write_text(FILE + "# mended\n", encoding="utf-8")
     more = run(8, aw.load_evaluator("sim.py:simulate"))
     assert [t.values for t in more.trials[:10]] == [t.values for t in first.trials]
     assert [v["evaluator"] for v in more.config.earlier_versions] == [first.config.versions["evaluator"]]

@@ -124,7 +124,7 @@ def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path, proble
             history.problem.evaluate(designs)
     else:
         assert np.array_equal(history.problem.evaluate(designs).values, problem.evaluate(designs).values)
-    assert (tmp_path / "run" / "trials.csv").read_text().splitlines()[0].endswith(",".join(names))
+    assert (tmp_path / "run" / "trials.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",".join(names))
 
 
 def test_changed_objectives_are_refused(tmp_path: Path) -> None:
@@ -197,7 +197,7 @@ def test_former_objective_names_are_reported_with_the_current_one(tmp_path: Path
     assert new not in RENAMED, "no current name is a former name of another objective"
     file = tmp_path / "old.yaml"
     for key, value in (("objectives", old), ("constraints", f"{old} <= 1")):
-        file.write_text(yaml.safe_dump({"name": "old", "targets": [[0.4, 0.1, 0.3]], key: [value]}))
+        file.write_text(yaml.safe_dump({"name": "old", "targets": [[0.4, 0.1, 0.3]], key: [value]}), encoding="utf-8")
         with pytest.raises(UsageError, match=f'"{old}".*It is now called "{new}".') as refusal:
             Problem(load_task(file))
         assert str(refusal.value).count("now called") == 1
@@ -216,7 +216,7 @@ def test_task_objectives_reach_run_prompt_figures_and_page(tmp_path: Path, names
     """Follow objectives from the task file to run, prompt, page and front search."""
     task = LOADED.model_copy(update={"objectives": names})
     file = tmp_path / "task.yaml"
-    file.write_text(yaml.safe_dump(task.model_dump(mode="json")))
+    file.write_text(yaml.safe_dump(task.model_dump(mode="json")), encoding="utf-8")
     result = CliRunner().invoke(
         app, ["optimize", str(file), "--n-init", "5", "--n-total", "12", "--out", str(tmp_path / "run")]
     )

@@ -59,7 +59,8 @@ def test_worst_case_combines_with_build_tolerance() -> None:
 def test_run_records_its_worst_case_settings(tmp_path: Path) -> None:
     file = tmp_path / "robust.yaml"
     file.write_text(
-        yaml.safe_dump({"name": "robust", "targets": [[0.4, 0.1, 0.3]], "payload": 0.2, "target_noise": 0.01})
+        yaml.safe_dump({"name": "robust", "targets": [[0.4, 0.1, 0.3]], "payload": 0.2, "target_noise": 0.01}),
+        encoding="utf-8",
     )
     run = optimize(Problem(load_task(file)), proposer="rules", n_total=10, out=tmp_path / "run")
     config, history = read_run(tmp_path / "run")
@@ -85,6 +86,6 @@ def test_prompt_states_the_worst_case_settings() -> None:
 )
 def test_invalid_cases_are_refused(given: dict[str, object], tmp_path: Path) -> None:
     file = tmp_path / "bad.yaml"
-    file.write_text(yaml.safe_dump({"name": "bad", "targets": [[0.4, 0.1, 0.3]], **given}))
+    file.write_text(yaml.safe_dump({"name": "bad", "targets": [[0.4, 0.1, 0.3]], **given}), encoding="utf-8")
     with pytest.raises(TaskError, match=str(next(iter(given)))):
         load_task(file)

@@ -146,7 +146,7 @@ def test_killed_run_resumes_with_the_same_conversation(
     sent = conversations(server, free)
     for name, lines in (("transcripts.jsonl", kept_calls), ("trials.jsonl", kept_trials)):
         file = tmp_path / "run" / name
-        file.write_text("".join(file.read_text().splitlines(keepends=True)[:lines]))
+        file.write_text("".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:lines]), encoding="utf-8")
     server.requests.clear()
     again = run(chat(server), tmp_path / "run")
     assert [trial.values for trial in again.trials] == [trial.values for trial in whole.trials]
@@ -248,8 +248,8 @@ def test_manual_questions_of_a_chat_contain_what_is_new(tmp_path: Path) -> None:
         asked = ManualProposer(tmp_path / "ask", PromptOptions(memory="chat"), wait=False)
         with pytest.raises(AnswerPendingError):
             run(asked, tmp_path / "run")
-        (tmp_path / "ask" / f"{number:03d}-answer.md").write_text(line.format(number / 100))
-    first, second = ((tmp_path / "ask" / f"{number:03d}-prompt.md").read_text() for number in (4, 7))
+        (tmp_path / "ask" / f"{number:03d}-answer.md").write_text(line.format(number / 100), encoding="utf-8")
+    first, second = ((tmp_path / "ask" / f"{number:03d}-prompt.md").read_text(encoding="utf-8") for number in (4, 7))
     assert "# Task" in first
     assert second.startswith(RESULTS)
 

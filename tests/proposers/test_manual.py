@@ -86,7 +86,9 @@ def test_command_line_accepts_answers_one_by_one(in_folder: Path) -> None:
     (in_folder / "ask" / "007-answer.json").write_text(JSON, encoding="utf-8")
     done = go("--json")
     assert json.loads(done.stdout)["proposer"]["origin"] == "manual"
-    trials = [json.loads(line) for line in (in_folder / "run" / "trials.jsonl").read_text().splitlines()]
+    trials = [
+        json.loads(line) for line in (in_folder / "run" / "trials.jsonl").read_text(encoding="utf-8").splitlines()
+    ]
     assert [trial["source"] for trial in trials] == ["random"] * 4 + ["manual", "bbo", "bbo"] * 2
     assert trials[4]["reason"] == "a shoulder in the middle"
     assert trials[7]["params"]["link_1"] == 0.25

@@ -52,7 +52,7 @@ def recorded(server: ChatServer, out: Path, asking: dict[str, Any] | None = None
 
 
 def lines(folder: Path) -> list[dict[str, Any]]:
-    trials = (folder / "trials.jsonl").read_text().splitlines()
+    trials = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()
     return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
 
 
@@ -231,7 +231,7 @@ def test_transcript_alone_can_be_replayed(in_pairs: ChatServer, tmp_path: Path, 
 
 def test_replay_takes_settings_missing_in_the_transcript_from_options(varied: ChatServer, tmp_path: Path) -> None:
     mine = tmp_path / "mine.md"
-    mine.write_text('{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}')
+    mine.write_text('{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}', encoding="utf-8")
     recorded(varied, tmp_path / "first", {"prompt": str(mine), "memory": "own"})
     shutil.copy(tmp_path / "first" / "transcripts.jsonl", tmp_path / "alone.jsonl")
     for record in ("first", "alone.jsonl"):
@@ -268,7 +268,9 @@ def test_options_that_contradict_the_record_are_refused(chat_server: ChatServer,
 def test_differing_prompt_is_reported_or_refused_when_strict(varied: ChatServer, tmp_path: Path) -> None:
     recorded(varied, tmp_path / "first")
     file = tmp_path / "first" / "transcripts.jsonl"
-    file.write_text(file.read_text().replace("You are an expert", "You are a layman", 1))
+    file.write_text(
+        file.read_text(encoding="utf-8").replace("You are an expert", "You are a layman", 1), encoding="utf-8"
+    )
     notes: list[str] = []
     proposer = ReplayProposer(tmp_path / "first")
     run = optimize(PROBLEM, proposer=proposer, **SETTINGS, watch=lambda progress: notes.append(progress.note))
@@ -297,9 +299,9 @@ def test_a_recorded_call_without_a_key_is_damaged(tmp_path: Path, key: str) -> N
     path = tmp_path / "transcripts.jsonl"
     Transcript(path).add(call)
     assert Transcript(path).calls == (call,)
-    content = json.loads(path.read_text())
+    content = json.loads(path.read_text(encoding="utf-8"))
     del content[key]
-    path.write_text(json.dumps(content) + "\n")
+    path.write_text(json.dumps(content) + "\n", encoding="utf-8")
     with pytest.raises(RunFolderError, match="line 1 is damaged"):
         ReplayProposer(path)
 
@@ -307,7 +309,7 @@ def test_a_recorded_call_without_a_key_is_damaged(tmp_path: Path, key: str) -> N
 def test_invalid_recordings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ReplayError, match="there is no"):
         ReplayProposer(tmp_path)
-    (tmp_path / "transcripts.jsonl").write_text("")
+    (tmp_path / "transcripts.jsonl").write_text("", encoding="utf-8")
     with pytest.raises(ReplayError, match="holds no proposal"):
         ReplayProposer(tmp_path)
     with pytest.raises(SettingsError, match="needs a run: replay:PATH"):
@@ -320,7 +322,7 @@ def test_recording_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
     """Not even a truncated last line is changed."""
     recorded(varied, tmp_path / "first")
     file = tmp_path / "first" / "transcripts.jsonl"
-    file.write_text(file.read_text() + '{"proposal": "llm-00')
+    file.write_text(file.read_text(encoding="utf-8") + '{"proposal": "llm-00', encoding="utf-8")
     before = file.read_bytes()
     optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), **SETTINGS)
     assert file.read_bytes() == before

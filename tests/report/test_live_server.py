@@ -65,7 +65,7 @@ class LiveStudy:
             str(folder),
         ]
         self.folder = folder
-        self.process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True, encoding="utf-8")
         self.said: list[str] = []
         while not (
             found := re.search(r"^live: (http://127\.0\.0\.1:\d+/#key=[\w-]{32})$", self.said[-1] if self.said else "")
@@ -190,7 +190,7 @@ def test_live_page_shows_the_end_and_outlives_the_study(tmp_path: Path, tab: Tab
     assert sorted(tab.ask("armwright.content.head.front")) == sorted(m.number for m in history.front)
     with tab.page.expect_download() as download:
         tab.page.get_by_role("button", name="URDF").click()
-    assert Path(download.value.path()).read_text().startswith("<?xml")
+    assert Path(download.value.path()).read_text(encoding="utf-8").startswith("<?xml")
     assert tab.faults == []
 
 

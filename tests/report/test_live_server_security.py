@@ -187,7 +187,7 @@ def test_slow_clients_do_not_block_others(served: tuple[Path, int, str]) -> None
 @pytest.fixture
 def evil(tmp_path: Path) -> Iterator[str]:
     """Another site, in the same browser."""
-    (tmp_path / "index.html").write_text("<!doctype html><title>evil</title>")
+    (tmp_path / "index.html").write_text("<!doctype html><title>evil</title>", encoding="utf-8")
     handler = partial(_Quiet, directory=str(tmp_path))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -264,20 +264,20 @@ def test_names_in_a_run_folder_are_escaped(tmp_path: Path, browser: Browser) -> 
     """Names of objectives, sources, faults, arms and the folder may come from a stranger."""
     folder = tmp_path / re.sub("[/]", "", LINK)[:60]
     aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="rules", n_init=3, n_step=2, n_total=4, out=folder)
-    config = yaml.safe_load((folder / "config.yaml").read_text())
+    config = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
     for objective in config["objectives"]:
         objective |= {"label": LINK, "unit": LINK, "symbol": LINK}
     config["method"]["proposer"]["name"] = LINK
     config["space"]["name"] = LINK[:100]
     config["versions"]["armwright"] = LINK
-    (folder / "config.yaml").write_text(yaml.safe_dump(config))
-    trials = [json.loads(line) for line in (folder / "trials.jsonl").read_text().splitlines()]
+    (folder / "config.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
+    trials = [json.loads(line) for line in (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
     for trial in trials[3:]:
         trial |= {"source": LINK, "reason": LINK, "proposal": LINK, "fault": LINK}
-    (folder / "trials.jsonl").write_text("".join(f"{json.dumps(trial)}\n" for trial in trials))
+    (folder / "trials.jsonl").write_text("".join(f"{json.dumps(trial)}\n" for trial in trials), encoding="utf-8")
     arm = {"joints": 6, "reach": 0.5, "mass": 1.0, "base": [0, 0, 0], "values": trials[-1]["values"], "measures": {},
            "dominates": 1, "dominated_by": 0, "violated": [], "notes": [LINK]}  # fmt: skip
-    (folder / "existing_arms.json").write_text(json.dumps([{"name": LINK, **arm}]))
+    (folder / "existing_arms.json").write_text(json.dumps([{"name": LINK, **arm}]), encoding="utf-8")
     shutil.rmtree(folder / "designs")
     tab = Tab(browser, offline=True)
     page = write_report(folder)

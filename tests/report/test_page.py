@@ -82,7 +82,7 @@ def test_page_opens_offline_without_requests(run: Path, tab: Tab) -> None:
     assert tab.faults == []
     assert (run / "report.html").stat().st_size < 2.5e6
     facts = tab.text("#facts")
-    summary = json.loads((run / "summary.json").read_text())
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     assert f"{summary['hypervolume']['final']:.4g}" in facts
     assert f"{100 * summary['front_gap']['share']:.1f} % of the best known" in facts
     assert tab.text("#repeat code") == "armwright optimize target-2 --proposer rules --n-total 40 --seed 1"
@@ -127,7 +127,7 @@ def test_axes_fit_the_designs_if_the_reference_point_is_far(tmp_path: Path, tab:
 
 def test_content_security_policy_allows_own_scripts_only(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html")
-    text = (run / "report.html").read_text()
+    text = (run / "report.html").read_text(encoding="utf-8")
     (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
     assert "default-src 'none'" in policy
     assert "connect-src 'none'" in policy
@@ -226,9 +226,9 @@ def test_downloaded_files_load(run: Path, tab: Tab, history: History) -> None:
     for name in ("URDF", "MJCF", "CSV"):
         with tab.page.expect_download() as download:
             tab.page.get_by_role("button", name=name).click()
-        files[name] = (download.value.suggested_filename, Path(download.value.path()).read_text())
+        files[name] = (download.value.suggested_filename, Path(download.value.path()).read_text(encoding="utf-8"))
     assert files["URDF"][0] == f"target-2-{number}.urdf"
-    assert files["URDF"][1] == (run / "designs" / f"{number:04d}" / "arm.urdf").read_text()
+    assert files["URDF"][1] == (run / "designs" / f"{number:04d}" / "arm.urdf").read_text(encoding="utf-8")
     robot = yourdfpy.URDF.load(io.StringIO(files["URDF"][1]))
     assert len(robot.actuated_joints) == 4
     assert mujoco.MjModel.from_xml_string(files["MJCF"][1]).njnt == 4
@@ -285,7 +285,7 @@ def test_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: Histo
     tab.page.keyboard.press("ArrowDown")
     assert tab.ask("armwright.state.design") == int(second.get_attribute("data-design"))
     assert second.get_attribute("aria-current") == "true"
-    robust = set(json.loads((run / "summary.json").read_text())["verification"]["robust_numbers"])
+    robust = set(json.loads((run / "summary.json").read_text(encoding="utf-8"))["verification"]["robust_numbers"])
     for row in tab.page.locator("#table tbody tr").all():
         verdict = "robust" if int(row.get_attribute("data-design")) in robust else "sensitive"
         assert verdict in row.inner_text()
@@ -409,13 +409,13 @@ def test_transcript_states_what_was_predicted_of_a_screened_proposal(
     chat_server.answer = lambda request: answer if wants_design(request) else "because"
     proposer = llm_proposer(chat_server.url, origin="scripted")
     aw.optimize(aw.Problem(aw.load_task("target-1")), proposer=proposer, n_init=4, n_step=2, n_total=3, out=tmp_path)
-    trials = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text().splitlines()]
+    trials = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
     screened = trials[4]  # as if the screen had left it out
     number, id_ = screened["number"], screened["proposal"]
     screened |= {"screened": {"source": "llm", "proposal": id_, "gain": 0.02, "predicted": [0.5, 12.0]}}
     screened |= {"source": "bbo", "proposal": None}
     del screened["reason"]
-    (tmp_path / "trials.jsonl").write_text("".join(json.dumps(trial) + "\n" for trial in trials))
+    (tmp_path / "trials.jsonl").write_text("".join(json.dumps(trial) + "\n" for trial in trials), encoding="utf-8")
     tab.open(write_report(tmp_path), f"#design={number}")
     line = (
         f"{id_} was not evaluated: predicted position error 0.5 m, torque 12 N m x 40; expected gain 2 % of the best "
@@ -495,7 +495,7 @@ def test_page_with_ten_thousand_designs(tmp_path: Path, tab: Tab) -> None:
 
 @pytest.mark.slow
 def test_report_without_trials_is_refused(run: Path, tmp_path: Path) -> None:
-    (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text())
+    (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     with pytest.raises(RunFolderError, match="nothing to report"):
         write_report(tmp_path)
     with pytest.raises(RunFolderError, match="not a run folder"):
@@ -504,7 +504,7 @@ def test_report_without_trials_is_refused(run: Path, tmp_path: Path) -> None:
 
 def test_unfinished_run_is_shown(run: Path, tmp_path: Path, tab: Tab) -> None:
     lines = (run / "trials.jsonl").read_bytes().splitlines(keepends=True)
-    (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text())
+    (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "trials.jsonl").write_bytes(b"".join(lines[:20]) + lines[20][:30])
     tab.open(write_report(tmp_path))
     assert "unfinished" in tab.text("#facts")

@@ -64,7 +64,7 @@ def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Serv
             yield Server(kind, address, routes, ("/",))
     else:
         task = folder / "secret-cell.yaml"
-        task.write_text(TASK)
+        task.write_text(TASK, encoding="utf-8")
         with served_editor(task, port) as editor:
             mine = Editor(EditedFiles(task), pages).routes()
             assert [one.path for one in mine if isinstance(one, Mount)] == ["/run"]
@@ -292,7 +292,7 @@ def test_files_are_downloaded_with_the_key(served: tuple[Path, int, str], browse
     tab.open(f"http://127.0.0.1:{port}/#key={key}")
     with tab.page.expect_download() as download:
         tab.page.get_by_role("button", name="URDF", exact=True).first.click()
-    assert Path(download.value.path()).read_text().startswith("<?xml")
+    assert Path(download.value.path()).read_text(encoding="utf-8").startswith("<?xml")
     assert all(key not in url for url in tab.requests)
     tab.close()
 

@@ -147,7 +147,7 @@ def test_loads_are_those_of_the_exported_trajectory(
 ) -> None:
     number = recommended[0]["design"]
     arm = history.member(number).arm
-    with (run / "designs" / f"{number:04d}" / "trajectory.csv").open() as file:
+    with (run / "designs" / f"{number:04d}" / "trajectory.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     tab.open(run / "report.html", f"#design={number}")
     for button, column, factor, limits in (

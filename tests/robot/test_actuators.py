@@ -160,7 +160,7 @@ def test_single_actuator_is_not_a_parameter() -> None:
     ],
 )
 def test_unbuildable_actuator_settings_are_refused(tmp_path: Path, space: dict, words: str) -> None:
-    (tmp_path / "space.yaml").write_text(yaml.safe_dump(space))
+    (tmp_path / "space.yaml").write_text(yaml.safe_dump(space), encoding="utf-8")
     with pytest.raises(SpaceError, match=words):
         load_space(tmp_path / "space.yaml")
 

@@ -71,7 +71,7 @@ def test_urdf_arms_are_held_as_by_pinocchio(name: str, postures: dict[str, Seque
 def test_ur5e_is_held_as_its_published_table_says(tmp_path: Path, payload: float) -> None:
     """The table as a URDF is read as the same arm that Pinocchio builds from the table itself."""
     file = tmp_path / "ur5e.urdf"
-    file.write_text(urdf_of(UR5E))
+    file.write_text(urdf_of(UR5E), encoding="utf-8")
     read = read_urdf(file)
     assert read.tip == "tool"
     angles = np.radians(list(UR_POSTURES.values()))

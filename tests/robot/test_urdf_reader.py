@@ -91,7 +91,7 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("seed", range(8))
 def test_exported_urdf_is_read_back(file: Path, seed: int) -> None:
     arm = any_arm(seed, ("revolute", "prismatic"))
-    file.write_text(to_urdf(arm))
+    file.write_text(to_urdf(arm), encoding="utf-8")
     read = read_urdf(file)
     assert_equal_arms(read.arm, arm)
     assert (read.base_link, read.tip) == ("world", "tip")
@@ -103,14 +103,14 @@ def test_exported_urdf_is_read_back(file: Path, seed: int) -> None:
 def test_link_frames_may_have_any_orientation(file: Path, seed: int) -> None:
     """The arm does not depend on the orientation of link frames and axes."""
     arm = any_arm(seed, ("revolute", "prismatic"))
-    file.write_text(with_frames_anyhow(arm, seed))
+    file.write_text(with_frames_anyhow(arm, seed), encoding="utf-8")
     assert_equal_arms(read_urdf(file).arm, arm)
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_fixed_joints_are_merged(file: Path, seed: int) -> None:
     """Tip and gravity torques, with payload, agree with Pinocchio."""
-    file.write_text(with_frames_anyhow(any_arm(seed), seed))
+    file.write_text(with_frames_anyhow(any_arm(seed), seed), encoding="utf-8")
     read = read_urdf(file)
     q = random_values(read.arm, 5, seed)
     for ours, theirs in zip(seen_by_kernels(read.arm, q, 0.7), seen_by_pinocchio(file, read, q, 0.7)[::2], strict=True):
@@ -122,7 +122,7 @@ def test_skew_axes_move_the_zero_posture(file: Path) -> None:
     moved = 0
     for seed in range(12):
         arm = any_arm(seed, ("revolute",))
-        file.write_text(with_frames_anyhow(arm, seed, off=0.4))
+        file.write_text(with_frames_anyhow(arm, seed, off=0.4), encoding="utf-8")
         read = read_urdf(file)
         q = random_values(read.arm, 5, seed)
         assert np.all(np.abs(read.zeros) <= np.pi / 4 + 1e-9)
@@ -187,10 +187,12 @@ def one_joint(joint: str = 'type="revolute"', inside: str = '<limit lower="-1" u
 
 def test_urdf_limits_are_converted(file: Path) -> None:
     """Limits may exclude 0, oppose the axis, or exceed the range of the kernels."""
-    file.write_text(one_joint(inside='<axis xyz="0 -2 0"/><limit lower="0.5" upper="1.5" effort="3"/>'))
+    file.write_text(
+        one_joint(inside='<axis xyz="0 -2 0"/><limit lower="0.5" upper="1.5" effort="3"/>'), encoding="utf-8"
+    )
     (joint,) = read_urdf(file).arm.joints
     assert (joint.axis, joint.lower, joint.upper, joint.effort) == ("y", -1.5, -0.5, 3.0)
-    file.write_text(one_joint(inside='<limit lower="-20" upper="7" effort="0"/>'))
+    file.write_text(one_joint(inside='<limit lower="-20" upper="7" effort="0"/>'), encoding="utf-8")
     read = read_urdf(file)
     assert (read.arm.joints[0].lower, read.arm.joints[0].upper) == (-2 * np.pi, 2 * np.pi)
     assert read.arm.joints[0].effort is None
@@ -199,7 +201,10 @@ def test_urdf_limits_are_converted(file: Path) -> None:
 
 def test_axes_are_snapped_within_tolerance(file: Path) -> None:
     for off, fits in ((0.9 * SNAP, True), (1.1 * SNAP, False)):
-        file.write_text(one_joint(inside=f'<axis xyz="{np.sin(off)} 0 {np.cos(off)}"/><limit lower="-1" upper="1"/>'))
+        file.write_text(
+            one_joint(inside=f'<axis xyz="{np.sin(off)} 0 {np.cos(off)}"/><limit lower="-1" upper="1"/>'),
+            encoding="utf-8",
+        )
         if fits:
             assert any(f"off by up to {off:.1g} rad" in note for note in read_urdf(file).notes)
         else:
@@ -248,7 +253,7 @@ REFUSED = {
 @pytest.mark.parametrize("number", range(len(REFUSED)))
 def test_damaged_and_hostile_files_are_refused_in_one_line(file: Path, number: int) -> None:
     text, words = list(REFUSED.items())[number]
-    file.write_text(text)
+    file.write_text(text, encoding="utf-8")
     with pytest.raises(ArmError, match=words) as refusal:
         read_urdf(file)
     assert "\n" not in str(refusal.value)
@@ -273,6 +278,6 @@ def test_chain_of_ten_thousand_links_is_read(file: Path) -> None:
     joint = '<joint name="{0}" type="{2}"><parent link="{0}"/><child link="{1}"/><limit lower="-1" upper="1"/></joint>'
     kinds = ("fixed", "revolute")
     joints = "".join(joint.format(i, i + 1, kinds[i == n // 2]) for i in range(n))
-    file.write_text(f"<robot>{links}{joints}</robot>")
+    file.write_text(f"<robot>{links}{joints}</robot>", encoding="utf-8")
     read = read_urdf(file)
     assert (read.joints, read.tip) == ((str(n // 2),), str(n))

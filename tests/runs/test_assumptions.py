@@ -64,7 +64,7 @@ def test_files_state_assumed_values(run: Path) -> None:
     record = named_actuator("XM540-W270").completed()
     expected = {"XM540-W270": {name: value_of(record, name) for name in SERVO}}
     for file in (run / "summary.json", run / "designs" / "0000" / "design.json"):
-        assert json.loads(file.read_text())["assumed"] == expected
+        assert json.loads(file.read_text(encoding="utf-8"))["assumed"] == expected
 
 
 def test_commands_state_assumed_values(run: Path) -> None:

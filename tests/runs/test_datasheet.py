@@ -235,7 +235,7 @@ def test_sheet_of_a_urdf_is_that_of_the_design_that_it_was_written_from(
 ) -> None:
     arm = history.member(NUMBER).arm
     file = tmp_path / "arm.urdf"
-    file.write_text(to_urdf(arm))
+    file.write_text(to_urdf(arm), encoding="utf-8")
     described = read_urdf(file, tip="tip")
     motors = [joint.actuator.name for joint in arm.joints if joint.actuator is not None]
     named = read_actuators(",".join(f"{n}={name}" for n, name in enumerate(motors, start=1)), described.joints)
@@ -324,7 +324,7 @@ def test_efforts_of_a_urdf_are_used_without_actuators() -> None:
 
 
 def test_first_recommended_design_is_the_default(run: Path, tmp_path: Path) -> None:
-    summary = json.loads((run / "summary.json").read_text())
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     first = [one["design"] for one in summary["recommended"][:1]]
     done = armwright("datasheet", run, "--out", tmp_path, "--json")
     if first:
@@ -341,10 +341,10 @@ def test_command_writes_html_and_json(run: Path, tmp_path: Path) -> None:
     files = [Path(line) for line in done.stdout.splitlines()]
     assert [file.name for file in files] == ["datasheet.html", "datasheet.json"]
     assert {file.parent for file in files} == {run / "designs" / f"{NUMBER:04d}"}
-    record = json.loads(files[1].read_text())
+    record = json.loads(files[1].read_text(encoding="utf-8"))
     assert record["design"] == NUMBER
     assert record["units"]["reach"] == "m"
-    assert files[0].read_text().startswith("<!doctype html>")
+    assert files[0].read_text(encoding="utf-8").startswith("<!doctype html>")
 
 
 @pytest.mark.parametrize(

@@ -56,4 +56,4 @@ def test_every_export_format_is_listed_and_written(run: Path, tmp_path: Path) ->
     for kind in FORMATS:
         assert kind in told
         exported(run, kind, "--out", str(tmp_path / "deep" / kind))
-        assert (tmp_path / "deep" / kind).read_text() == exported(run, kind)
+        assert (tmp_path / "deep" / kind).read_text(encoding="utf-8") == exported(run, kind)

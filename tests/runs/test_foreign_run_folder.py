@@ -154,4 +154,4 @@ def test_a_lock_that_is_a_link_leaves_its_target_as_it_is(run: Path, tmp_path: P
     with pytest.raises(RunFolderError, match="is a link"), RunFolder(run):
         pass
     assert mode(target) == 0o644
-    assert json.loads((run / "status.json").read_text())["doing"] == "finished"
+    assert json.loads((run / "status.json").read_text(encoding="utf-8"))["doing"] == "finished"

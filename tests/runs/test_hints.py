@@ -57,7 +57,7 @@ def test_hint_enters_the_next_prompt_once(chat_server: ChatServer, tmp_path: Pat
     assert hint == Hint(1, "no joint may\nbe a roll joint")
     assert used_hints(calls(out)) == {hint: "llm-0007"}
     assert [call.hints for call in calls(out) if (call.proposal, call.step) == ("llm-0007", step)] == [(hint,)]
-    written = [json.loads(line) for line in (out / "transcripts.jsonl").read_text().splitlines()]
+    written = [json.loads(line) for line in (out / "transcripts.jsonl").read_text(encoding="utf-8").splitlines()]
     assert [call["hints"] for call in written if "hints" in call] == [[asdict(hint)]]
     assert sum(NOTE in prompt for prompt in chat_server.prompts()) == 1
 
@@ -109,8 +109,12 @@ def test_hint_of_an_interrupted_call_is_sent_again(chat_server: ChatServer, tmp_
     run(out, asks(chat_server))
     assert [call.prompt for call in calls(out) if call.hints] == [shown]
     file = out / "transcripts.jsonl"  # as a kill after the thoughts leaves it
-    file.write_text("".join(file.read_text().splitlines(keepends=True)[:3]))  # two checks, and the thoughts
-    (out / "trials.jsonl").write_text("".join((out / "trials.jsonl").read_text().splitlines(keepends=True)[:4]))
+    file.write_text(
+        "".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:3]), encoding="utf-8"
+    )  # two checks, and the thoughts
+    (out / "trials.jsonl").write_text(
+        "".join((out / "trials.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)[:4]), encoding="utf-8"
+    )
     (out / "summary.json").unlink()
     chat_server.requests.clear()
     run(out, asks(chat_server))
@@ -215,7 +219,7 @@ def test_template_may_place_hints_itself() -> None:
 
 def test_run_with_a_template_without_hints_sends_them(chat_server: ChatServer, tmp_path: Path) -> None:
     out, own = tmp_path / "run", tmp_path / "own.md"
-    own.write_text("{{ targets }} End with ORIGIN, JOINTS and LINKS.")
+    own.write_text("{{ targets }} End with ORIGIN, JOINTS and LINKS.", encoding="utf-8")
     run(out, asks(chat_server, prompt=str(own)), watch=after(5, lambda: add_hint(out, "first")))
     ends = [call.prompt.rpartition("LINKS.\n")[2] for call in calls(out) if call.step == "reasoning"]
     assert ends == ["", f"\n{NOTE}first\n", ""]
@@ -251,6 +255,6 @@ def test_manual_proposer_gets_no_hints(tmp_path: Path) -> None:
         with pytest.raises(AnswerPendingError):
             run(out, ManualProposer(folder, wait=False))
         add_hint(out, "first")
-    assert "engineer" not in (folder / "004-prompt.md").read_text()
+    assert "engineer" not in (folder / "004-prompt.md").read_text(encoding="utf-8")
     assert status(out).doing == "stopped"
     assert "004-prompt.md waits for" in status(out).fault

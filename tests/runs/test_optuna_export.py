@@ -333,7 +333,7 @@ def test_failed_export_leaves_no_database(plain: Path, tmp_path: Path, monkeypat
 
 
 def test_invalid_exports_are_refused(plain: Path, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
+    (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(RunFolderError, match="cannot write"):
         export_study(plain, tmp_path / "file" / "study.db")
     (tmp_path / "empty").mkdir()

@@ -143,12 +143,12 @@ def test_runs_report_where_designs_are_worst(tmp_path: Path) -> None:
         task = Task.model_validate({"name": name, "targets": targets, "cycle": cycle})
         folder = tmp_path / name
         aw.optimize(aw.Problem(task, aw.paper_space(joints=4)), n_init=8, n_total=8, out=folder)
-        return json.loads((folder / "summary.json").read_text()), folder
+        return json.loads((folder / "summary.json").read_text(encoding="utf-8")), folder
 
     summary, folder = run("possible", 0.002)
     assert summary["feasibility"]["nearest"] is None
     (first, *_) = sorted(folder.glob("designs/*/design.json"))
-    assert json.loads(first.read_text())["path"]["path_error"]["value"] <= 0.002
+    assert json.loads(first.read_text(encoding="utf-8"))["path"]["path_error"]["value"] <= 0.002
     assert "worst along its cycle: path error " in armwright("pick", str(folder)).stdout.replace("\n  ", " ")
     assert json.loads(armwright("pick", str(folder), "--json").stdout)[0]["path"]["jumps"] == []
     summary, folder = run("impossible", 1e-8)

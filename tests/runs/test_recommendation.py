@@ -61,13 +61,13 @@ def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
         *("joint", "peak_torque", "rms_torque", "claimed_peak_torque"),
         *("claimed_rms_torque", "peak_speed", "saturated_fraction"),
     ]
-    assert json.loads((run / "simulation.json").read_text()) == content
+    assert json.loads((run / "simulation.json").read_text(encoding="utf-8")) == content
     assert "#0, verified; holds all but: " in " ".join(armwright("simulate", run).stdout.split())
     place = run / "designs" / "0000"
     assert (place / "figures" / "simulation.png").is_file()
-    rows = (place / "simulation.csv").read_text().splitlines()
+    rows = (place / "simulation.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].startswith("time,step,tip_x,tip_y,tip_z,q_1")
-    assert len(rows) == len((place / "trajectory.csv").read_text().splitlines())
+    assert len(rows) == len((place / "trajectory.csv").read_text(encoding="utf-8").splitlines())
     shown = armwright("simulate", run, "--design", "0").stdout
     assert "1 of 1 pass" in shown
 

@@ -51,7 +51,7 @@ def test_run_folder_has_the_documented_files(run: StudyResult) -> None:
 
 
 def test_trials_are_one_json_line_each(run: StudyResult) -> None:
-    lines = [json.loads(line) for line in (folder(run) / "trials.jsonl").read_text().splitlines()]
+    lines = [json.loads(line) for line in (folder(run) / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
     for line, trial in zip(lines, run.trials, strict=True):
         reason = ["reason"] if trial.source == "rules" else []
         assert list(line) == ["number", "source", "proposal", "params", "values", *reason, "seconds"]
@@ -62,7 +62,7 @@ def test_trials_are_one_json_line_each(run: StudyResult) -> None:
 
 
 def test_config_reproduces_the_run(run: StudyResult) -> None:
-    config = yaml.safe_load((folder(run) / "config.yaml").read_text())
+    config = yaml.safe_load((folder(run) / "config.yaml").read_text(encoding="utf-8"))
     assert config["task"]["targets"][0] == [-0.45, -0.45, -0.45]
     assert config["method"] == {
         "proposer": {"name": "rules"},
@@ -82,7 +82,7 @@ def test_config_reproduces_the_run(run: StudyResult) -> None:
 
 
 def test_summary_has_the_documented_keys(run: StudyResult) -> None:
-    summary = json.loads((folder(run) / "summary.json").read_text())
+    summary = json.loads((folder(run) / "summary.json").read_text(encoding="utf-8"))
     assert summary == read_summary(folder(run)) == run.summary
     assert list(summary) == [
         "task",
@@ -118,7 +118,7 @@ def test_summary_has_the_documented_keys(run: StudyResult) -> None:
 def test_summary_with_lone_surrogate_is_read(run: StudyResult) -> None:
     """Paths that are not UTF-8 contain one, such as the source of a replay."""
     summary = run.summary | {"replay": "runs/\udc80"}
-    (folder(run) / "summary.json").write_text(json.dumps(summary))
+    (folder(run) / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     assert read_summary(folder(run)) == summary
 
 
@@ -134,7 +134,7 @@ def test_front_designs_are_written_with_their_values(run: StudyResult) -> None:
     assert run.front
     for member in run.front:
         place = folder(run) / "designs" / f"{member.number:04d}"
-        record = json.loads((place / "design.json").read_text())
+        record = json.loads((place / "design.json").read_text(encoding="utf-8"))
         assert record["params"] == dict(member.design.params)
         assert record["source"] == member.source
         assert bool(record["reason"]) == (member.source == "rules")
@@ -144,16 +144,16 @@ def test_front_designs_are_written_with_their_values(run: StudyResult) -> None:
         assert 40 * sum(norms) == pytest.approx(member.values[1])
         assert [target["target"] for target in record["targets"]] == [list(t) for t in PROBLEM.task.targets]
         assert {len(target["q"]) for target in record["targets"]} == {4}
-        assert (place / "arm.urdf").read_text() == to_urdf(member.arm, name=f"target-1-{member.number}")
+        assert (place / "arm.urdf").read_text(encoding="utf-8") == to_urdf(member.arm, name=f"target-1-{member.number}")
 
 
 def test_csv_tables_match_the_run(run: StudyResult) -> None:
-    with open(folder(run) / "trials.csv", newline="") as file:
+    with open(folder(run) / "trials.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 13
     assert list(rows[0])[:5] == ["number", "source", "origin_x", "origin_y", "origin_z"]
     assert [float(row["torque"]) for row in rows] == [trial.values[1] for trial in run.trials]
-    with open(folder(run) / "front.csv", newline="") as file:
+    with open(folder(run) / "front.csv", newline="", encoding="utf-8") as file:
         assert {int(row["number"]) for row in csv.DictReader(file)} == {member.number for member in run.front}
 
 
@@ -215,7 +215,7 @@ def test_damaged_trials_are_reported_by_line_and_kept(
 
 
 def test_damaged_config_is_reported(run: StudyResult, tmp_path: Path) -> None:
-    (folder(run) / "config.yaml").write_text("task: [")
+    (folder(run) / "config.yaml").write_text("task: [", encoding="utf-8")
     with pytest.raises(RunFolderError, match=r"config.yaml is not valid YAML"):
         short(tmp_path / "run")
 
@@ -236,16 +236,16 @@ def test_trials_without_a_config_are_not_overwritten(run: StudyResult, tmp_path:
 @pytest.mark.parametrize("name", ["figures/mine.png", "notes.txt", "config.yaml", "designs/0001/arm.urdf"])
 def test_folder_with_foreign_files_is_not_touched(tmp_path: Path, name: str) -> None:
     (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-    (tmp_path / name).write_text("mine: 1\n")
+    (tmp_path / name).write_text("mine: 1\n", encoding="utf-8")
     with pytest.raises(ArmwrightError, match=r"holds no run|unknown key"):
         short(tmp_path)
-    assert (tmp_path / name).read_text() == "mine: 1\n"
+    assert (tmp_path / name).read_text(encoding="utf-8") == "mine: 1\n"
 
 
 def test_folder_without_a_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="not a run folder"):
         read_run(tmp_path)
-    (tmp_path / "file").write_text("")
+    (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(RunFolderError, match="cannot write"):
         short(tmp_path / "file")
 

@@ -61,7 +61,7 @@ def test_weights_are_relative_to_the_reference_point(history: History) -> None:
 
 
 def test_pick_can_be_restricted_to_robust_designs(run: Path) -> None:
-    robust = json.loads((run / "summary.json").read_text())["verification"]["robust_numbers"]
+    robust = json.loads((run / "summary.json").read_text(encoding="utf-8"))["verification"]["robust_numbers"]
     assert robust
     _, picked = pick_from(run, robust=True)
     assert sorted(member.number for member in picked) == sorted(robust)
@@ -134,7 +134,7 @@ def test_pick_and_export_commands_agree(run: Path, history: History, tmp_path: P
     number = told[0]["number"]
     assert f"#{number} " in invoke("pick", run, "--where", "position_error<=1.5", "--by", "torque")
     urdf = invoke("export", run, "--design", number)
-    assert urdf == (run / "designs" / f"{number:04d}" / "arm.urdf").read_text()
+    assert urdf == (run / "designs" / f"{number:04d}" / "arm.urdf").read_text(encoding="utf-8")
     robot = yourdfpy.URDF.load(io.StringIO(urdf))
     assert len(robot.actuated_joints) == 4
     invoke("export", run, "--format", "mjcf", "--out", tmp_path / "deep" / "arm.xml")

@@ -210,7 +210,7 @@ def test_the_independent_check_gives_the_same_verdicts(desk: Desk, tmp_path: Pat
     for name, one in (("good", desk), ("weak", Desk(SPACE | {"actuators": [WEAK]}))):
         for file, text in one.files.items():
             (tmp_path / name).mkdir(exist_ok=True)
-            (tmp_path / name / file).write_text(text)
+            (tmp_path / name / file).write_text(text, encoding="utf-8")
         result = one.simulate()
         assert (not check(tmp_path / name)) == (result.verdict == PASS)
 

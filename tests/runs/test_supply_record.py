@@ -19,7 +19,7 @@ def test_records_state_the_quantities(tmp_path: Path) -> None:
         desk.problem, proposer="none", n_init=1, n_total=1, initial_designs=[desk.design], verify=False, out=tmp_path
     )
     peak, mean = desk.problem.evaluate([desk.design])[0].values
-    record = json.loads((tmp_path / "designs" / "0000" / "design.json").read_text())
+    record = json.loads((tmp_path / "designs" / "0000" / "design.json").read_text(encoding="utf-8"))
     assert record["supply"] == {"peak_current": peak, "mean_current": mean, "voltage": 12.0}
     assert 0.0 < mean < peak < 5 * 4.4
     text = f"{peak:.3g} A peak, {mean:.3g} A mean, at 12 V"

@@ -106,13 +106,13 @@ def test_verify_run_marks_the_front(tmp_path: Path) -> None:
     settings = {"proposer": "rules", "n_init": 5, "n_step": 5, "n_total": 20, "seed": 0, "out": tmp_path / "run"}
     run = optimize(PROBLEM, verify=False, **settings)
     assert run.summary["verification"] is None
-    assert "verdict" not in (tmp_path / "run" / "front.csv").read_text()
+    assert "verdict" not in (tmp_path / "run" / "front.csv").read_text(encoding="utf-8")
     history, summary = verify_run(tmp_path / "run")
     assert summary == read_summary(tmp_path / "run")
     record = summary["verification"]
     assert record["robust"] + record["sensitive"] == len(history.front)
     assert {**summary, "verification": None} == run.summary
-    table = (tmp_path / "run" / "front.csv").read_text()
+    table = (tmp_path / "run" / "front.csv").read_text(encoding="utf-8")
     assert table.count(",robust,") == record["robust"]
     assert table.count(",sensitive,") == record["sensitive"]
     other = optimize(PROBLEM, **{**settings, "out": tmp_path / "other"})

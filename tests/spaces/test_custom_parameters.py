@@ -53,7 +53,7 @@ def measure(arm: aw.Arm, task: aw.Task, design: aw.Design) -> tuple[float, float
 
 def test_space_file_declares_parameters_after_the_built_in_ones(tmp_path: Path) -> None:
     file = tmp_path / "space.yaml"
-    file.write_text(yaml.safe_dump({"joints": 3, "parameters": CUSTOM}, sort_keys=False))
+    file.write_text(yaml.safe_dump({"joints": 3, "parameters": CUSTOM}, sort_keys=False), encoding="utf-8")
     space = aw.load_space(file)
     plain = aw.paper_space(3)
     assert space.parameters[: len(plain.parameters)] == plain.parameters

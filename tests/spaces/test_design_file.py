@@ -52,17 +52,17 @@ def test_initial_design_from_an_earlier_run(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["optimize", "target-1", *options])
     assert result.exit_code == 0, result.output
     _, history = read_run(tmp_path / "b")
-    assert history.trials[0].design.params == json.loads(file.read_text())["params"]
-    config = (tmp_path / "b" / "config.yaml").read_text()
+    assert history.trials[0].design.params == json.loads(file.read_text(encoding="utf-8"))["params"]
+    config = (tmp_path / "b" / "config.yaml").read_text(encoding="utf-8")
     assert "initial_designs:" in config
 
 
 def test_files_without_a_design_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
-    file.write_text(json.dumps({"params": {**GIVEN[0].params, "link_1": 3.0}}))
+    file.write_text(json.dumps({"params": {**GIVEN[0].params, "link_1": 3.0}}), encoding="utf-8")
     with pytest.raises(DesignError, match=r"mine.yaml: link_1 = 3 m is outside"):
         read_design(file, PROBLEM.space)
-    file.write_text("params: 3")
+    file.write_text("params: 3", encoding="utf-8")
     with pytest.raises(DesignError, match="params"):
         read_design(file, PROBLEM.space)
     result = CliRunner().invoke(app, ["optimize", "target-1", "--initial-design", str(tmp_path / "none.json")])

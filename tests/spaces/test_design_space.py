@@ -113,7 +113,8 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
     file = tmp_path / "space.yaml"
     file.write_text(
         "name: six\njoints: 6\nlink: [0.1, 0.5]\norigin_z: [0, 0]\n"
-        "link_section: {tubes: [[0.03, 0.002]], material: aluminium}\n"
+        "link_section: {tubes: [[0.03, 0.002]], material: aluminium}\n",
+        encoding="utf-8",
     )
     space = load_space(file)
     assert (space.joints, space.link, space.origin_z, space.origin_x) == (6, (0.1, 0.5), (0.0, 0.0), (-1.0, 1.0))
@@ -161,7 +162,7 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
 )
 def test_invalid_space_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "space.yaml"
-    file.write_text(text)
+    file.write_text(text, encoding="utf-8")
     with pytest.raises(SpaceError) as refusal:
         load_space(file)
     assert words in str(refusal.value)
@@ -198,7 +199,7 @@ RESTRICTED = {"joint_1": "Y", "joint_2": ["P", "R"], "origin_z": 0.0, "link_1": 
 
 
 def test_restrict_fixes_or_narrows_parameters(tmp_path: Path) -> None:
-    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": RESTRICTED}))
+    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": RESTRICTED}), encoding="utf-8")
     space = load_space(tmp_path / "space.yaml")
     designs = space.sample(200, 1)
     assert {design.joints[0] for design in designs} == {"Y"}
@@ -241,6 +242,6 @@ def test_restricted_space_is_respected_by_a_run(tmp_path: Path) -> None:
     ],
 )
 def test_restriction_outside_a_parameter_is_refused(tmp_path: Path, restrict: object, words: str) -> None:
-    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": restrict}))
+    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": restrict}), encoding="utf-8")
     with pytest.raises(SpaceError, match=words):
         load_space(tmp_path / "space.yaml")

@@ -263,7 +263,7 @@ def test_invalid_spaces_are_refused(content: dict[str, Any], words: str, tmp_pat
     import yaml
 
     file = tmp_path / "space.yaml"
-    file.write_text(yaml.safe_dump(content))
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
     with pytest.raises(SpaceError, match=words):
         load_space(file)
 

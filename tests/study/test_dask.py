@@ -117,8 +117,8 @@ for out, workers in (("here", None), ("there", aw.Workers(1))):
 @pytest.mark.slow
 def test_script_without_a_main_guard_uses_a_local_worker(in_folder: Path) -> None:
     """The evaluator is pickled by value; the script does not run again on the worker."""
-    (in_folder / "script.py").write_text(SCRIPT)
-    done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True)
+    (in_folder / "script.py").write_text(SCRIPT, encoding="utf-8")
+    done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True, encoding="utf-8")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert trials(in_folder / "there") == trials(in_folder / "here")
     assert numbers(in_folder / "there") == list(range(N_TRIALS))
@@ -247,7 +247,9 @@ def test_design_that_kills_three_workers_ends_the_search(tmp_path: Path, bench: 
 @pytest.mark.slow
 def test_version_mismatch_and_lost_scheduler_are_one_line(tmp_path: Path, bench: Bench) -> None:
     (tmp_path / "other" / "armwright-9.9.dist-info").mkdir(parents=True)
-    (tmp_path / "other" / "armwright-9.9.dist-info" / "METADATA").write_text("Name: armwright\nVersion: 9.9\n")
+    (tmp_path / "other" / "armwright-9.9.dist-info" / "METADATA").write_text(
+        "Name: armwright\nVersion: 9.9\n", encoding="utf-8"
+    )
     out = tmp_path / "run"
     path = os.pathsep.join([str(tmp_path / "other"), os.environ.get("PYTHONPATH", "")])
     cluster = ShellCluster(tmp_path)
@@ -452,7 +454,7 @@ def test_cell_that_kills_workers_reports_its_failure(tmp_path: Path) -> None:
 def test_ctrl_c_ends_an_experiment_and_its_workers(tmp_path: Path) -> None:
     plan, cells = two_cells(tmp_path / "out", n_total=10_000)
     file = tmp_path / "two.yaml"
-    file.write_text(yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True)))
+    file.write_text(yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True)), encoding="utf-8")
     process = begin_command("experiment", file, "--workers", "2", "--out", tmp_path / "out")
     wait_until(lambda: have_begun(cells))
     started = descendants(process.pid)

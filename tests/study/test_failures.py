@@ -18,6 +18,7 @@ from armwright.runs.optuna_export import export_study
 from armwright.search.samplers import SAMPLERS
 from armwright.study import evaluation_process
 from armwright.study.progress import Progress
+from tests.torture.short import armwright
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 SPACE = aw.paper_space(joints=3)
@@ -43,7 +44,7 @@ def never(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
 
 
 def recorded(run: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in (run / "trials.jsonl").read_text().splitlines()]
+    return [json.loads(line) for line in (run / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +79,10 @@ def test_failed_trials_are_in_no_front_and_no_hypervolume(run: Path) -> None:
 
 
 def test_summary_counts_failures_by_kind(run: Path) -> None:
-    summary = json.loads((run / "summary.json").read_text())
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     kinds = [trial["failure"]["kind"] for trial in recorded(run) if "failure" in trial]
     assert summary["failures"] == {kind: kinds.count(kind) for kind in ("exception", "timeout", "non_finite")}
-    table = (run / "trials.csv").read_text()
+    table = (run / "trials.csv").read_text(encoding="utf-8")
     assert "inf" not in table
     assert table.splitlines()[0].endswith(",reach,height,failure")
 
@@ -246,3 +247,75 @@ def test_timeout_ends_code_that_holds_the_lock_and_crashes_are_failures() -> Non
         assert (trial.failure.kind if trial.failure else None) == expected
     reasons = {trial.failure.reason for trial in found.trials if trial.failure}
     assert reasons == {"no result within 1 s", "the process of the evaluator was ended by SIGSEGV"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", [1e60, -1e60, 1e-300, 5e-324, -0.0])
+def test_values_at_the_limits_of_numbers_are_modelled_and_drawn(tmp_path: Path, scale: float) -> None:
+    """Warnings are errors."""
+    measure = aw.evaluator("reach [m]", "height [m]")(lambda arm, task: (scale * arm.base[0], scale * arm.base[2]))
+    run = aw.optimize(aw.Problem(TASK, SPACE, evaluator=measure), **SHORT, out=tmp_path / "run")
+    assert not run.history.failed.any()
+    json.dumps(run.summary, allow_nan=False, default=str)
+    assert aw.write_report(tmp_path / "run").is_file()
+    assert aw.write_figures(tmp_path / "run")
+
+
+RAISING = """
+import armwright as aw, asyncio, os, sys
+
+class Unprintable(Exception):
+    def __str__(self):
+        raise ValueError
+
+def fork(child):
+    if os.fork() == 0:
+        child()
+
+def stop(fault):
+    raise fault
+
+FAULTS = {
+    "CancelledError": lambda: stop(asyncio.CancelledError()),
+    "GeneratorExit": lambda: stop(GeneratorExit()),
+    "SystemExit: 3": lambda: sys.exit(3),
+    "Unprintable: (its __str__ raises ValueError)": lambda: stop(Unprintable()),
+    "forked": lambda: fork(lambda: None),
+    "forked, exits": lambda: fork(sys.exit),
+    "forked, raises": lambda: fork(lambda: stop(ValueError())),
+    "none, ends its fork": lambda: fork(lambda: os._exit(0)),
+}
+
+@aw.evaluator("reach [m]", "number")
+def measure(arm, task):
+    number = int(abs(arm.base[0]) * 1e6) % len(FAULTS)
+    list(FAULTS.values())[number]()
+    return sum(link.length for link in arm.links), number + 1.0
+"""
+
+
+@pytest.mark.slow
+def test_faults_of_an_evaluator_are_failed_trials_wherever_it_runs(in_folder: Path) -> None:
+    (in_folder / "raising.py").write_text(RAISING, encoding="utf-8")
+    faults: dict[str, object] = {}
+    exec(RAISING, faults)  # for the names of the faults
+    names = list(faults["FAULTS"])  # type: ignore[call-overload]
+    runs = {}
+    for place, options in (("here", []), ("process", ["--evaluation-timeout", "60"]), ("workers", ["--workers", "2"])):
+        done = armwright(
+            "optimize", "target-1", "--evaluator", "raising.py:measure", "--proposer", "none", "--sampler", "random",
+            "--n-init", "20", "--n-total", "20", "--no-figures", "--allow-failures", "--json", "--out", place, *options,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+        runs[place] = [
+            [trial["number"], trial["params"]["origin_x"], trial.get("failure", {}).get("reason", "")]
+            for trial in recorded(Path(place))
+        ]
+        assert json.loads(done.stdout)["n_trials"] == len(runs[place]) == 40
+    for number, x, reason in runs["here"]:
+        expected = names[int(abs(x) * 1e6) % len(names)]
+        if expected.startswith("forked"):
+            expected = "returned in a forked process as well; end that process with os._exit"
+        assert reason == ("" if expected.startswith("none") else expected), number
+    assert runs["here"] == runs["process"] == runs["workers"]

@@ -250,8 +250,8 @@ def test_good_initial_designs_are_not_a_stall() -> None:
 def test_gpu_run_is_verified_without_a_gpu(tmp_path: Path) -> None:
     find_front(PROBLEM, evaluations=300, out=tmp_path / "run")
     config = tmp_path / "run" / "config.yaml"
-    config.write_text(config.read_text().replace("device: cpu", "device: cuda"))
-    assert "device: cuda" in config.read_text()
+    config.write_text(config.read_text(encoding="utf-8").replace("device: cpu", "device: cuda"), encoding="utf-8")
+    assert "device: cuda" in config.read_text(encoding="utf-8")
     assert verify_run(tmp_path / "run")[1]["verification"]["robust"] > 0
     assert write_figures(tmp_path / "run")
 

@@ -80,7 +80,7 @@ def test_printed_prompt_is_the_prompt_sent(chat_server: ChatServer, in_folder: P
     before, words = shown("target-1", "--after", "run")
     assert words.startswith("about ")
     assert words.endswith("tokens; for trial 7\n")
-    if (in_folder / "run" / "config.yaml").read_text().count("template:"):
+    if (in_folder / "run" / "config.yaml").read_text(encoding="utf-8").count("template:"):
         (in_folder / "own.md").write_text(OWN, encoding="utf-8")
         assert before.startswith("Only 7 designs so far.")
     run(out, 4, llm_proposer(chat_server.url, **how))
@@ -178,7 +178,7 @@ def test_prompt_after_the_reasoning_requests_the_parameters(
     run(in_folder / "run", 1, llm_proposer(chat_server.url), in_flight=in_flight)
     for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 2)):  # as a kill after the first answer leaves it
         file = in_folder / "run" / name
-        file.write_text("".join(file.read_text().splitlines(keepends=True)[:lines]))
+        file.write_text("".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:lines]), encoding="utf-8")
     told, words = shown("--after", "run")
     assert words.endswith("tokens; for trial 4\n")
     run(in_folder / "run", 1, llm_proposer(chat_server.url), in_flight=in_flight)

@@ -241,7 +241,7 @@ def test_larger_n_total_extends_a_finished_run(tmp_path: Path) -> None:
     longer = short(tmp_path / "run", n_total=12)
     assert longer.resumed == 13
     assert designs(longer) == designs(short(n_total=12))
-    assert json.loads((tmp_path / "run" / "summary.json").read_text())["n_trials"] == 17
+    assert json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))["n_trials"] == 17
 
 
 def test_changed_settings_are_refused_with_differences(tmp_path: Path) -> None:
@@ -274,14 +274,14 @@ def test_folder_without_trials_accepts_any_settings(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         optimize(PROBLEM, proposer=Listed(), n_init=1, n_step=1, n_total=1, out=tmp_path / "run", watch=fail)
-    (tmp_path / "run" / "trials.jsonl").write_text("")
+    (tmp_path / "run" / "trials.jsonl").write_text("", encoding="utf-8")
     assert len(short(tmp_path / "run").trials) == 13
 
 
 def test_changed_versions_are_recorded(tmp_path: Path) -> None:
     short(tmp_path / "run")
     config = tmp_path / "run" / "config.yaml"
-    config.write_text(config.read_text().replace("  optuna: ", "  optuna: 0."))
+    config.write_text(config.read_text(encoding="utf-8").replace("  optuna: ", "  optuna: 0."), encoding="utf-8")
     run = short(tmp_path / "run", n_total=12)
     assert run.config.versions["optuna"] == optuna.__version__
     assert run.config.earlier_versions[0]["optuna"] == f"0.{optuna.__version__}"

@@ -56,7 +56,7 @@ def start(*arguments: object) -> subprocess.Popen[str]:
     """Start a command in a process of its own, its output in pipes."""
     command = [sys.executable, "-m", "armwright", *map(str, arguments)]
     return subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"
     )
 
 

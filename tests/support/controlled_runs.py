@@ -33,7 +33,7 @@ def asks(server: ChatServer, **asking: Any) -> LlmProposer:
 
 def lines(folder: Path) -> list[dict[str, Any]]:
     """The trials of a run without their seconds."""
-    trials = (folder / "trials.jsonl").read_text().splitlines()
+    trials = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()
     return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
 
 

@@ -48,7 +48,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.file = folder / "sim.py"
-        self.file.write_text(EVALUATOR.format(place=str(folder)))
+        self.file.write_text(EVALUATOR.format(place=str(folder)), encoding="utf-8")
 
     def problem(self) -> aw.Problem:
         return aw.Problem(TASK, evaluator=aw.load_evaluator(f"{self.file}:measure"))
@@ -64,7 +64,7 @@ class Bench:
     def evaluated(self) -> list[tuple[int, str]]:
         """The process and the name of each design whose evaluation began."""
         file = self.folder / "evaluated"
-        lines = file.read_text().splitlines() if file.exists() else []
+        lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
         return [(int(line.split()[0]), line.split()[1]) for line in lines]
 
     @property
@@ -92,7 +92,7 @@ class ShellCluster:
         self.workers: list[subprocess.Popen[bytes]] = []
         self.scheduler = self._begin("scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard")
         wait_until(lambda: self._file.is_file() and self._file.stat().st_size > 0)
-        self.address = str(json.loads(self._file.read_text())["address"])
+        self.address = str(json.loads(self._file.read_text(encoding="utf-8"))["address"])
 
     def add_worker(self, **environment: str) -> subprocess.Popen[bytes]:
         flags = ("--no-nanny", "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1")

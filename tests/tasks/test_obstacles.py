@@ -160,7 +160,7 @@ def test_paper_objectives_ignore_obstacles() -> None:
 def test_obstacles_reach_prompt_and_figures(tmp_path: Path) -> None:
     file = tmp_path / "way.yaml"
     said = {"name": "way", "targets": POINTS, "obstacles": RECORDS, "objectives": ["worst_error", "collision"]}
-    file.write_text(yaml.safe_dump(said))
+    file.write_text(yaml.safe_dump(said), encoding="utf-8")
 
     def armwright(*words: object) -> str:
         result = CliRunner().invoke(app, list(map(str, words)))

@@ -86,7 +86,7 @@ def test_target_with_only_a_position_is_a_point() -> None:
             "target 2: expected axis or orientation, got both",
         ),
         ("{position: [0, 0, 1], orientation: [0, 0, 90]}", r"target 2: orientation: expected .* rad.*90° is 1.5708"),
-        ("{position: [0, 0, 1], tolerance: 0}", "target 2: tolerance: expected a number above 0 m, got 0"),
+        ("{position: [0, 0, 1], tolerance: 0}", "target 2: tolerance: expected a number of at least 1e-09 m, got 0"),
         ("{position: [0, 0, 1], angle_tolerance: 0.1}", "target 2: angle_tolerance needs an axis"),
         ("{position: [0, 0, 1], weight: -1}", "target 2: weight"),
         ("{position: [0, 0, 1001]}", "target 2 = .* is more than 1000 m away"),
@@ -201,7 +201,7 @@ def test_run_records_target_requirements(tmp_path: Path) -> None:
     run = optimize(problem, n_init=5, n_total=1, out=tmp_path / "run")
     assert read_config(tmp_path / "run").task == problem.task
     (first, *_) = sorted((tmp_path / "run" / "designs").glob("*/design.json"))
-    records = json.loads(first.read_text())["targets"]
+    records = json.loads(first.read_text(encoding="utf-8"))["targets"]
     assert ["angle_error" in record for record in records] == [True, False, True, False]
     number = int(first.parent.name)
     missed = problem.physics([run.history.trials[number].design]).unreached[0]

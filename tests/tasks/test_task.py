@@ -50,7 +50,7 @@ def test_paper_targets_have_the_stated_symmetries() -> None:
 
 def test_minimal_task_file_is_accepted(tmp_path: Path) -> None:
     file = tmp_path / "shelf.yaml"
-    file.write_text("name: shelf\ntargets: [[0.45, 0.0, 0.1]]\n")
+    file.write_text("name: shelf\ntargets: [[0.45, 0.0, 0.1]]\n", encoding="utf-8")
     task = load_task(file)
     assert task.target_positions.tolist() == [[0.45, 0.0, 0.1]]
     assert task.reference_point is None
@@ -85,7 +85,7 @@ def test_minimal_task_file_is_accepted(tmp_path: Path) -> None:
 )
 def test_invalid_task_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "task.yaml"
-    file.write_text(text)
+    file.write_text(text, encoding="utf-8")
     with pytest.raises(TaskError) as refusal:
         load_task(file)
     assert words in str(refusal.value)

@@ -203,7 +203,8 @@ def test_too_many_boxes_are_refused() -> None:
 def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
     (in_folder / "cover.yaml").write_text(
         "name: cover\nworkspace: {low: [0.2, -0.3, 0.1], high: [0.5, 0.3, 0.4], points: 60}\n"
-        "objectives: [uncovered_fraction, torque]\n"
+        "objectives: [uncovered_fraction, torque]\n",
+        encoding="utf-8",
     )
     told = CliRunner().invoke(app, ["optimize", "cover.yaml", "--n-total", "20", "--out", "run"])
     assert told.exit_code == 0, told.output

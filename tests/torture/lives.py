@@ -108,7 +108,7 @@ class Command:
         return self.process.wait() == -signal.SIGKILL
 
     def said(self) -> str:
-        return self.words.read_text()
+        return self.words.read_text(encoding="utf-8")
 
 
 def _children(pid: int) -> list[psutil.Process]:
@@ -233,7 +233,7 @@ def files(folder: Path) -> set[Path]:
 
 
 def summary(folder: Path) -> Any:
-    return without_cost(json.loads((folder / "summary.json").read_text()))
+    return without_cost(json.loads((folder / "summary.json").read_text(encoding="utf-8")))
 
 
 def without_cost(content: Any) -> Any:

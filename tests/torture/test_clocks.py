@@ -23,12 +23,12 @@ def clock(tmp_path: Path) -> Iterator[dict[str, str]]:
     if not found:
         pytest.skip("libfaketime is not installed (on Debian and Ubuntu: sudo apt install faketime)")
     file, over = tmp_path / "clock", threading.Event()
-    file.write_text(f"{TIMES[0]}\n")
+    file.write_text(f"{TIMES[0]}\n", encoding="utf-8")
 
     def jump() -> None:
         for time in cycle(TIMES):
             new = file.with_name("clock.new")
-            new.write_text(f"{time}\n")
+            new.write_text(f"{time}\n", encoding="utf-8")
             new.replace(file)
             if over.wait(0.02):
                 return
@@ -87,7 +87,10 @@ def test_design_and_experiment_survive_a_jumping_clock(
     assert (done.returncode, done.stderr) == (0, "")
     plan = tmp_path / "small.yaml"
     content = {"name": "small", "tasks": ["target-1"], "seeds": 1, "n_init": 4, "n_total": 6}
-    plan.write_text(yaml.safe_dump({**content, "methods": {"rules": {"label": "R", "proposer": "rules", "n_step": 3}}}))
+    plan.write_text(
+        yaml.safe_dump({**content, "methods": {"rules": {"label": "R", "proposer": "rules", "n_step": 3}}}),
+        encoding="utf-8",
+    )
     here = ("--workers", "0", "--no-figures", "--out", tmp_path / "experiment")
     done = armwright("experiment", plan, *here, environment=clock)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout

@@ -13,9 +13,11 @@ import pytest
 
 from armwright.exceptions import ArmwrightError, RunConflictError
 from armwright.problem.problem import Problem
+from armwright.report.figures import write_figures
 from armwright.report.page import write_report
 from armwright.runs.config import versions
-from armwright.runs.folder import read_config
+from armwright.runs.folder import read_config, read_run
+from armwright.runs.selection import pick_from
 from armwright.study.front_run import find_front
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
@@ -39,7 +41,9 @@ def short(folder: Path, **settings: Any) -> StudyResult:
 def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("intact") / "run"
     short(folder)
-    (folder / "control.json").write_text('{"paused": false, "stop": false, "hints": [{"id": 1, "text": "a hint"}]}')
+    (folder / "control.json").write_text(
+        '{"paused": false, "stop": false, "hints": [{"id": 1, "text": "a hint"}]}', encoding="utf-8"
+    )
     return folder
 
 
@@ -145,12 +149,86 @@ def test_trials_truncated_at_any_byte_are_repeated(tmp_path: Path, intact: Path,
         assert trials(folder) == trials(intact)
 
 
+def with_number(content: bytes, key: str, value: object) -> bytes:
+    """Return the trials with another value at the start of a field of the sixth."""
+    lines = content.splitlines()
+    trial = json.loads(lines[5])
+    trial[key] = {"total": value} if key == "seconds" else [value, *trial.get(key, [0.0, 0.0])[1:]]
+    lines[5] = json.dumps(trial).encode()
+    return b"\n".join(lines) + b"\n"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda lines: [*lines[:6], *lines[5:]], "line 7 is damaged (expected trial number 6, found 5)"),
+        (lambda lines: [*lines[:4], lines[5], lines[4], *lines[6:]], "line 5 is damaged (expected trial number 4,"),
+        (lambda lines: [*lines[:6], b"", *lines[6:]], "line 7 is damaged (blank)"),
+        (lambda lines: [*lines, b""], "line 13 is damaged (blank)"),
+        (lambda lines: [*lines, b" \t\r"], "line 13 is damaged (blank)"),
+    ],
+    ids=["twice", "out of order", "blank", "blank at the end", "spaces at the end"],
+)
+def test_misplaced_line_of_trials_is_named(
+    tmp_path: Path, intact: Path, change: Callable[[list[bytes]], list[bytes]], words: str
+) -> None:
+    lines = (intact / "trials.jsonl").read_bytes().splitlines()
+    shutil.copytree(intact, tmp_path / "run")
+    (tmp_path / "run" / "trials.jsonl").write_bytes(b"".join(line + b"\n" for line in change(lines)))
+    for read in (lambda: short(tmp_path / "run"), lambda: read_run(tmp_path / "run")):
+        with pytest.raises(ArmwrightError) as refusal:
+            read()
+        assert words in str(refusal.value)
+        assert "\n" not in str(refusal.value)
+
+
+def test_trials_with_line_ends_of_windows_resume(tmp_path: Path, intact: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(intact, folder)
+    content = (folder / "trials.jsonl").read_bytes()
+    (folder / "trials.jsonl").write_bytes(content.replace(b"\n", b"\r\n"))
+    short(folder, n_total=10)
+    assert trials(folder)[: len(trials(intact))] == trials(intact)
+
+
+def test_huge_number_of_a_trial_is_named(tmp_path: Path) -> None:
+    task = load_task("target-1").model_copy(update={"constraints": ("length <= 9", "mass <= 9")})
+    folder = tmp_path / "run"
+    optimize(Problem(task), **SETTINGS, proposer="rules", out=folder)
+    content = (folder / "trials.jsonl").read_bytes()
+    for key in ("values", "expected", "violations", "seconds"):
+        at = "seconds.total" if key == "seconds" else f"{key}.0"
+        for value in (-1.7e308, -1e308, 1e101, 1.7976931348623157e308):
+            (folder / "trials.jsonl").write_bytes(with_number(content, key, value))
+            with pytest.raises(ArmwrightError) as refusal:
+                read_run(folder)
+            assert f"line 6 is damaged ({at}: expected a number within ±1e+" in str(refusal.value)
+            assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("values", [(-1e60, 1e60), (1e60, 1e60), (5e-324, -5e-324), (-0.0, 1e-310)])
+def test_numbers_at_the_limits_are_read_drawn_and_extended(
+    tmp_path: Path, intact: Path, values: tuple[float, float]
+) -> None:
+    """Warnings are errors."""
+    folder = tmp_path / "run"
+    shutil.copytree(intact, folder)
+    lines = [json.dumps({**trial, "values": values}) + "\n" for trial in trials(folder)]
+    (folder / "trials.jsonl").write_text("".join(lines), encoding="utf-8")
+    for file in (write_report(folder), *write_figures(folder)):
+        assert file.is_file()
+    pick_from(folder)
+    run = short(folder, n_total=12)
+    json.dumps(run.summary, allow_nan=False, default=str)
+
+
 def test_config_truncated_at_any_line_is_refused_or_harmless(tmp_path: Path, intact: Path) -> None:
-    lines = (intact / "config.yaml").read_text().splitlines(keepends=True)
+    lines = (intact / "config.yaml").read_text(encoding="utf-8").splitlines(keepends=True)
     for n in range(len(lines)):
         folder = tmp_path / f"run{n}"
         shutil.copytree(intact, folder)
-        (folder / "config.yaml").write_text("".join(lines[:n]))
+        (folder / "config.yaml").write_text("".join(lines[:n]), encoding="utf-8")
         if resume(folder, "config.yaml", short) == "resumed":
             assert n > len(lines) - 12, lines[n]  # versions that are not told
             assert trials(folder) == trials(intact)
@@ -237,8 +315,8 @@ def test_run_of_a_newer_version_is_refused(tmp_path: Path, intact: Path) -> None
     folder = tmp_path / "run"
     shutil.copytree(intact, folder)
     ours = read_config(intact).versions["armwright"]
-    text = (folder / "config.yaml").read_text().replace(f"armwright: {ours}", "armwright: 99.1.0")
-    (folder / "config.yaml").write_text(f"wheels: 4\n{text}")
+    text = (folder / "config.yaml").read_text(encoding="utf-8").replace(f"armwright: {ours}", "armwright: 99.1.0")
+    (folder / "config.yaml").write_text(f"wheels: 4\n{text}", encoding="utf-8")
     with pytest.raises(ArmwrightError, match=rf'"wheels".*\(written by armwright 99\.1\.0; this is {ours}\)'):
         short(folder)
 
@@ -246,7 +324,9 @@ def test_run_of_a_newer_version_is_refused(tmp_path: Path, intact: Path) -> None
 def test_trial_of_a_newer_version_is_refused(tmp_path: Path, intact: Path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(intact, folder)
-    first, *others = (folder / "trials.jsonl").read_text().splitlines(keepends=True)
-    (folder / "trials.jsonl").write_text(json.dumps({**json.loads(first), "wheels": 4}) + "\n" + "".join(others))
+    first, *others = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
+    (folder / "trials.jsonl").write_text(
+        json.dumps({**json.loads(first), "wheels": 4}) + "\n" + "".join(others), encoding="utf-8"
+    )
     with pytest.raises(ArmwrightError, match="line 1 is damaged"):
         short(folder)

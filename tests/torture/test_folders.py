@@ -53,7 +53,10 @@ def test_second_process_is_refused_without_effect_on_the_first(tmp_path: Path, w
 
 def test_one_of_two_simultaneous_processes_gets_the_folder(tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "run"
-    both = [subprocess.Popen(command(folder, "--no-figures"), stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    both = [
+        subprocess.Popen(command(folder, "--no-figures"), stderr=subprocess.PIPE, text=True, encoding="utf-8")
+        for _ in range(2)
+    ]
     for process in both:
         _, said = process.communicate()
         assert process.returncode == 0 or "is in use by another armwright process" in said
@@ -173,7 +176,11 @@ def test_read_only_folder_is_read_and_not_written(tmp_path: Path, whole: Path) -
 def test_folder_resumes_after_being_read_only(tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "run"
     process = subprocess.Popen(
-        as_a_plain_user(command(folder, "--no-figures")), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        as_a_plain_user(command(folder, "--no-figures")),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
     )
     while n_lines(folder / "trials.jsonl") < 3:
         time.sleep(0.002)
@@ -249,7 +256,7 @@ def test_folder_replacement_is_atomic(tmp_path: Path, monkeypatch: pytest.Monkey
     for folder, content in ((place, "old"), (part, "new")):
         folder.mkdir()
         for n in range(3):
-            (folder / f"{n}.png").write_text(content)
+            (folder / f"{n}.png").write_text(content, encoding="utf-8")
 
     def dies(folder: Path) -> None:
         next(folder.iterdir()).unlink()
@@ -259,7 +266,7 @@ def test_folder_replacement_is_atomic(tmp_path: Path, monkeypatch: pytest.Monkey
         patch.setattr(shutil, "rmtree", dies)
         with pytest.raises(KeyboardInterrupt):
             replace_folder(place, part if with_part else None)
-    assert [file.read_text() for file in place.glob("*")] == (["new"] * 3 if with_part else [])
+    assert [file.read_text(encoding="utf-8") for file in place.glob("*")] == (["new"] * 3 if with_part else [])
     replace_folder(place)
     assert not place.exists()
     assert not place.with_name("figures.old").exists()

@@ -65,7 +65,9 @@ def disk(tmp_path: Path) -> Iterator[Path]:
     """A disk of 64 kB."""
     place = tmp_path / "disk"
     place.mkdir()
-    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place], capture_output=True, text=True)
+    made = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place], capture_output=True, text=True, encoding="utf-8"
+    )
     if made.returncode:
         pytest.skip(f"no disk may be mounted here: {made.stderr.strip()}")
     yield place
@@ -130,7 +132,7 @@ def test_no_space_for_the_kernels(tmp_path: Path, whole: Path) -> None:
 
 def test_output_streams_on_a_full_disk(tmp_path: Path, whole: Path) -> None:
     """stdout and stderr on a full disk."""
-    with open("/dev/full", "w") as full:
+    with open("/dev/full", "w", encoding="utf-8") as full:
         code = subprocess.run(command(tmp_path / "run", "--no-figures"), stdout=full, stderr=full).returncode
     assert code == 1
     is_beginning(tmp_path / "run", whole)

@@ -140,7 +140,9 @@ def test_killed_study_with_a_model(
     def same(folder: Path, whole: Path) -> None:
         paid_once(folder)
         assert trials(folder) == trials(whole)
-        n_calls = [len((place / "transcripts.jsonl").read_text().splitlines()) for place in (folder, whole)]
+        n_calls = [
+            len((place / "transcripts.jsonl").read_text(encoding="utf-8").splitlines()) for place in (folder, whole)
+        ]
         # The model is tried once a session; an answer on its way when the kill came is asked for again.
         assert n_calls[0] >= n_calls[1]
         one, other = (
@@ -239,14 +241,14 @@ EXPERIMENT: dict[str, Any] = {
 
 
 def table(folder: Path) -> list[dict[str, str]]:
-    rows = csv.DictReader((folder / "table.csv").read_text().splitlines())
+    rows = csv.DictReader((folder / "table.csv").read_text(encoding="utf-8").splitlines())
     return [{name: value for name, value in row.items() if "seconds" not in name} for row in rows]
 
 
 def test_killed_experiment(torture: Callable[[str, Scenario], Counter[str]], tmp_path: Path) -> None:
     """Killed: its process, one of its workers, or all of them at once."""
     file = tmp_path / "small.yaml"
-    file.write_text(yaml.safe_dump(EXPERIMENT))
+    file.write_text(yaml.safe_dump(EXPERIMENT), encoding="utf-8")
     cells = [Path("runs") / method / "target-1" / f"seed{seed}" for method in ("bbo", "rules") for seed in (0, 1)]
 
     def progress(folder: Path) -> float:

@@ -1,8 +1,10 @@
 """Closed pipes, missing terminals and closed standard streams."""
 
+import json
 import os
 import pty
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,7 @@ def test_closed_output_pipe_ends_the_command(tmp_path: Path, whole: Path) -> Non
     """As with `| head -1`."""
     folder = tmp_path / "run"
     process = subprocess.Popen(
-        command(folder, "--no-figures"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command(folder, "--no-figures"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"
     )
     with process:
         assert process.stdout is not None
@@ -40,7 +42,7 @@ def test_closed_standard_streams(tmp_path: Path, whole: Path, closed: str) -> No
 
 
 def test_error_without_a_stderr(tmp_path: Path) -> None:
-    (tmp_path / "run").write_text("")
+    (tmp_path / "run").write_text("", encoding="utf-8")
     done = run(["sh", "-c", 'exec "$@" 2>&-', "sh", *command(tmp_path / "run")])
     assert (done.returncode, done.stderr) == (1, "")
 
@@ -72,5 +74,104 @@ def test_terminal_that_disappears(tmp_path: Path, whole: Path) -> None:
 
 
 def test_error_is_one_line_on_any_stream(tmp_path: Path) -> None:
-    (tmp_path / "run").write_text("")
+    (tmp_path / "run").write_text("", encoding="utf-8")
     assert "cannot write" in one_line(armwright("optimize", "target-1", "--out", tmp_path / "run"))
+
+
+CHATTY = """
+import atexit, ctypes, os, subprocess, sys
+import armwright as aw
+
+C = ctypes.CDLL(None)
+
+def chat():
+    print("print")
+    sys.stdout.write("buffered until the end")
+    os.write(1, b"write\\n")
+    C.printf(b"printf, flushed at exit\\n")
+    subprocess.run(["echo", "child"], check=True)
+
+print("import")
+atexit.register(chat)
+
+@aw.evaluator("size [m]")
+def chats(arm, task):
+    chat()
+    return arm.length
+
+@aw.evaluator("size [m]")
+def closes(arm, task):
+    sys.stdout.close()
+    sys.stderr.close()
+    os.closerange(0, 3)
+    return arm.length
+
+@aw.evaluator("size [m]")
+def redirects(arm, task):
+    sys.stdout = sys.stderr = None
+    file = os.open("log", os.O_WRONLY | os.O_CREAT)
+    os.dup2(file, 1)
+    os.dup2(file, 2)
+    return arm.length
+"""
+
+
+@pytest.mark.parametrize("function", ["chats", "closes", "redirects"])
+def test_output_is_ours_alone_whatever_an_evaluator_does(in_folder: Path, function: str) -> None:
+    Path("chatty.py").write_text(CHATTY, encoding="utf-8")
+    study = (
+        "optimize", "target-1", "--evaluator", f"chatty.py:{function}", "--proposer", "none", "--no-figures",
+        "--n-init", "2", "--n-total", "8", "--out", "run",
+    )  # fmt: skip
+    done = armwright(*study, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["n_trials"] == 10
+    assert all(word in done.stderr for word in ("proposer: none", "import"))
+    if function == "chats":
+        assert all(word in done.stderr for word in ("print", "write", "printf", "child", "until the end"))
+    shown = armwright(*study)
+    assert shown.returncode == 0, shown.stderr
+    assert "run/ is finished" in shown.stdout
+    assert not any(word in shown.stdout for word in ("import", "printf", "child"))
+
+
+@pytest.mark.parametrize("form", ["--json", "--csv"])
+def test_other_code_in_any_command_prints_to_stderr(tmp_path: Path, form: str) -> None:
+    noisy = (
+        "import ctypes, os, sys\n"
+        "import armwright.experiments.run_list as it\n"
+        "from armwright.cli.app import main\n"
+        "def listed(*arguments, found=it.list_runs):\n"
+        "    print('print'); os.system('echo child'); ctypes.CDLL(None).puts(b'puts')\n"
+        "    return found(*arguments)\n"
+        "it.list_runs = listed\n"
+        "sys.argv = ['armwright', 'runs', *sys.argv[1:]]\n"
+        "main()\n"
+    )
+    done = run([sys.executable, "-c", noisy, str(tmp_path), form])
+    assert (done.returncode, done.stdout) == (0, "[]\n" if form == "--json" else "")
+    assert sorted(done.stderr.split()) == ["child", "print", "puts"]
+
+
+def test_help_is_printed_to_stdout() -> None:
+    for arguments in (["--help"], ["runs", "--help"], ["--version"]):
+        done = armwright(*arguments)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout
+
+
+@pytest.mark.parametrize("arguments", [["tasks", "--json"], ["actuators", "--csv"], ["prompt", "--variables"]])
+def test_closed_pipe_is_one_line(in_folder: Path, arguments: list[str]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "wb") as pipe:
+        process = subprocess.run(
+            [sys.executable, "-m", "armwright", *arguments],
+            stdout=pipe,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            encoding="utf-8",
+        )
+    assert process.returncode == 1
+    assert process.stderr == "armwright: output pipe closed; rerun the same command to resume an unfinished run\n"

@@ -1,13 +1,13 @@
 """A line on stderr that says what a command is doing, in a terminal only."""
 
-import sys
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Column
+
+from armwright.cli.streams import open_console
 
 DELAY = 0.7  # [s] before the line appears: short work is not announced
 
@@ -22,11 +22,12 @@ def activity(description: str, delay: float = DELAY) -> Generator[None]:
         description: The work, such as "drawing figures".
         delay: Time before the line appears [s].
     """
-    if not sys.stderr.isatty():
+    console = open_console(is_json=True)
+    if not console.file.isatty():
         yield
         return
     text = TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True))
-    line = Progress(SpinnerColumn(), text, TimeElapsedColumn(), console=Console(stderr=True), transient=True)
+    line = Progress(SpinnerColumn(), text, TimeElapsedColumn(), console=console, transient=True)
     line.add_task(description, total=None)
     timer = threading.Timer(delay, line.start)
     timer.daemon = True

@@ -3,9 +3,10 @@
 Modules that a command needs are imported when it runs, so that `armwright --help` stays fast.
 """
 
-import os
 import sys
+from collections.abc import Callable
 from contextlib import suppress
+from functools import wraps
 from io import TextIOWrapper
 from typing import Annotated, NoReturn
 
@@ -20,8 +21,10 @@ from armwright.cli import (
     search_commands,
     simulate_command,
 )
-from armwright.cli.signals import INTERRUPTED, install_handlers, open_closed_streams
+from armwright.cli.signals import INTERRUPTED, install_handlers
+from armwright.cli.streams import abandon_streams, claim_streams, print_error
 from armwright.exceptions import ArmwrightError
+from armwright.user_code import open_closed_streams
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -57,9 +60,22 @@ COMMANDS = {
     ),
     "Show": (output_commands.report, output_commands.live, output_commands.prompt, output_commands.doctor),
 }
+
+
+def _claiming_streams(function: Callable[..., None]) -> Callable[..., None]:
+    """Return a command that claims the streams first, but after Typer printed help, which uses sys.stdout."""
+
+    @wraps(function)
+    def command(*arguments: object, **options: object) -> None:
+        claim_streams()
+        function(*arguments, **options)
+
+    return command
+
+
 for _panel, _functions in COMMANDS.items():
     for _function in _functions:
-        app.command(rich_help_panel=_panel)(_function)
+        app.command(rich_help_panel=_panel)(_claiming_streams(_function))
 
 
 def main() -> NoReturn:
@@ -73,14 +89,13 @@ def main() -> NoReturn:
         app()
     except ArmwrightError as error:
         for note in getattr(error, "__notes__", ()):  # the traceback of an evaluator's code
-            print(note, file=sys.stderr)
-        print(f"armwright: {error}", file=sys.stderr)
+            print_error(note)
+        print_error(f"armwright: {error}")
         sys.exit(error.exit_code)
     except OSError as error:
         with suppress(OSError):  # stderr may be gone as well
-            print(f"armwright: {_describe(error)}", file=sys.stderr, flush=True)
-        for number in (1, 2):  # their buffers cannot be written either
-            os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+            print_error(f"armwright: {_describe(error)}")
+        abandon_streams()
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)

@@ -8,7 +8,7 @@ import typer
 from armwright.cli.activity import activity
 from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base, parse_price
 from armwright.cli.options import TASK, Json, SpaceFile
-from armwright.cli.streams import print_json
+from armwright.cli.streams import print_json, print_text
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def datasheet(
         print_json(sheet_record(sheet))
         return
     for file in files:
-        print(file)
+        print_text(str(file))
 
 
 def _sheet_of_urdf(

@@ -18,7 +18,7 @@ from armwright.cli.options import (
     SpaceFile,
     select_workers,
 )
-from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_csv, print_json
+from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError
 
 
@@ -65,7 +65,7 @@ def experiment(
     from armwright.report.tables import write_tables
 
     if print_:
-        print(plan.builtin_text(name), end="")
+        print_text(plan.builtin_text(name), end="")
         return
     console = open_console(json_ or print_commands)
     whole, folder = plan.load_experiment(name)
@@ -82,7 +82,7 @@ def experiment(
     placed = running.default_workers(len(due)) if is_default else select_workers(workers, scheduler)
     show_plan(console, due, len(before), skipped, placed)
     if print_commands:
-        print("\n".join(cell.command for cell in due))
+        print_text("\n".join(cell.command for cell in due))
         return
     failed: list[running.CellOutcome] = []
     try:

@@ -21,7 +21,7 @@ from armwright.cli.options import (
     load_problem,
 )
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json
+from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -57,8 +57,8 @@ def init(
     with naming_write_errors(file, error=FailureError), file.open("x", encoding="utf-8") as new:
         new.write(text)
     for note in found.notes if found is not None else ():
-        print(f"note: {points}: {note}")
-    print(
+        print_text(f"note: {points}: {note}")
+    print_text(
         f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
     )
 
@@ -79,7 +79,7 @@ def edit(
     from armwright.editor.edited_files import EditedFiles
     from armwright.editor.server import serve_editor
 
-    serve_editor(EditedFiles(task, space), lambda address: print(address, flush=True), port, open_)
+    serve_editor(EditedFiles(task, space), print_text, port, open_)
 
 
 def check(
@@ -206,7 +206,7 @@ def draft(
 
     request = " ".join(description)
     if print_prompt:
-        print(draft_prompt(request))
+        print_text(draft_prompt(request))
         print_json(draft_schema())
         return
     console = open_console(json_)

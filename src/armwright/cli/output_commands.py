@@ -17,7 +17,7 @@ from armwright.cli.options import (
     SpaceFile,
     load_problem,
 )
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json
+from armwright.cli.streams import check_formats, open_console, print_csv, print_error, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -96,12 +96,13 @@ def export(
             raise SettingsError(f"--design {design} does not go with --format optuna, which exports the whole run")
         with activity(f"exporting {run}"):
             study = export_study(run, out)
-        print(f"{study.database}; to view it in a browser (pip install optuna-dashboard):\n  {study.dashboard_command}")
+        print_text(f"{study.database}; to view it in a browser (pip install optuna-dashboard):")
+        print_text(f"  {study.dashboard_command}")
         return
     with activity(f"exporting a design of {run}"):
         text = export_design(run, design, format_)
     if out is None:
-        print(text, end="")
+        print_text(text, end="")
         return
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(text, encoding="utf-8")
@@ -116,7 +117,7 @@ def report(
     for run in runs:
         with activity(f"writing the page of {run}"):
             written = write_report(run)
-        print(written)
+        print_text(str(written))
 
 
 def live(
@@ -133,7 +134,7 @@ def live(
 
     if not follow:
         read_config(run)  # report a folder without a run at once
-    serve(run, lambda address: print(address, flush=True), host, port, sys.stdin.buffer if follow else None)
+    serve(run, print_text, host, port, sys.stdin.buffer if follow else None)
 
 
 def prompt(
@@ -179,10 +180,10 @@ def prompt(
     from armwright.tasks.catalogue import load_task
 
     if variables:
-        print("\n".join(f"{name}: {description}" for name, description in VARIABLES.items()))
+        print_text("\n".join(f"{name}: {description}" for name, description in VARIABLES.items()))
         return
     if template:
-        print(whole_template(prompt or "plus"), end="")
+        print_text(whole_template(prompt or "plus"), end="")
         return
     options = load_model_options(model_options, prompt=prompt, memory=memory)
     if after is None:
@@ -206,9 +207,9 @@ def prompt(
     if schema:
         print_json(shown.schema)
         return
-    print(shown.prompt, end="")
+    print_text(shown.prompt, end="")
     note = f"; {shown.note}" if shown.note else ""
-    print(f"about {shown.tokens:,} tokens; for trial {shown.number}{note}", file=sys.stderr)
+    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}{note}")
 
 
 def doctor(

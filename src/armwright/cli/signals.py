@@ -42,15 +42,6 @@ def install_handlers() -> None:
     sys.unraisablehook = _repeat_dropped_interrupt
 
 
-def open_closed_streams() -> None:
-    """Open stdin, stdout and stderr if they are closed, so that no file of a run gets their number."""
-    for number in range(3):
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
-
-
 def _interrupt(*_: object) -> None:
     """Raise KeyboardInterrupt; a second signal ends the process at once, as kill -9 may at any moment."""
     for number in _SIGNALS:
@@ -78,9 +69,9 @@ def _watch_signals() -> int:
 
 def _end_late(reader: int) -> None:
     while True:
-        if os.read(reader, 1)[0] not in _SIGNALS:
+        number, installed = os.read(reader, 1)[0], _installed
+        if number not in _SIGNALS or not _is_ending(installed):  # a server that handles signals gets this one
             continue
-        installed = _installed
         for stream in (1, 2):
             if os.isatty(stream):
                 _write(stream, _SHOW_CURSOR)

@@ -1,13 +1,14 @@
-"""Consoles and formats that all commands share."""
+"""Output streams, consoles and formats that all commands share."""
 
 import json
+import os
 import re
 import shlex
 import sys
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TextIO
 
 from rich.console import Console
 from rich.text import Text
@@ -19,6 +20,45 @@ from armwright.files import to_csv
 
 WIDE = 1000  # [characters]
 _UNBROKEN = re.compile(r"`[^`]*`|\d (?=(?:%|[A-Za-zµ]{1,3})(?:\W|$))")  # commands, and numbers with their units
+
+_own: dict[int, TextIO] = {}  # our copies of stdout (1) and stderr (2)
+
+
+def claim_streams() -> None:
+    """Keep stdout for our own output: what other code in this process prints, C libraries included, goes to stderr.
+
+    Nor does it end our output if that code closes its streams. The streams of a test runner stay as they are.
+    """
+    if _own or sys.stdout is not sys.__stdout__:
+        return
+    for number, stream in ((1, sys.stdout), (2, sys.stderr)):
+        encoding, errors = ("utf-8", None) if stream is None else (stream.encoding, stream.errors)
+        _own[number] = open(os.dup(number), "w", encoding=encoding, errors=errors)  # noqa: SIM115 (used until the end)
+    os.dup2(2, 1)
+
+
+def abandon_streams() -> None:
+    """Drop what is still to be written to stdout and stderr, which cannot be written."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for number in (1, 2, *(stream.fileno() for stream in _own.values())):
+        os.dup2(nowhere, number)
+
+
+def print_text(text: str, end: str = "\n") -> None:
+    """Print text to stdout as it is, at once."""
+    _print(text, end, _own.get(1))
+
+
+def print_error(text: str) -> None:
+    """Print text to stderr as it is, at once."""
+    _print(text, "\n", _own.get(2, sys.stderr))
+
+
+def _print(text: str, end: str, stream: TextIO | None) -> None:
+    try:
+        print(text, end=end, file=stream, flush=True)
+    except BrokenPipeError:
+        raise BrokenPipeError from None  # without its number, for which Typer would end the process silently
 
 
 class _Console(Console):
@@ -39,7 +79,8 @@ class _Console(Console):
 
 def open_console(is_json: bool = False) -> Console:
     """Return a console on stdout, or on stderr if another program reads stdout; plain text unless it is a terminal."""
-    console = _Console(stderr=is_json, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    file = _own.get(2 if is_json else 1)
+    console = _Console(file=file, stderr=is_json, highlight=False, markup=False, emoji=False, soft_wrap=True)
     if not console.is_terminal:
         console.width = WIDE  # tables in files and pipes are whole
     return console
@@ -47,14 +88,14 @@ def open_console(is_json: bool = False) -> Console:
 
 def print_json(content: Any) -> None:
     """Print content as indented JSON to stdout; paths become strings."""
-    print(json.dumps(content, indent=2, default=str))
+    print_text(json.dumps(content, indent=2, default=str))
 
 
 def print_csv(rows: Iterable[Mapping[str, Any]]) -> None:
     """Print records as CSV with a header to stdout; a record that lacks a key gets an empty field."""
     records = list(rows)
     keys = dict.fromkeys(key for record in records for key in record)
-    print(to_csv({key: record.get(key) for key in keys} for record in records), end="")
+    print_text(to_csv({key: record.get(key) for key in keys} for record in records), end="")
 
 
 def check_formats(is_json: bool, is_csv: bool) -> bool:

@@ -33,7 +33,8 @@ class DesignRun:
         # Ctrl-C in the terminal reaches the editor, which then ends the search in order.
         self._process = start_module(
             "armwright", "design", *options, "--", task, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True, errors="replace", env={"PYTHONUNBUFFERED": "1"},
+            stderr=subprocess.STDOUT, encoding="utf-8", errors="replace",
+            env={"PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8"},
         )  # fmt: skip
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, cast
 
+from armwright.arrays import LARGEST_OBJECTIVE
 from armwright.exceptions import DesignError
 from armwright.llm.answer_format import JOINT_NAMES, designs_in_lines, expand_lists, plain_number
 from armwright.llm.model_options import PromptOptions
@@ -181,7 +182,7 @@ def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
     if n_joints is not None and "n_joints" not in params:  # given by the length of a list
         params["n_joints"] = str(sum(name.startswith("joint_") for name in params))
     design = problem.space.design(params)
-    known = [value for value in expected if isinstance(value, float) and math.isfinite(value)]
+    known = [value for value in expected if isinstance(value, float) and abs(value) <= LARGEST_OBJECTIVE]
     return Answer(design, reason, tuple(known) if len(known) == len(expected) else None)
 
 

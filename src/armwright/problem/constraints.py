@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
-from armwright.arrays import Array
+from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import TaskError, did_you_mean
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
@@ -117,9 +117,10 @@ def _read(text: str) -> Constraint:
             f"Quantities: {', '.join(QUANTITIES)}"
         )
     bound = float(number) if _NUMBER.fullmatch(number) else math.nan
-    if not math.isfinite(bound):
+    if not abs(bound) <= LARGEST_OBJECTIVE:
         unit = QUANTITIES[name].unit
         raise TaskError(
-            f'constraint "{text}": expected a finite number [{unit}], got "{number}"; try {name} {relation} 3'
+            f'constraint "{text}": expected a finite number [{unit}], at most ±{LARGEST_OBJECTIVE:g}, got "{number}"; '
+            f"try {name} {relation} 3"
         )
     return Constraint(QUANTITIES[name], cast("Relation", relation), bound)

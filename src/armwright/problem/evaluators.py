@@ -17,9 +17,8 @@ import math
 import re
 import sys
 import sysconfig
-import traceback
 from collections.abc import Callable, Sequence
-from contextlib import chdir
+from contextvars import Context, copy_context
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
@@ -29,7 +28,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arrays import Array
+from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.failure import Failure
@@ -39,6 +38,7 @@ from armwright.robot.arm import Arm
 from armwright.spaces.parameters import Design
 from armwright.tasks.task import Task
 from armwright.text import one_line
+from armwright.user_code import MAX_REASON_LENGTH, ForkError, contained, describe_exception, place_of, traceback_of
 
 Measure = Callable[[Arm, Task], Sequence[float] | float] | Callable[[Arm, Task, Design], Sequence[float] | float]
 Measurement = tuple[float, ...] | Failure  # the objectives of one arm, or why there are none
@@ -47,7 +47,6 @@ DESIGN = "design"  # name of the argument of a function that takes the design, t
 
 NAMED = re.compile(r"([a-z][a-z0-9_]*)(?: \[([^\[\]]{1,40})\])?")  # such as "energy [J]"
 MAX_NAME_LENGTH = 40
-MAX_REASON_LENGTH = 300
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,7 @@ class Evaluator:
         version: Part of the sha256 of its file; empty without a file.
         place: The argument of `load_evaluator`.
         source: Content of the file. A pickle holds it, so that other processes need no copy.
+        context: The state that its file set when it was imported, such as `numpy.seterr`; applies to its calls only.
     """
 
     name: str
@@ -69,6 +69,7 @@ class Evaluator:
     version: str = field(default="", compare=False)
     place: str = field(default="", compare=False)
     source: bytes = field(default=b"", compare=False, repr=False)
+    context: Context | None = field(default=None, compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle a file by its source, a module's evaluator by name, and any other by value."""
@@ -100,24 +101,32 @@ class Evaluator:
     def attempt(self, arm: Arm, task: Task, design: Design | None = None) -> Measurement:
         """Return the objectives of an arm, or why there are none; the arguments are those of a call."""
         given: dict[str, Any] = {DESIGN: design} if self.takes_design else {}
+        context = copy_context() if self.context is None else self.context.copy()
         try:
-            with chdir("."):  # solvers change the working folder, to which the run's folder may be relative
-                made = cast("Callable[..., object]", self.measure)(arm, task, **given)
-        except (Exception, SystemExit) as fault:  # noqa: BLE001 (the failure is recorded)
+            with contained():
+                return self._measurement(context.run(cast("Callable[..., object]", self.measure), arm, task, **given))
+        except KeyboardInterrupt:
+            raise
+        except ForkError as fault:
+            return self._wrong_result(str(fault))
+        except BaseException as fault:  # noqa: BLE001 (the failure is recorded; user code may raise anything)
             kind = type(fault).__name__
-            reason = one_line(f"{kind}: {fault}".removesuffix(": "), MAX_REASON_LENGTH)
-            return Failure("exception", reason, kind, _place(fault), _traceback(fault))
+            return Failure("exception", describe_exception(fault), kind, place_of(fault), traceback_of(fault))
+
+    def _measurement(self, made: object) -> Measurement:
+        """Check what the function returned."""
         names = [objective.name for objective in self.objectives]
         values = _numbers(made)
         if len(values) != len(names):
-            reason = one_line(
-                f"expected {len(names)} numbers ({', '.join(names)}), got {made!r:.80}", MAX_REASON_LENGTH
-            )
-            return Failure("exception", reason, "wrong result", _defined_at(self.measure))
+            return self._wrong_result(f"expected {len(names)} numbers ({', '.join(names)}), got {made!r:.80}")
         for name, value in zip(names, values, strict=True):
-            if not math.isfinite(value):
-                return Failure("non_finite", f"expected finite numbers, got {name} = {value}")
+            if not abs(value) <= LARGEST_OBJECTIVE:
+                limit = "finite numbers" if not math.isfinite(value) else f"numbers within ±{LARGEST_OBJECTIVE:g}"
+                return Failure("non_finite", f"expected {limit}, got {name} = {value}")
         return values
+
+    def _wrong_result(self, reason: str) -> Failure:
+        return Failure("exception", one_line(reason, MAX_REASON_LENGTH), "wrong result", _defined_at(self.measure))
 
 
 def evaluator_error(message: str, failure: Failure) -> EvaluatorError:
@@ -169,19 +178,20 @@ def load_evaluator(place: str) -> Evaluator:
         if not Path(where).is_file():
             raise SettingsError(f"cannot read {where}: there is no such file")
         return _from_source(place, Path(where).read_bytes())
-    module = _module(where)
+    module, context = _loaded(_module, where)
     found = _found(module, where, function)
     file = getattr(module, "__file__", None)
     version = "" if file is None else _version(Path(file).read_bytes())
-    return replace(found, name=f"{where}:{function}", version=version, place=place)
+    return replace(found, name=f"{where}:{function}", version=version, place=place, context=context)
 
 
 def _from_source(place: str, source: bytes) -> Evaluator:
     """Load the evaluator of `file.py:function`, whether or not the file is here."""
     where, _, function = place.rpartition(":")
-    found = _found(_file_module(Path(where), source), where, function)
+    module, context = _loaded(_file_module, Path(where), source)
+    found = _found(module, where, function)
     name = f"{Path(where).name}:{function}"
-    return replace(found, name=name, version=_version(source), place=place, source=source)
+    return replace(found, name=name, version=_version(source), place=place, source=source, context=context)
 
 
 def _version(source: bytes) -> str:
@@ -236,11 +246,20 @@ def _objective(given: str, description: str, name: str) -> Objective:
     return Objective(own, unit, description, each, over="arm")
 
 
+def _loaded(load: Callable[..., ModuleType], *arguments: object) -> tuple[ModuleType, Context]:
+    """Return a module of users, and the context that its code left behind."""
+    context = copy_context()
+    return context.run(load, *arguments), context
+
+
 def _module(name: str) -> ModuleType:
     try:
-        return importlib.import_module(name)
-    except (Exception, SystemExit) as fault:
-        raise SettingsError(f"cannot import {name}: {type(fault).__name__}: {fault}") from fault
+        with contained():
+            return importlib.import_module(name)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as fault:
+        raise SettingsError(f"cannot import {name}: {describe_exception(fault)}") from fault
 
 
 class _Source(importlib.abc.SourceLoader):
@@ -271,27 +290,15 @@ def _file_module(path: Path, source: bytes) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # as pickle and dataclasses expect
     try:
-        spec.loader.exec_module(module)
+        with contained():
+            spec.loader.exec_module(module)
+    except KeyboardInterrupt:
+        raise
     except SettingsError as fault:  # raised by our decorator for an argument in the file
-        raise SettingsError(f"cannot load {path}: {fault} ({_place(fault, str(path))})") from fault
-    except (Exception, SystemExit) as fault:
-        raise SettingsError(f"cannot load {path}: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
+        raise SettingsError(f"cannot load {path}: {fault} ({place_of(fault, str(path))})") from fault
+    except BaseException as fault:
+        raise SettingsError(f"cannot load {path}: {describe_exception(fault)} ({place_of(fault)})") from fault
     return module
-
-
-def _traceback(fault: BaseException) -> str:
-    """Return the traceback of an evaluator's code, without our own frame."""
-    trace = fault.__traceback__
-    return "".join(traceback.format_exception(type(fault), fault, trace and trace.tb_next)).rstrip()
-
-
-def _place(fault: BaseException, file: str = "") -> str:
-    """Return where an exception was raised, or where `file` called what raised it: `file.py, line 12`."""
-    if isinstance(fault, SyntaxError):
-        return f"{Path(fault.filename or '').name}, line {fault.lineno}"
-    frames = traceback.extract_tb(fault.__traceback__)
-    frame = next((frame for frame in reversed(frames) if frame.filename == file), frames[-1])
-    return f"{Path(frame.filename).name}, line {frame.lineno}"
 
 
 def _defined_at(measure: Measure) -> str:

@@ -21,6 +21,7 @@ from armwright.report.style import FRONT, RC, line
 
 FAR_REFERENCE = 2.0  # times the largest value; a reference point beyond is not drawn
 FITTED = 1.1  # upper limit of such an axis, as a multiple of the largest value
+SMALLEST = 1e-250  # value that counts as above 0; matplotlib has no axes that end at smaller ones
 SIMILAR = 0.5  # share of the upper limit; if all values are above, the axis begins near them
 LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # widths [inch]
 
@@ -40,8 +41,8 @@ def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Arr
     """Return the limits (2, 2) of a plane of two objectives: low and high of each.
 
     The plane reaches beyond the reference point, but only beyond the largest values if the reference point is more than
-    twice as far in either. It begins at 0, or near the smallest value if all values within the reference point are
-    similar.
+    twice as far in either. It begins at 0, or near the smallest value if that is negative or all values within the
+    reference point are similar.
 
     Args:
         values: (N, 2) designs to show: those nearer than the limits, else their front.
@@ -54,10 +55,12 @@ def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Arr
     if not len(values):
         return np.column_stack([np.zeros(2), shown * point])
     best, worst = values.min(axis=0), values.max(axis=0)
-    is_far = np.any((worst > 0.0) & (point > FAR_REFERENCE * worst))
+    is_far = np.any((worst > SMALLEST) & (point > FAR_REFERENCE * worst))
     beyond = shown * (point if len(within) else np.maximum(point, worst))
-    high = np.where(is_far & (worst > 0.0), FITTED * worst, beyond)
-    low = np.where((best > SIMILAR * high) & (best < point), best - (FITTED - 1.0) * (high - best), 0.0)
+    high = np.where(is_far & (worst > SMALLEST), FITTED * worst, beyond)
+    low = np.where(
+        (best < 0.0) | ((best > SIMILAR * high) & (best < point)), best - (FITTED - 1.0) * (high - best), 0.0
+    )
     return np.column_stack([low, high])
 
 

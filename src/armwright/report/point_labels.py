@@ -111,6 +111,8 @@ def _candidates(axes: Any, label: PointLabel) -> Iterator[Any]:
 def _along_leader(axes: Any, label: PointLabel, box: Bbox) -> list[Bbox]:
     """Return small boxes along the line from a point to the middle of its label, as far as it is drawn."""
     start: Array = axes.transData.transform(label.at)
+    if not axes.figure.bbox.contains(*start):
+        return []
     along = np.asarray(box.corners(), dtype=np.float64).mean(axis=0) - start
     steps = np.linspace(0.0, 1.0, 2 + int(np.hypot(along[0], along[1]) / POINT))[1:-1]
     places = [(start + step * along).tolist() for step in steps]

@@ -6,11 +6,11 @@ from contextlib import suppress
 from functools import cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, Field, field_validator
 
-from armwright.arrays import Array
+from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import RunConflictError, RunFolderError
 from armwright.kinematics.devices import Device, usable_device
 from armwright.problem.evaluation import Evaluation
@@ -135,7 +135,7 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
     tolerance: float = Field(default=0.0, ge=0.0)
     device: Device = "cpu"
     objectives: tuple[ObjectiveRecord, ...] = record_objectives(PAPER_OBJECTIVES)
-    reference_point: tuple[float, ...] | None
+    reference_point: tuple[Annotated[float, Field(le=2.0 * LARGEST_OBJECTIVE)], ...] | None
     method: Method | FrontMethod
     seed: int
     evaluator: str | None = None

@@ -9,15 +9,35 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
-from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
+from pydantic import AfterValidator, ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
 
+from armwright.arrays import LARGEST_OBJECTIVE
 from armwright.files import replace_surrogates
+from armwright.pareto import PENALTY
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Objective
 from armwright.runs.config import RunConfig
 from armwright.spaces.parameters import Design, ParameterValue
 
+LONGEST = 1e8  # [s]
+
 Count = Annotated[int, Field(ge=0, lt=2**63)]
+
+
+def _within(limit: float) -> AfterValidator:
+    """Return the check of a number whose sums and products have to stay finite."""
+
+    def check(value: float) -> float:
+        if not abs(value) <= limit:
+            raise ValueError(f"expected a number within ±{limit:g}, got {value:g}")
+        return value
+
+    return AfterValidator(check)
+
+
+_Objectives = tuple[Annotated[float, _within(LARGEST_OBJECTIVE)], ...]
+_Violations = tuple[Annotated[float, _within(PENALTY)], ...]
+_Seconds = Mapping[str, Annotated[float, _within(LONGEST)]]
 
 _PARAMS: TypeAdapter[dict[str, ParameterValue]] = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True))
 
@@ -82,17 +102,17 @@ class FinishedTrial:
     number: int
     source: str
     design: _Params
-    values: tuple[float, ...]
+    values: _Objectives
     proposal: str | None = None
     reason: _Text = ""
-    expected: tuple[float, ...] | None = None
+    expected: _Objectives | None = None
     fault: str | None = None
     asked: int | None = None
     feedback: int | None = None
     duplicate_of: int | None = None
-    seconds: Mapping[str, float] = field(default_factory=dict[str, float])
+    seconds: _Seconds = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
-    violations: tuple[float, ...] = ()
+    violations: _Violations = ()
     failure: Failure | None = None
     screened: ScreenedOut | None = None
 
@@ -136,6 +156,8 @@ def parse_trial(line: bytes, number: int, config: RunConfig) -> FinishedTrial:
         ValueError: The line is not a trial, or not trial `number` of such a run.
         DesignError: Its design is not in the space.
     """
+    if not line.strip():
+        raise ValueError("blank")
     trial = _LINE.validate_json(line)
     for name, found, expected in (
         ("values", trial.values, () if trial.failure is not None else config.objectives),

@@ -80,4 +80,4 @@ def _message(fault: Exception) -> str:
     if not isinstance(fault, ValidationError):
         return str(fault)
     first = fault.errors(include_url=False, include_context=False, include_input=False)[0]
-    return f"{'.'.join(map(str, first['loc']))}: {first['msg']}".removeprefix(": ")
+    return f"{'.'.join(map(str, first['loc']))}: {first['msg'].removeprefix('Value error, ')}".removeprefix(": ")

@@ -20,7 +20,7 @@ def main() -> None:
     """Start the cluster and wait."""
     n_workers, folder = int(sys.argv[1]), sys.argv[2]
     threading.Thread(target=_end_with_parent, args=(folder,), daemon=True).start()
-    answer = os.fdopen(os.dup(1), "w")
+    answer = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what evaluators print must not fill the pipe
     logging.disable()  # news of connections that end; workers have a setting of their own
     cluster, credentials = _start(n_workers, folder)

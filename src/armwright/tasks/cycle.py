@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self, cast
 from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
 
 from armwright.exceptions import did_you_mean
+from armwright.tasks.targets import MIN_TOLERANCE
 
 By = Literal["line", "joint"]
 Action = Literal["pick", "place"]
@@ -67,8 +68,8 @@ class PathTolerance(Strict, frozen=True):
         angle: Angle of the tool from its direction or orientation [rad]; None for NEAR_DIRECTION.
     """
 
-    path: float | None = Field(default=None, gt=0.0, le=1000.0)
-    angle: float | None = Field(default=None, gt=0.0, le=3.2)
+    path: float | None = Field(default=None, ge=MIN_TOLERANCE, le=1000.0)
+    angle: float | None = Field(default=None, ge=MIN_TOLERANCE, le=3.2)
 
     @property
     def largest_distance(self) -> float:

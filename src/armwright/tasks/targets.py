@@ -22,6 +22,7 @@ from armwright.rotations import rotation_from_rpy, rotation_to_axis
 
 MAX_COORDINATE = 1000.0  # [m]
 MAX_WEIGHT = 1e6
+MIN_TOLERANCE = 1e-9  # [m], [rad]
 
 Point = tuple[float, float, float]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]  # [m]
@@ -89,8 +90,8 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     position: Point
     axis: Point | None = None
     orientation: Point | None = None
-    tolerance: float | None = Field(default=None, gt=0.0, le=MAX_COORDINATE)
-    angle_tolerance: float | None = Field(default=None, gt=0.0, le=math.pi)
+    tolerance: float | None = Field(default=None, ge=MIN_TOLERANCE, le=MAX_COORDINATE)
+    angle_tolerance: float | None = Field(default=None, ge=MIN_TOLERANCE, le=math.pi)
     weight: float = Field(default=1.0, gt=0.0, le=MAX_WEIGHT)
 
     @field_validator("position", mode="before")

@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )  # fmt: skip
 
-from armwright.arrays import Array
+from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.files import check_name
 from armwright.tasks.cycle import IN_ORDER, Cycle, read_cycle, target_indices
 from armwright.tasks.moments import MAX_MASS
@@ -205,8 +205,11 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
                 f"workspace: expected at most {MAX_POSES} points x directions in all boxes together, got {n_poses}; "
                 "try fewer points"
             )
-        if self.reference_point is not None and min(self.reference_point) <= 0.0:
-            raise ValueError(f"reference_point: expected values above 0, got {list(self.reference_point)}")
+        if any(not 0.0 < value <= LARGEST_OBJECTIVE for value in self.reference_point or ()):
+            raise ValueError(
+                f"reference_point: expected values above 0 and at most {LARGEST_OBJECTIVE:g}, "
+                f"got {list(self.reference_point or ())}"
+            )
         return self
 
     @property

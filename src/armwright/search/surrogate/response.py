@@ -9,6 +9,7 @@ from armwright.arrays import Array
 from armwright.search.surrogate.gaussian_process import GaussianProcess, Hyperparameters, fit
 
 SHIFT = 0.03  # of the median, added before a logarithm, so that a value near 0 does not stand out
+SMALLEST = 1e-100  # median of values whose logarithms are taken
 LARGEST_LOG = 700.0  # of a prediction, so that it is finite
 
 
@@ -80,7 +81,7 @@ def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:
     """
     first, *others = inputs
     transforms = [Transform.of(values, is_log=False)]
-    if values.min() >= 0.0 and np.median(values) > 0.0:
+    if values.min() >= 0.0 and np.median(values) > SMALLEST:
         transforms.append(Transform.of(values, is_log=True))
     best = max((_fitted(first, inputs, values, t) for t in transforms), key=lambda model: model.log_posterior)
     models = [best, *(_fitted(name, inputs, values, best.transform) for name in others)]
