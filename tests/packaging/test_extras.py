@@ -72,7 +72,7 @@ ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
 def test_missing_package_names_its_install_command(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
     extra, package, ask = ASKED[asked]
     monkeypatch.setitem(sys.modules, package, None)
-    for module in ("armwright.llm.client", "armwright.llm.errors"):
+    for module in ("client", "connections", "errors", "responses", "transport"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     if extra in ("gp", "arms"):  # of which there may be more missing here, or less
         monkeypatch.setattr(extras, "missing_packages", lambda _: [package])

@@ -28,7 +28,7 @@ from armwright.runs.front_gap import known_front
 from armwright.runs.history import History
 from armwright.runs.selection import pick_from
 from tests.support.browser import Tab
-from tests.support.chat_server import ChatServer, wants_design
+from tests.support.chat_server import ChatServer, is_check, wants_design
 from tests.support.wire_formats import llm_proposer
 
 HOSTILE = (
@@ -374,7 +374,8 @@ def test_markup_in_answers_is_escaped(tmp_path: Path, tab: Tab, chat_server: Cha
     task = aw.Task(name="evil", targets=aw.load_task("target-1").targets, description=HOSTILE, provenance=HOSTILE)
     best = dict(known_front(aw.Problem(task=task)).designs[0].params)
     answer = json.dumps({**best, "reason": HOSTILE})
-    chat_server.answer = lambda request: answer if wants_design(request) else HOSTILE
+    checked = json.dumps({"answer": HOSTILE})
+    chat_server.answer = lambda request: answer if wants_design(request) else checked if is_check(request) else HOSTILE
     proposer = llm_proposer(chat_server.url, model=HOSTILE, origin="scripted")
     problem = aw.Problem(task=task, space=aw.paper_space().model_copy(update={"name": HOSTILE[:100]}))
     run = aw.optimize(problem, proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
