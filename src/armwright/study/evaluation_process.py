@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from armwright.exceptions import EvaluatorError, SettingsError
+from armwright.kinematics.devices import find_cache
 from armwright.problem.evaluators import Measurement
 from armwright.problem.failure import Failure
 from armwright.problem.problem import Problem
@@ -119,6 +120,7 @@ class EvaluationProcess:
 
     def _start(self) -> None:
         self.close()
+        find_cache()
         self._connection, theirs = Pipe()
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         with theirs:
