@@ -1,5 +1,6 @@
 """Locked, read-only, moved and deleted folders; no home; no cache."""
 
+import os
 import shutil
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 
 from armwright.exceptions import RunFolderError
 from armwright.files import replace_folder
+from armwright.kinematics import kernel_cache
 from armwright.problem.problem import Problem
 from armwright.runs.folder import RunFolder, is_held
 from armwright.study.progress import Progress
@@ -233,11 +235,78 @@ def test_figures_without_a_home(tmp_path: Path, cache: Path) -> None:
     assert list((tmp_path / "run" / "figures").glob("*.png"))
 
 
-def test_missing_kernel_cache(tmp_path: Path) -> None:
-    nowhere = {"HOME": "/proc/self/nowhere", "XDG_CACHE_HOME": None, "WARP_CACHE_PATH": None}
-    words = one_line(study(tmp_path / "run", environment=nowhere))
+def compiled(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*.o"))
+
+
+@pytest.mark.slow
+def test_home_that_cannot_be_written(tmp_path: Path, whole: Path, cache: Path) -> None:
+    """Kernels are kept in a temporary folder, which later commands and other processes find again."""
+    place = tmp_path / "tmp"
+    place.mkdir()
+    nowhere: dict[str, str | None] = {
+        "HOME": "/proc/self/nowhere", "XDG_CACHE_HOME": None, "XDG_CONFIG_HOME": None, "WARP_CACHE_PATH": None,
+        "TMPDIR": str(place),
+    }  # fmt: skip
+    kept = place / f"armwright-kernels-{os.getuid()}"
+    shutil.copytree(cache, kept)  # as an earlier command left it
+    kept.chmod(0o700)
+    before = compiled(kept)
+    assert before
+    for name, more in (("run", ()), ("workers", ("--workers", "2"))):  # one line for all processes
+        done = study(tmp_path / name, "--no-figures", *more, environment=nowhere)
+        assert done.returncode == 0, done.stderr
+        (line,) = done.stderr.splitlines()
+        assert line.startswith(f"compiled kernels are kept in {kept}, as your cache folder cannot be written; ")
+        assert len(trials(tmp_path / name)) == N_TRIALS
+    is_same_run(tmp_path / "run", whole)
+    assert compiled(kept) == before
+
+
+@pytest.mark.slow
+def test_read_only_kernel_cache_is_used_as_far_as_it_goes(tmp_path: Path, whole: Path, cache: Path) -> None:
+    home, place = tmp_path / "cache", tmp_path / "tmp"
+    (version,) = (folder for folder in cache.iterdir() if folder.is_dir())
+    shutil.copytree(version, home / "warp" / version.name)
+    place.mkdir()
+    environment = {"XDG_CACHE_HOME": str(home), "WARP_CACHE_PATH": None, "TMPDIR": str(place)}
+    with read_only(home):
+        done = run(as_a_plain_user(command(tmp_path / "run", "--no-figures")), environment=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    for module in compiled(home):
+        if "ik_kernels" in str(module):
+            shutil.rmtree(module.parent, ignore_errors=True)
+    with read_only(home):
+        done = run(as_a_plain_user(command(tmp_path / "again", "--no-figures")), environment=environment)
+    assert done.returncode == 0, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"compiled kernels are kept in {place}/armwright-kernels-")
+    for name in ("run", "again"):
+        is_same_run(tmp_path / name, whole)
+
+
+def test_named_kernel_cache_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
+    words = one_line(study(tmp_path / "run", environment={"WARP_CACHE_PATH": "/proc/self/nowhere"}))
     assert "cannot write compiled kernels" in words
     assert "set WARP_CACHE_PATH to a writable folder" in words
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o720])
+def test_temporary_kernel_cache_of_others_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int
+) -> None:
+    monkeypatch.setattr(kernel_cache.tempfile, "tempdir", str(tmp_path))
+    folder = Path(kernel_cache._private_folder())
+    assert folder.parent == tmp_path
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert Path(kernel_cache._private_folder()) == folder
+    folder.chmod(mode)
+    other = Path(kernel_cache._private_folder())
+    assert other != folder
+    assert other.stat().st_mode & 0o777 == 0o700
+    folder.rmdir()
+    folder.symlink_to(other)
+    assert Path(kernel_cache._private_folder()) not in (folder, other)
 
 
 def test_filled_read_only_kernel_cache(tmp_path: Path, whole: Path, cache: Path) -> None:

@@ -8,8 +8,9 @@ from contextlib import contextmanager, nullcontext
 from functools import cache
 from typing import Any, Literal, cast, get_args
 
-from armwright.exceptions import FailureError, SettingsError, did_you_mean
+from armwright.exceptions import SettingsError, did_you_mean
 from armwright.kinematics.arm_arrays import Motions, Precision, TargetKind
+from armwright.kinematics.kernel_cache import init_warp, make_cache_writable, report_cache_errors
 
 Device = Literal["cpu", "cuda"]
 
@@ -71,6 +72,12 @@ compilation = Compilation()
 _loading = threading.Lock()
 
 
+def find_cache() -> None:
+    """Initialise Warp, which finds the folder of compiled kernels that processes started from here on share."""
+    with _loading:
+        _warp()
+
+
 def load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> tuple[Any, Any]:
     """Return Warp and one variant of the kernels, compiled and loaded on a device, so that threads only launch."""
     with _loading:
@@ -117,14 +124,14 @@ def _warp() -> Any:
     import warp as wp
 
     wp.config.log_level = wp.LOG_ERROR
-    with _report_cache_errors(), _silent_stderr():
-        wp.init()
+    with report_cache_errors():
+        init_warp(wp)
     return wp
 
 
 @cache
 def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> Any:
-    with _report_cache_errors():
+    with report_cache_errors():
         from armwright.kinematics.ik_kernels import ik_kernels
 
         kernels = ik_kernels(precision, lanes, motions, kind)
@@ -134,7 +141,7 @@ def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, 
 
 @cache
 def _load_clearance(precision: Precision, device: Device) -> Any:
-    with _report_cache_errors():
+    with report_cache_errors():
         from armwright.kinematics.clearance_kernels import clearance_kernels
 
         kernels = clearance_kernels(precision)
@@ -144,7 +151,7 @@ def _load_clearance(precision: Precision, device: Device) -> Any:
 
 @cache
 def _load_motor_clearance(precision: Precision, device: Device) -> Any:
-    with _report_cache_errors():
+    with report_cache_errors():
         from armwright.kinematics.motor_kernels import motor_kernels
 
         kernels = motor_kernels(precision)
@@ -154,7 +161,7 @@ def _load_motor_clearance(precision: Precision, device: Device) -> Any:
 
 @cache
 def _load_column_clearance(precision: Precision, device: Device) -> Any:
-    with _report_cache_errors():
+    with report_cache_errors():
         from armwright.kinematics.column_kernels import column_kernels
 
         kernels = column_kernels(precision)
@@ -164,7 +171,7 @@ def _load_column_clearance(precision: Precision, device: Device) -> Any:
 
 @cache
 def _load_path(device: Device) -> Any:
-    with _report_cache_errors():
+    with report_cache_errors():
         from armwright.kinematics.path_kernels import path_kernels
 
         kernels = path_kernels()
@@ -174,7 +181,7 @@ def _load_path(device: Device) -> Any:
 
 @cache
 def _load_dynamics(device: Device) -> Any:
-    with _report_cache_errors():
+    with report_cache_errors():
         from armwright.kinematics.dynamics_kernels import dynamics_kernels
 
         kernels = dynamics_kernels()
@@ -186,37 +193,11 @@ def _load_modules(kernels: Sequence[Any], device: Device) -> None:
     """Load the modules of kernels on a device; compile those that are not in the cache."""
     # Warp launches with this size on the CPU. Modules of another size would have to be compiled again.
     block_dim = 1 if device == "cpu" else None
-    cache_dir = str(_warp().config.kernel_cache_dir)
+    warp = _warp()
     for module in (kernel.module for kernel in kernels):
-        is_cached = os.path.exists(os.path.join(cache_dir, module.get_module_identifier(block_dim)))
+        folder = os.path.join(str(warp.config.kernel_cache_dir), module.get_module_identifier(block_dim))
+        is_cached = os.path.exists(folder)
+        if not is_cached:
+            make_cache_writable(warp)
         with nullcontext() if is_cached else compilation.timed():
             module.load(device, block_dim)
-
-
-@contextmanager
-def _report_cache_errors() -> Generator[None]:
-    try:
-        yield
-    except OSError as error:
-        path = "" if error.filename is None else f": {error.filename}"
-        raise FailureError(
-            f"cannot write compiled kernels: {error.strerror or error}{path}; set WARP_CACHE_PATH to a writable folder"
-        ) from error
-
-
-@contextmanager
-def _silent_stderr() -> Generator[None]:
-    """Drop what the process writes to stderr: Warp reports a missing NVIDIA driver there, whatever its log level."""
-    try:
-        stderr = os.dup(2)
-    except OSError:  # stderr is closed: nothing to silence
-        yield
-        return
-    sink = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(sink, 2)
-        yield
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(sink)

@@ -23,6 +23,7 @@ from uuid import uuid4
 from armwright.child_process import start_module
 from armwright.exceptions import ArmwrightError, ClusterError, FailureError, SettingsError
 from armwright.extras import check_extra
+from armwright.kinematics.devices import find_cache
 
 MAX_WORKERS = 10_000
 MAX_LOSSES = 3  # workers lost over the same task before it is given up
@@ -275,6 +276,7 @@ def _local_cluster(n_workers: int) -> Generator[tuple[str, dict[str, str]]]:
     Yields:
         The scheduler's address and the credentials to connect, which no other user of the machine knows.
     """
+    find_cache()
     environment = {**dict.fromkeys(THREADS, "1"), "DASK_LOGGING__DISTRIBUTED": "critical"}
     with (
         TemporaryDirectory(prefix="armwright-workers-") as folder,

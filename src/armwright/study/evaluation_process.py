@@ -19,6 +19,7 @@ from typing import Any
 
 from armwright.child_process import start_module
 from armwright.exceptions import EvaluatorError, SettingsError
+from armwright.kinematics.devices import find_cache
 from armwright.problem.evaluators import Measurement
 from armwright.problem.failure import Failure
 from armwright.problem.problem import Problem
@@ -120,6 +121,7 @@ class EvaluationProcess:
 
     def _start(self) -> None:
         self.close()
+        find_cache()
         self._connection, theirs = Pipe()
         with theirs:
             self._process = start_module(
