@@ -73,7 +73,7 @@ def test_missing_package_names_its_install_command(asked: str, monkeypatch: pyte
     extra, package, ask = ASKED[asked]
     monkeypatch.setitem(sys.modules, package, None)
     for module in ("client", "connections", "errors", "responses", "transport"):
-        monkeypatch.delitem(sys.modules, module, raising=False)
+        monkeypatch.delitem(sys.modules, f"armwright.llm.{module}", raising=False)
     if extra in ("gp", "arms"):  # of which there may be more missing here, or less
         monkeypatch.setattr(extras, "missing_packages", lambda _: [package])
     with pytest.raises(MissingExtraError) as fault:
