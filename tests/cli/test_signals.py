@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from armwright.cli.signals import interruptible
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request
 from tests.support.command_line import PATIENCE, armwright
 from tests.support.wire_formats import model_options
@@ -146,3 +147,15 @@ def test_hostile_answer_is_interrupted(chat_server: ChatServer, in_folder: Path)
     is_hostile = False
     chat_server.answer = answer
     assert is_resumed(in_folder / "run", *how)
+
+
+def test_error_that_code_in_c_makes_of_an_interrupt_is_one() -> None:
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        with pytest.raises(ValueError, match="ours"), interruptible():
+            raise ValueError("ours")
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # as after a first Ctrl-C
+        with pytest.raises(KeyboardInterrupt), interruptible():
+            raise TypeError("Cannot compare structured arrays")
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -31,6 +31,7 @@ from armwright.cli.options import (
     load_problem,
     select_workers,
 )
+from armwright.cli.signals import interruptible
 from armwright.cli.streams import exit_interrupted, open_console, print_command, print_json, repeat_command
 from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 
@@ -94,7 +95,7 @@ def design(
     folder = out or Path("runs") / f"{problem.task.name}-design-seed{seed}"
     check_before_search(console, problem, check_files(task, space), folder)
     try:
-        with search_progress(console) as watch:
+        with interruptible(), search_progress(console) as watch:
             run = find_front(
                 problem,
                 budget=plan,
@@ -224,7 +225,7 @@ def optimize(
 
         console.print(f"live: {start_server(folder)}")
     try:
-        with study_progress(console) as watch:
+        with interruptible(), study_progress(console) as watch:
             run = run_study(
                 problem,
                 proposer=choice.proposer or "none",

@@ -6,6 +6,8 @@ import select
 import signal
 import sys
 import threading
+from collections.abc import Generator
+from contextlib import contextmanager
 from functools import cache
 from types import FrameType
 
@@ -40,6 +42,17 @@ def install_handlers() -> None:
             signal.signal(number, _interrupt)
             _reset_on_delivery(number)
     sys.unraisablehook = _repeat_dropped_interrupt
+
+
+@contextmanager
+def interruptible() -> Generator[None]:
+    """Raise KeyboardInterrupt again where code in C made another exception of it, as comparisons in numpy do."""
+    try:
+        yield
+    except Exception as fault:
+        if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:  # which `_interrupt` sets
+            raise KeyboardInterrupt from fault
+        raise
 
 
 def _interrupt(*_: object) -> None:
