@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
 from armwright.report.datasheet import write_datasheet
 from armwright.report.datasheet_html import to_html
@@ -12,7 +13,6 @@ from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.runs.datasheet.sheet import DataSheet, JointLine, LinkLine, MassLine, Part, Sensitivity
 from armwright.runs.datasheet.urdf_sheet import urdf_sheet
-from tests.support.browser import browser, program
 
 LONG = "XW540-T260-with-a-very-long-name-1234567"
 
@@ -54,17 +54,15 @@ def sheet(request: pytest.FixtureRequest) -> DataSheet:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("paper", ["A4", "Letter"])
-def test_sheet_prints_on_two_pages(sheet: DataSheet, tmp_path: Path, paper: str) -> None:
-    path = program()
-    assert path is not None, "the tests need Chromium"
+def test_sheet_prints_on_two_pages(sheet: DataSheet, browser: Browser, tmp_path: Path, paper: str) -> None:
     (tmp_path / "sheet.html").write_text(to_html(sheet), encoding="utf-8")
-    with browser(path) as started:
-        page = started.new_page()
-        page.goto((tmp_path / "sheet.html").as_uri())
-        printed = page.pdf(format=paper, prefer_css_page_size=paper == "A4")
-        page.emulate_media(media="print")
-        page.set_viewport_size({"width": 703, "height": 1032})  # what the margins leave of A4, at 96 dpi
-        wide = page.evaluate("[...document.querySelectorAll('table')].filter(e => e.scrollWidth > 703).length")
+    page = browser.new_page()
+    page.goto((tmp_path / "sheet.html").as_uri())
+    printed = page.pdf(format=paper, prefer_css_page_size=paper == "A4")
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": 703, "height": 1032})  # what the margins leave of A4, at 96 dpi
+    wide = page.evaluate("[...document.querySelectorAll('table')].filter(e => e.scrollWidth > 703).length")
+    page.close()
     assert printed.count(b"/Type /Page\n") == 2
     assert not wide, "tables are cut off"
 
