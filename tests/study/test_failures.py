@@ -3,6 +3,7 @@
 import json
 import math
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -215,9 +216,12 @@ def test_idle_process_of_an_evaluator_ends_and_is_replaced() -> None:
     process = evaluation_process.EvaluationProcess(pickled, timeout=60.0)
     design = SPACE.sample(1, 0)[0]
     command = "import armwright.study.evaluation_process as it; it.IDLE_SECONDS = 0.0; it.main()"
-    start = subprocess.Popen
+
+    def start(module: str, connection: int, **options: Any) -> subprocess.Popen[Any]:
+        return subprocess.Popen([sys.executable, "-c", command, str(connection)], start_new_session=True, **options)
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(subprocess, "Popen", lambda args, **options: start([args[0], "-c", command, args[3]], **options))
+        patch.setattr(evaluation_process, "start_module", start)
         process._start()
         assert process._process is not None
         assert process._process.wait() == evaluation_process.IDLE_EXIT
