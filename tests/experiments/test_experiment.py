@@ -333,7 +333,7 @@ def test_recorded_experiment_replays_without_a_model(in_folder: Path, chat_serve
     file = file_of(in_folder, **settings)
     first = run_here(file, "--out", "first")
     assert first.exit_code == 0, first.output
-    assert "2 of them ask test-model for about 4 proposals in total" in first.output
+    assert f"2 of them ask test-model at {chat_server.url} for about 4 proposals in total" in first.output
     assert "[scripted]" in (in_folder / "first" / "table.md").read_text(encoding="utf-8")
     chat_server.requests.clear()
     again = run_here(file, "--out", "again", "--replay", "first", "--seeds", "3")
