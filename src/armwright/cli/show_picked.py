@@ -129,7 +129,7 @@ def show_picked(
             console.print(f"  perturbed: {survival[member.number]['verdict']}")
     first = picked[0].number
     console.print(
-        Text(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
+        Text(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | ros2_control")
     )
 
 
