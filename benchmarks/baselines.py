@@ -14,7 +14,7 @@ import armwright
 from armwright.experiments.baselines import BASELINES, baselines, baselines_of
 from armwright.experiments.plan import suite_tasks
 from armwright.files import to_csv
-from armwright.runs.front_gap import best_known_hypervolume
+from armwright.proof.front_gap import best_known_hypervolume
 from armwright.tasks.catalogue import load_task
 
 PACKAGE = Path(armwright.__file__).parent

@@ -21,9 +21,9 @@ from motor_clearance import motor_clearance
 
 import armwright as aw
 from armwright.arrays import Array
-from armwright.runs.recommendation import recommend
-from armwright.runs.simulated_run import SimulatedMember, Simulator
-from armwright.runs.simulation import PASS
+from armwright.proof.recommendation import recommend
+from armwright.proof.simulated_run import SimulatedMember, Simulator
+from armwright.proof.simulation import PASS
 
 BUILT_IN = ("desk-sorting", "box-palletising", "lathe-tending", "screwing", "casting-inspection", "dispensing")
 EXAMPLES = ("2-assembly", "3-long-shelf", "4-wall-painting", "5-obstacle-reach", "6-price", "7-compare-arms")

@@ -25,8 +25,8 @@ import pinocchio as pin
 from skrobot.coordinates import Coordinates
 from skrobot.model import RobotModel
 
-from armwright.kinematics.arm_arrays import ArmArrays, Precision, stack_arms
-from armwright.kinematics.ik import UPDATES, solve_postures
+from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision, stack_arms
+from armwright.kinematics.ik.ik import UPDATES, solve_postures
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.urdf_writer import to_urdf

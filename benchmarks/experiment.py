@@ -12,8 +12,8 @@ from armwright.experiments.cells import plan_cells
 from armwright.experiments.outcome import collect, published
 from armwright.experiments.plan import load_experiment, with_only, with_seeds
 from armwright.experiments.runner import run_cells
-from armwright.report.tables import markdown
-from armwright.study.cluster import Workers
+from armwright.experiments.tables import markdown
+from armwright.study.workers.cluster import Workers
 
 
 def main() -> None:

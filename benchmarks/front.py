@@ -20,8 +20,8 @@ from armwright.arrays import Array
 from armwright.experiments.plan import suite_tasks
 from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
-from armwright.runs.front_gap import known_front
-from armwright.search.front_search import FrontSearch
+from armwright.proof.front_gap import known_front
+from armwright.search.front.front_search import FrontSearch
 from armwright.tasks.catalogue import load_task
 
 BUDGETS = (10_000, 20_000, 50_000, 100_000, 200_000)

@@ -24,12 +24,12 @@ from searches import new_search, reference_point_of
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.kinematics.arm_arrays import Precision
+from armwright.kinematics.arms.arm_arrays import Precision
 from armwright.kinematics.devices import Device, compilation, cores, resolve_device
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.problem import Problem
-from armwright.runs.front_gap import known_front
-from armwright.search.screening import Screen, pays
+from armwright.proof.front_gap import known_front
+from armwright.search.front.screening import Screen, pays
 from armwright.spaces.design_space import DesignSpace, default_space
 from armwright.spaces.parameters import FloatParameter
 from armwright.tasks.catalogue import load_task

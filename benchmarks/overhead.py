@@ -17,8 +17,8 @@ from pathlib import Path
 
 import optuna
 
+from armwright.pictures.figures import write_figures
 from armwright.problem.problem import Problem
-from armwright.report.figures import write_figures
 from armwright.search.samplers import sampler_factory
 from armwright.seeding import derived_seed
 from armwright.spaces.optuna_distributions import distributions
@@ -83,7 +83,10 @@ def whole_process() -> None:
     imports = "import armwright.study.study, armwright.search.samplers, warp, optuna"
     print(f"  imports of a run                       {seconds_and_memory([sys.executable, '-c', imports])[0]:6.2f} s")
     with tempfile.TemporaryDirectory() as folder:
-        load = "from armwright.kinematics.devices import load; load('float32', 8, 'revolute', 'position', 'cpu')"
+        load = (
+            "from armwright.kinematics.devices import load_kernels; "
+            "load_kernels('ik.ik_kernels', 'cpu', 'float32', 8, 'revolute', 'position')"
+        )
         cold = seconds_and_memory([sys.executable, "-c", load], WARP_CACHE_PATH=folder)[0]
         warm = seconds_and_memory([sys.executable, "-c", load], WARP_CACHE_PATH=folder)[0]
         print(f"  kernels: compiled {cold:.2f} s, loaded from the cache {warm:.2f} s (with the import of Warp)")

@@ -1,4 +1,4 @@
-"""The best known fronts of the built-in tasks (src/armwright/runs/best_known_fronts/), and how they are made.
+"""The best known fronts of the built-in tasks (src/armwright/proof/best_known_fronts/), and how they are made.
 
 Of each task the union of: our search with several seeds; in the paper's space, our search within each joint sequence by
 itself, which no other sequence can crowd out; pymoo's NSGA-II; and what was known before. So a run of this script never
@@ -23,8 +23,8 @@ import armwright
 from armwright.arrays import Array
 from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
-from armwright.runs.front_gap import VOLUME_LINE, known_front
-from armwright.search.survival import front
+from armwright.proof.front_gap import VOLUME_LINE, known_front
+from armwright.search.front.selection import front
 from armwright.spaces.design_space import default_space
 from armwright.tasks.catalogue import builtin_tasks
 
@@ -34,7 +34,7 @@ PER_SEQUENCE = 2_000
 PYMOO_EVALUATIONS, PYMOO_CYCLE_EVALUATIONS = 30_000, 3_000
 KEPT = 0.999  # of a front's hypervolume, by its designs in the file
 DECIMALS = 9  # of its parameters: a nanometre, as a micrometre already costs 0.1 % of target-2's hypervolume
-PLACE = Path(armwright.__file__).parent / "runs" / "best_known_fronts"
+PLACE = Path(armwright.__file__).parent / "proof" / "best_known_fronts"
 
 
 def main() -> None:

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from armwright.arrays import Array
 from armwright.pareto import default_reference_point
 from armwright.problem.problem import Problem
-from armwright.search.front_search import FrontSearch
-from armwright.search.screening import Screen, pays
-from armwright.search.variation import offspring
+from armwright.search.front.front_search import FrontSearch
+from armwright.search.front.screening import Screen, pays
+from armwright.search.front.variation import offspring
 from armwright.spaces.design_parameters import conditional_parameters
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import CategoricalParameter
-from armwright.study.direct_search import SHORT, SHORT_FIRST_BATCH
+from armwright.study.front.direct_search import SHORT, SHORT_FIRST_BATCH
 
 
 def new_search(problem: Problem, reference_point: tuple[float, ...], seed: int, screen: Screen | None) -> FrontSearch:

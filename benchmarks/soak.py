@@ -32,7 +32,7 @@ from armwright.runs.folder import read_run
 from armwright.search.samplers import sampler_factory
 from armwright.seeding import derived_seed
 from armwright.spaces.parameters import FloatParameter
-from armwright.study.front_run import find_front
+from armwright.study.front.front_run import find_front
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 

@@ -34,9 +34,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import armwright as aw
 from armwright.arrays import Array
-from armwright.kinematics.clearance import clearances
-from armwright.kinematics.devices import load
-from armwright.kinematics.ik import LANES, solve_postures
+from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.devices import load_kernels
+from armwright.kinematics.ik.ik import LANES, solve_postures
 from armwright.problem.evaluation import Scene, evaluate_arrays
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Outcomes, Problem, worst_case
@@ -136,7 +136,7 @@ def poses() -> None:
     os.environ["WARP_CACHE_PATH"] = tempfile.mkdtemp(prefix="armwright-speed-")  # where nothing is compiled yet
     print("Targets of several kinds: designs/s, 8 targets")
     for kind in ("position", "pose"):
-        taken = seconds(partial(load, "float32", LANES["cpu"], "revolute", kind, "cpu"))
+        taken = seconds(partial(load_kernels, "ik.ik_kernels", "cpu", "float32", LANES["cpu"], "revolute", kind))
         print(f"  kernels of kind {kind} compile in {taken:.1f} s", flush=True)
     rng = np.random.default_rng(0)
     points = rng.uniform(-0.5, 0.5, (8, 3))

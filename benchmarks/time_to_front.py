@@ -15,10 +15,10 @@ from peers import Nsga2
 
 from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
-from armwright.runs.front_gap import known_front
-from armwright.study.front_run import find_front
+from armwright.proof.front_gap import known_front
+from armwright.study.front.front_run import find_front
+from armwright.study.front.search_budget import SearchProgress
 from armwright.study.progress import Progress
-from armwright.study.search_budget import SearchProgress
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 

@@ -16,11 +16,11 @@ import pinocchio
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmwrightError
-from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
-from armwright.kinematics.compliance import Stiffness, backlash_errors, own_loads, tip_displacements, unit_payload
-from armwright.kinematics.forward import forward_kinematics
-from armwright.kinematics.ik import solve_postures
-from armwright.kinematics.payload_limits import payloads_over_reach
+from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
+from armwright.kinematics.arms.forward import forward_kinematics
+from armwright.kinematics.ik.ik import solve_postures
+from armwright.kinematics.reach.compliance import Stiffness, backlash_errors, own_loads, tip_displacements, unit_payload
+from armwright.kinematics.reach.payload_limits import payloads_over_reach
 from armwright.robot.actuators import named_actuator
 from armwright.robot.arm import GRAVITY, Actuator, Arm
 from armwright.robot.robot_descriptions import find_urdf

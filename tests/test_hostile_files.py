@@ -21,10 +21,10 @@ from armwright.experiments.cells import plan_cells
 from armwright.experiments.plan import load_experiment
 from armwright.llm.prompt import load_prompt
 from armwright.llm.transcript import Transcript
-from armwright.report.page import write_report
+from armwright.page.page import write_report
+from armwright.proof.results import read_summary
 from armwright.robot.urdf_reader import read_urdf
 from armwright.runs.folder import read_config
-from armwright.runs.results import read_summary
 from armwright.spaces.design_space import load_space
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task

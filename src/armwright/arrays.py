@@ -1,5 +1,6 @@
 """The array type of the whole package, and files of arrays."""
 
+import math
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,3 +29,8 @@ def open_arrays(path: Path) -> Generator[Mapping[str, NDArray[Any]]]:
         file.seek(0)
         with np.load(file, allow_pickle=False) as arrays:
             yield arrays
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return a value as float; None if it is not finite, which is how tables and JSON state what is not known."""
+    return float(value) if math.isfinite(value) else None

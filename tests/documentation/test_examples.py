@@ -15,14 +15,14 @@ from typer.testing import CliRunner
 
 import armwright as aw
 from armwright.cli.app import app
-from armwright.kinematics.compliance import Stiffness
+from armwright.kinematics.reach.compliance import Stiffness
 from armwright.problem.drive_quantities import require_ratings
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
+from armwright.proof.selection import pick_from
 from armwright.runs.history import FrontMember
-from armwright.runs.optuna_export import export_study
-from armwright.runs.selection import pick_from
+from armwright.study.optuna_export import export_study
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request

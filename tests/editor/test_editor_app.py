@@ -11,7 +11,7 @@ import pytest
 
 import armwright as aw
 from armwright.editor.app import MAX_BODY
-from armwright.report.request_guard import HEADERS
+from armwright.page.request_guard import HEADERS
 from tests.support.editor import ServedEditor, served_editor
 from tests.support.live_server import ask
 

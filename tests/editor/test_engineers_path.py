@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 import armwright as aw
-from armwright.runs.results import read_summary
+from armwright.proof.results import read_summary
 from tests.support.browser import Tab
 from tests.support.editor import ServedEditor, served_editor
 

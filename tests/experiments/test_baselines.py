@@ -6,7 +6,7 @@ import pytest
 
 from armwright.experiments.baselines import baselines, baselines_of
 from armwright.experiments.plan import suite_tasks
-from armwright.runs.front_gap import best_known_hypervolume
+from armwright.proof.front_gap import best_known_hypervolume
 from armwright.tasks.catalogue import load_task
 from tests import ROOT
 

@@ -17,17 +17,17 @@ from typer.testing import CliRunner
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.experiments.compare_runs import Comparison, compare_runs, compare_summaries
+from armwright.experiments.latex_tables import latex
 from armwright.experiments.outcome import Published
 from armwright.experiments.run_list import find_runs, list_runs
-from armwright.experiments.run_summary import RunSummary, read_run_summary, shares_by_source
+from armwright.experiments.run_record import RunSummary, read_run_summary, shares_by_source
 from armwright.experiments.statistics import interval, paired_test
+from armwright.experiments.tables import markdown, write_tables
+from armwright.pictures.comparison_figures import write_comparison_figures
 from armwright.problem.problem import Problem
-from armwright.report.comparison_figures import write_comparison_figures
-from armwright.report.latex_tables import latex
-from armwright.report.tables import markdown, write_tables
+from armwright.proof.front_gap import known_front
 from armwright.runs.folder import read_run
-from armwright.runs.front_gap import known_front
-from armwright.study.front_run import find_front
+from armwright.study.front.front_run import find_front
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task

@@ -28,9 +28,9 @@ from armwright.experiments.plan import (
     with_seeds,
 )
 from armwright.experiments.runner import run_cell
+from armwright.experiments.tables import write_tables
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.recording_file import shipped_recordings
-from armwright.report.tables import write_tables
 from armwright.search.samplers import SAMPLERS
 from tests.support.chat_server import ChatServer
 

@@ -23,8 +23,8 @@ class LiveServer:
     app: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        from armwright.report.live_app import OpenPages, live_app
-        from armwright.report.request_guard import Guard
+        from armwright.page.live_app import OpenPages, live_app
+        from armwright.page.request_guard import Guard
 
         self.app = Guard(live_app(self.folder, OpenPages()), self.key, {"/"}, lambda host: host == "127.0.0.1:9")
 

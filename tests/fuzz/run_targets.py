@@ -19,7 +19,7 @@ from tests.support.wire_formats import llm_proposer
 @cache
 def a_run() -> Path:
     """Return a small finished run with proposals of a scripted model, and its page."""
-    from armwright.report.page import write_report
+    from armwright.page.page import write_report
     from tests.support.chat_server import ChatServer, designer
 
     there = folder() / "run"
@@ -63,12 +63,12 @@ def looked_at(there: Path) -> None:
     """Read a run folder in every way."""
     from armwright.experiments.compare_runs import compare_runs
     from armwright.experiments.run_list import list_runs
+    from armwright.experiments.tables import markdown
+    from armwright.page.content import RunContent
+    from armwright.proof.export import export_design
+    from armwright.proof.selection import pick_from
     from armwright.proposers.replay import ReplayProposer
-    from armwright.report.page_content import RunContent
-    from armwright.report.tables import markdown
     from armwright.runs.control import Channel, add_hint, read_control, read_status
-    from armwright.runs.export import export_design
-    from armwright.runs.selection import pick_from
 
     any_of(
         (

@@ -56,9 +56,9 @@ def point_seeds() -> list[bytes]:
 
 def run_words(data: bytes) -> None:
     """Read expressions of options and task files; none of them is evaluated as code."""
+    from armwright.problem.conditions import read_condition, read_weights
     from armwright.problem.constraints import read_constraints
-    from armwright.runs.conditions import read_condition, read_weights
-    from armwright.study.search_budget import read_seconds
+    from armwright.study.front.search_budget import read_seconds
 
     text = data.decode("utf-8", "replace")
     reads = (read_condition, read_weights, read_seconds, lambda words: read_constraints(words.split("\n")))

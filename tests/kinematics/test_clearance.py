@@ -10,9 +10,9 @@ import pinocchio
 import pytest
 from numpy.typing import NDArray
 
-from armwright.kinematics.arm_arrays import Precision, stack_arms
-from armwright.kinematics.clearance import clearances
-from armwright.kinematics.forward import link_lines
+from armwright.kinematics.arms.arm_arrays import Precision, stack_arms
+from armwright.kinematics.arms.forward import link_lines
+from armwright.kinematics.contact.clearance import clearances
 from armwright.problem.evaluation import evaluate
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf

@@ -10,15 +10,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from armwright.kinematics.arm_arrays import Precision, stack_arms
-from armwright.kinematics.clearance import clearances, straight_motor_clearance
+from armwright.kinematics.arms.arm_arrays import Precision, stack_arms
+from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.problem.problem import Problem
+from armwright.proof.simulation_model import Surroundings, to_simulation_mjcf
 from armwright.robot.arm import Arm, Column, Joint, uniform_link
 from armwright.robot.collision_pairs import joined_by_column
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground

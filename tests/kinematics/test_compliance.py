@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armwright.kinematics.arm_arrays import FIXED, ArmArrays, carrying, stack_arms
-from armwright.kinematics.compliance import (
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays, carrying, stack_arms
+from armwright.kinematics.arms.forward import forward_kinematics
+from armwright.kinematics.reach.compliance import (
     Stiffness,
     backlash_errors,
     backlash_over_reach,
@@ -16,8 +17,7 @@ from armwright.kinematics.compliance import (
     tip_displacements,
     unit_payload,
 )
-from armwright.kinematics.forward import forward_kinematics
-from armwright.kinematics.reach_postures import postures_over_reach
+from armwright.kinematics.reach.reach_postures import postures_over_reach
 from armwright.robot.arm import AXES, GRAVITY, Arm, Joint, Link, MountedTool, uniform_link
 from armwright.tasks.payload import LoadShape
 from tests.support.frame_program import frame_displacement

@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.cycle_loads import BETWEEN, CycleLoads, cycle_loads
-from armwright.kinematics.cycle_path import INSTANTS, find_paths
-from armwright.kinematics.motion_path import MotionPath
-from armwright.kinematics.torque_terms import torque_terms
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.cycle.cycle_loads import BETWEEN, CycleLoads, cycle_loads
+from armwright.kinematics.cycle.cycle_path import INSTANTS, find_paths
+from armwright.kinematics.cycle.motion_path import MotionPath
+from armwright.kinematics.cycle.torque_terms import torque_terms
 from armwright.robot.arm import Actuator, Arm, Joint, uniform_link
 from armwright.robot.mjcf import to_mjcf
 from armwright.tasks.payload import Payload

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.kinematics.arm_arrays import FIXED, stack_arms
-from armwright.kinematics.cycle_choice import CLOSED, MAX_SLIDE, MAX_STEP, choose_candidates
-from armwright.kinematics.cycle_path import CyclePaths, find_paths
-from armwright.kinematics.entry_postures import entry_postures
-from armwright.kinematics.line_following import follow_lines
-from armwright.kinematics.motion_path import MANY_SAMPLES, MotionPath
+from armwright.kinematics.arms.arm_arrays import FIXED, stack_arms
+from armwright.kinematics.cycle.cycle_choice import CLOSED, MAX_SLIDE, MAX_STEP, choose_candidates
+from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths
+from armwright.kinematics.cycle.entry_postures import entry_postures
+from armwright.kinematics.cycle.line_following import follow_lines
+from armwright.kinematics.cycle.motion_path import MANY_SAMPLES, MotionPath
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.tasks.motions import Motion
 from armwright.tasks.task import Task

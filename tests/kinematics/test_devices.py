@@ -10,9 +10,9 @@ import pytest
 
 from armwright.exceptions import FailureError, SettingsError
 from armwright.kinematics import devices
-from armwright.kinematics import ik as solve
 from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.ik import ik as solve
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem import problem
 from armwright.problem.problem import Problem
 from armwright.tasks.catalogue import load_task
@@ -61,7 +61,8 @@ def test_first_use_by_many_threads_restores_stderr() -> None:
 @pytest.mark.parametrize("closed", ["", "import os; os.close(2)\n"])
 def test_kernels_are_silent_and_work_with_closed_stderr(closed: str) -> None:
     done = run(
-        closed + "from armwright.kinematics.devices import load; load('float32', 8, 'revolute', 'position', 'cpu')"
+        closed + "from armwright.kinematics.devices import load_kernels as load; "
+        "load('ik.ik_kernels', 'cpu', 'float32', 8, 'revolute', 'position')"
     )
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -105,12 +106,12 @@ def test_problem_resolves_auto_device_once() -> None:
 COMPILE_FOR_CUDA = """
 import sys
 import warp as wp
-from armwright.kinematics.clearance_kernels import clearance_kernels
-from armwright.kinematics.column_kernels import column_kernels
-from armwright.kinematics.dynamics_kernels import dynamics_kernels
-from armwright.kinematics.ik_kernels import ik_kernels
-from armwright.kinematics.motor_kernels import motor_kernels
-from armwright.kinematics.path_kernels import path_kernels
+from armwright.kinematics.contact.clearance_kernels import clearance_kernels
+from armwright.kinematics.contact.column_kernels import column_kernels
+from armwright.kinematics.cycle.dynamics_kernels import dynamics_kernels
+from armwright.kinematics.ik.ik_kernels import ik_kernels
+from armwright.kinematics.contact.motor_kernels import motor_kernels
+from armwright.kinematics.cycle.path_kernels import path_kernels
 variants = [ik_kernels("float32", 1, motions, "position") for motions in ("revolute", "any")]
 variants += [ik_kernels("float32", 1, "any", "pose"), path_kernels(), dynamics_kernels()]
 variants += [make("float32") for make in (clearance_kernels, motor_kernels, column_kernels)]

@@ -9,9 +9,9 @@ import toppra
 from toppra import algorithm, constraint
 
 from armwright.arrays import Array
-from armwright.kinematics.actuation import Actuation, actuation_at_joints
-from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
-from armwright.kinematics.drive_limits import (
+from armwright.kinematics.arms.actuation import Actuation, actuation_at_joints
+from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
+from armwright.kinematics.cycle.drive_limits import (
     MotionLoad,
     available_torque,
     least_time,

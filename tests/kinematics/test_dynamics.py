@@ -10,9 +10,9 @@ import pinocchio
 import pytest
 from numpy.typing import NDArray
 
-from armwright.kinematics.arm_arrays import FIXED, stack_arms
-from armwright.kinematics.forward import forward_kinematics
-from armwright.kinematics.torque_terms import inertia_matrices
+from armwright.kinematics.arms.arm_arrays import FIXED, stack_arms
+from armwright.kinematics.arms.forward import forward_kinematics
+from armwright.kinematics.cycle.torque_terms import inertia_matrices
 from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
 from armwright.robot.link_geometry import inertia_tensor
 from armwright.robot.mjcf import to_mjcf

@@ -6,9 +6,9 @@ import pytest
 from numpy.typing import NDArray
 from skrobot.coordinates.math import manipulability
 
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.forward import forward_kinematics
-from armwright.kinematics.jacobian import jacobians
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.arms.forward import forward_kinematics
+from armwright.kinematics.arms.jacobian import jacobians
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem

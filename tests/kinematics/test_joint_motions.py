@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armwright.kinematics.cycle_choice import MAX_STEP
+from armwright.kinematics.cycle.cycle_choice import MAX_STEP
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.task import Task

@@ -12,19 +12,19 @@ import pytest
 from numpy.typing import NDArray
 
 from armwright.exceptions import ArmError, SpaceError
-from armwright.kinematics.arm_arrays import Precision, stack_arms
-from armwright.kinematics.clearance import clearances, straight_motor_clearance
-from armwright.kinematics.forward import link_lines
-from armwright.kinematics.motor_bodies import MotorBodies
+from armwright.kinematics.arms.arm_arrays import Precision, stack_arms
+from armwright.kinematics.arms.forward import link_lines
+from armwright.kinematics.arms.motor_bodies import MotorBodies
+from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
+from armwright.proof.simulation_model import Surroundings, to_simulation_mjcf
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.collision_pairs import joined_by_motors
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.datasheet.joint_lines import joint_lines
-from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
+from armwright.sheet.joint_lines import joint_lines
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground, Obstacle

@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.payload_limits import held_payloads, payloads_over_reach
-from armwright.kinematics.reach_postures import postures_over_reach
+from armwright.kinematics.reach.payload_limits import held_payloads, payloads_over_reach
+from armwright.kinematics.reach.reach_postures import postures_over_reach
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import PAYLOAD_CAPACITY, TORQUE_UTILISATION
 from armwright.robot.arm import GRAVITY, Actuator, Arm, Joint, uniform_link

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics import ik as solve
-from armwright.kinematics.arm_arrays import FIXED, stack_arms
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.arms.arm_arrays import FIXED, stack_arms
+from armwright.kinematics.ik import ik as solve
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.evaluation import Evaluation, Scene, evaluate, evaluate_arrays
 from armwright.robot.arm import Arm, Joint, MountedTool, uniform_link
 from armwright.robot.urdf_writer import to_urdf

@@ -14,9 +14,9 @@ import pinocchio
 import pytest
 
 from armwright.exceptions import ArmError, SettingsError
-from armwright.kinematics import ik as solve
-from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
-from armwright.kinematics.ik import Postures
+from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
+from armwright.kinematics.ik import ik as solve
+from armwright.kinematics.ik.ik import Postures
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.design_space import DesignSpace, paper_space

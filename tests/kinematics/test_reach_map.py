@@ -10,8 +10,8 @@ import pytest
 
 import armwright as aw
 from armwright.exceptions import ArmError, SettingsError
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.reachable_poses import PoseSearch, Tolerances, sample_postures
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.reach.reachable_poses import PoseSearch, Tolerances, sample_postures
 from armwright.robot.arm import Actuator, Arm, Joint, MountedTool, uniform_link
 from armwright.rotations import cone_directions
 from armwright.tasks.obstacles import Ground

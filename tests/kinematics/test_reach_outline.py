@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.reach_outline import N_SECTORS, reach_outline
+from armwright.kinematics.reach.reach_outline import N_SECTORS, reach_outline
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from tests.support.arms import moving_arms

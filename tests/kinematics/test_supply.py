@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.kinematics.actuation import FIXED_RATINGS, Actuation, actuation_at_joints, ratings_of
-from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads
-from armwright.kinematics.cycle_path import INSTANTS
-from armwright.kinematics.supply import supply_currents
-from armwright.kinematics.torque_terms import torque_terms
+from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints, ratings_of
+from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_loads
+from armwright.kinematics.cycle.cycle_path import INSTANTS
+from armwright.kinematics.cycle.supply import supply_currents
+from armwright.kinematics.cycle.torque_terms import torque_terms
 from armwright.robot.actuators import catalogue, value_of
 from armwright.robot.arm import Actuator
 from tests.support.cycles import Case, random_case, tolerated

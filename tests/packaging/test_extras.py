@@ -14,9 +14,9 @@ import armwright as aw
 from armwright import extras
 from armwright.exceptions import MissingExtraError, UsageError
 from armwright.extras import EXTRAS, missing_packages, requires_extra
-from armwright.report.live_server import serve, start_server
+from armwright.page.live_server import serve, start_server
+from armwright.proof.simulation import mujoco_version
 from armwright.robot.robot_descriptions import find_urdf
-from armwright.runs.simulation import mujoco_version
 from tests import ROOT
 from tests.support.extras import NEEDS_GP
 

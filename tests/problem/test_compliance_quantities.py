@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import SettingsError
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.compliance import Stiffness, backlash_errors
-from armwright.kinematics.forward import forward_kinematics
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.arms.forward import forward_kinematics
+from armwright.kinematics.reach.compliance import Stiffness, backlash_errors
 from armwright.problem.checks.requirements import check_requirements
 from armwright.problem.estimates import lower_bounds
 from armwright.problem.evaluation import evaluate

@@ -25,25 +25,25 @@ from armwright.pareto import (
     penalised_objectives,
     total_violation,
 )
+from armwright.pictures.figures import chosen_members, write_figures
 from armwright.problem.constraints import Constraint, read_constraints
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
+from armwright.proof.attribution import attribution_by_source
+from armwright.proof.front_gap import known_front
+from armwright.proof.results import verify_run
+from armwright.proof.selection import numbers_of, pick
 from armwright.proposers.for_optuna.proposer import study_history
 from armwright.proposers.replay import ReplayProposer
-from armwright.report.figures import chosen_members, write_figures
-from armwright.runs.attribution import attribution_by_source
 from armwright.runs.folder import read_run
-from armwright.runs.front_gap import known_front
 from armwright.runs.history import History, found_reference_point
-from armwright.runs.results import verify_run
-from armwright.runs.selection import numbers_of, pick
 from armwright.runs.trial import FinishedTrial
-from armwright.search.front_search import FrontSearch
+from armwright.search.front.front_search import FrontSearch
 from armwright.search.samplers import BlackBox
 from armwright.spaces.design_space import paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.spaces.tolerance import perturbed
-from armwright.study.front_run import find_front
+from armwright.study.front.front_run import find_front
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task

@@ -9,7 +9,7 @@ from armwright.exceptions import SettingsError
 from armwright.problem.evaluation import evaluate_arrays
 from armwright.problem.objectives import MOTION_QUANTITIES, OBJECTIVES, PATH_QUANTITIES
 from armwright.problem.problem import Problem
-from armwright.runs.verification import verify
+from armwright.proof.verification import verify
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.tolerance import TOLERANCE, perturbed
 from armwright.tasks.task import Task

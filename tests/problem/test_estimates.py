@@ -7,7 +7,7 @@ import pytest
 
 from armwright.problem.estimates import estimates, lower_bounds
 from armwright.problem.problem import Problem
-from armwright.runs.front_gap import known_front
+from armwright.proof.front_gap import known_front
 from armwright.spaces.design_space import DesignSpace, default_space, paper_space
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task

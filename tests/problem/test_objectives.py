@@ -12,18 +12,18 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError, UsageError
+from armwright.page.content import RunContent
+from armwright.pictures.figures import chosen_members, write_figures
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, RENAMED, named_objectives
 from armwright.problem.problem import Problem
-from armwright.report.figures import chosen_members, write_figures
-from armwright.report.page_content import RunContent
+from armwright.proof.results import verify_run
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
-from armwright.runs.results import verify_run
 from armwright.spaces.design_space import paper_space
-from armwright.study.front_run import find_front
+from armwright.study.front.front_run import find_front
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task

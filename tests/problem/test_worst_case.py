@@ -9,8 +9,8 @@ import yaml
 from armwright.exceptions import TaskError
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
+from armwright.proof.verification import verify
 from armwright.runs.folder import read_run
-from armwright.runs.verification import verify
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task

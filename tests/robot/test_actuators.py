@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import ArmError, SettingsError, SpaceError
-from armwright.kinematics.actuation import Actuation
-from armwright.kinematics.arm_arrays import FLOATS, stack_arms
+from armwright.kinematics.arms.actuation import Actuation
+from armwright.kinematics.arms.arm_arrays import FLOATS, stack_arms
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem

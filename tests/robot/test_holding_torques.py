@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.robot.urdf_reader import UrdfArm, read_urdf
 from tests.support.robots import robot
 

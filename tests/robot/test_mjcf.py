@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.forward import joint_positions
+from armwright.kinematics.arms.forward import joint_positions
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf

@@ -7,9 +7,9 @@ import pinocchio
 import pytest
 
 from armwright.exceptions import SettingsError
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.forward import forward_kinematics
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.arms.forward import forward_kinematics
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.robot.mounting import Mounting, can_turn, mounted, needs_turning
 from armwright.robot.urdf_reader import read_urdf
 from tests.robot.test_urdf_reader import random_values, seen_by_pinocchio

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from armwright.kinematics.forward import joint_positions
+from armwright.kinematics.arms.forward import joint_positions
 from armwright.robot.arm import Arm, Joint, MountedTool
 from armwright.robot.mjcf import to_mjcf
 from tests.support.exported_arms import ARMS, full, peer_of, postures

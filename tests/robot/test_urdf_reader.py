@@ -7,8 +7,8 @@ import pinocchio
 import pytest
 
 from armwright.exceptions import ArmError
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import SNAP, UrdfArm, read_urdf
 from armwright.robot.urdf_writer import to_urdf

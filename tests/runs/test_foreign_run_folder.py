@@ -14,16 +14,16 @@ import pytest
 
 from armwright import arrays, files
 from armwright.exceptions import RunFolderError
-from armwright.experiments.compare_arms import read_existing_arms
+from armwright.existing.compare_arms import read_existing_arms
 from armwright.experiments.run_list import list_runs
 from armwright.llm.transcript import Transcript
+from armwright.page.page import write_report
 from armwright.problem.problem import Problem
-from armwright.report.page import write_report
+from armwright.proof.results import read_summary
 from armwright.runs.control import add_hint, read_control, read_status
-from armwright.runs.datasheet.design_sheet import design_sheet
 from armwright.runs.folder import RunFolder, is_held, read_run
-from armwright.runs.results import read_summary
-from armwright.study.front_run import find_front
+from armwright.sheet.design_sheet import design_sheet
+from armwright.study.front.front_run import find_front
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 

@@ -13,9 +13,9 @@ import yaml
 
 from armwright.exceptions import ArmwrightError, RunConflictError, RunFolderError
 from armwright.problem.problem import Problem
+from armwright.proof.results import read_summary
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
-from armwright.runs.results import read_summary
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
-from armwright.search.front_search import (
+from armwright.search.front.front_search import (
     CAPACITIES,
     FIRST_BATCH,
     LATE_SHARE,
@@ -19,8 +19,8 @@ from armwright.search.front_search import (
     SMALLEST_BATCH,
     FrontSearch,
 )
-from armwright.search.survival import best_of_each, leaders, ranks, survivors
-from armwright.search.variation import RARE_SHARE, _of_equal_number, _parents, offspring
+from armwright.search.front.selection import best_of_each, leaders, ranks, survivors
+from armwright.search.front.variation import RARE_SHARE, _of_equal_number, _parents, offspring
 from armwright.spaces.design_space import load_space, paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.tasks.catalogue import load_task
@@ -210,7 +210,7 @@ def test_search_stalls_when_hypervolume_stops_growing():
 
 def test_side_pools_start_join_and_are_restored(monkeypatch):
     for name, value in (("SIDE_FROM", 2000), ("SIDE_LIFE", 1500)):
-        monkeypatch.setattr(f"armwright.search.front_search.{name}", value)
+        monkeypatch.setattr(f"armwright.search.front.front_search.{name}", value)
     search, ages = made(), []
     while search.evaluations < 12_000:
         search.step()

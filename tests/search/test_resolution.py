@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from armwright.arrays import Array
 from armwright.pareto import front_mask, hypervolume
-from armwright.search.resolution import distinct, resolution_of
+from armwright.search.front.resolution import distinct, resolution_of
 
 
 def random_front(seed: int, n_objectives: int) -> np.ndarray:

@@ -8,10 +8,10 @@ import pytest
 from armwright.pareto import feasible_mask, total_violation
 from armwright.problem.estimates import lower_bounds
 from armwright.problem.problem import Problem
-from armwright.runs.front_gap import known_front
+from armwright.proof.front_gap import known_front
 from armwright.search.encoding import DesignEncoding
-from armwright.search.screening import CANDIDATES, NEAR_MISSES, REJECTED_SHARE, REMEMBERED, Screen, pays
-from armwright.search.variation import offspring
+from armwright.search.front.screening import CANDIDATES, NEAR_MISSES, REJECTED_SHARE, REMEMBERED, Screen, pays
+from armwright.search.front.variation import offspring
 from armwright.spaces.design_space import default_space
 from armwright.tasks.catalogue import builtin_tasks, load_task
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import SpaceError
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.clearance import clearances
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.contact.clearance import clearances
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.objectives import MASS, PRICE
 from armwright.problem.problem import Problem

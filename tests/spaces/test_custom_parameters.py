@@ -11,17 +11,17 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 
 import armwright as aw
 from armwright.exceptions import DesignError, SettingsError, SpaceError
-from armwright.kinematics.arm_arrays import stack_arms
+from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.llm.answer import answer_schema, read_answers, read_text
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import load_prompt
 from armwright.problem.checks.instant import check_instantly
+from armwright.problem.conditions import read_condition
 from armwright.problem.reduction import without_joints
-from armwright.runs.conditions import read_condition
+from armwright.proof.selection import pick
 from armwright.runs.folder import read_run
-from armwright.runs.selection import pick
 from armwright.search.encoding import DesignEncoding
-from armwright.search.variation import offspring
+from armwright.search.front.variation import offspring
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import FloatParameter

@@ -6,8 +6,8 @@ import pytest
 
 from armwright.cli.notes import space_note, unused_parts
 from armwright.cli.options import load_problem
+from armwright.page.repeat_command import repeat_command
 from armwright.problem.checks.instant import check_instantly
-from armwright.report.repeat_command import repeat_command
 from armwright.runs.config import FrontMethod
 from armwright.spaces.design_space import builtin_spaces, default_space, load_space, paper_space
 from armwright.study.settings import run_config

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError, SpaceError
-from armwright.kinematics.arm_arrays import FLOATS, stack_arms
+from armwright.kinematics.arms.arm_arrays import FLOATS, stack_arms
 from armwright.llm.prompt import load_prompt
 from armwright.problem.problem import Problem
 from armwright.robot.tubes import MATERIALS
@@ -20,7 +20,7 @@ from armwright.spaces.design_space import DesignSpace, load_space, paper_space
 from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.link_section import LinkSection
 from armwright.spaces.parameters import Design, FloatParameter
-from armwright.study.front_run import find_front
+from armwright.study.front.front_run import find_front
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 

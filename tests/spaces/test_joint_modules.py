@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError, SpaceError
-from armwright.kinematics.actuation import Actuation
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.forward import joint_positions
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.arms.actuation import Actuation
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.arms.forward import joint_positions
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
 from armwright.robot.mjcf import to_mjcf

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.kinematics.arm_arrays import stack_arms
+from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.llm.answer import Answer, read_answers, read_text, written_answers
 from armwright.llm.answer_format import designs_in_lines
 from armwright.llm.model_options import PromptOptions
@@ -17,10 +17,10 @@ from armwright.problem.problem import Problem
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.tubes import MATERIALS, Tube
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.datasheet.over_reach import link_line
-from armwright.runs.datasheet.parts import parts_list
 from armwright.search.encoding import DesignEncoding
-from armwright.search.variation import offspring
+from armwright.search.front.variation import offspring
+from armwright.sheet.arm_drawing import link_line
+from armwright.sheet.parts import parts_list
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import CategoricalParameter

@@ -20,8 +20,8 @@ from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.runner import _outcome_of, finished_before, run_cells
 from armwright.problem.objective import Objective
 from armwright.runs.control import stop_study
-from armwright.study.cluster import Finished
 from armwright.study.progress import Progress
+from armwright.study.workers.cluster import Finished
 from tests.support.dask_processes import (
     TASK,
     Bench,
@@ -395,7 +395,7 @@ def test_worker_objective_exception_has_its_traceback(shell: ShellCluster) -> No
 def test_invalid_worker_settings_are_one_line(
     monkeypatch: pytest.MonkeyPatch, ask: Callable[[], object], fault: type[Exception], words: str
 ) -> None:
-    monkeypatch.setattr("armwright.study.cluster.CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("armwright.study.workers.cluster.CONNECT_SECONDS", 0.5)
     with pytest.raises(fault, match=words) as raised:
         ask()
     assert "\n" not in str(raised.value)

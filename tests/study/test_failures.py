@@ -15,10 +15,10 @@ import armwright as aw
 from armwright.exceptions import EvaluatorError
 from armwright.llm.feedback import Feedback
 from armwright.pareto import hypervolume
-from armwright.runs.optuna_export import export_study
 from armwright.search.samplers import SAMPLERS
-from armwright.study import evaluation_process
+from armwright.study.optuna_export import export_study
 from armwright.study.progress import Progress
+from armwright.study.workers import evaluation_process
 from tests.torture.short import armwright
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
@@ -215,7 +215,7 @@ def test_idle_process_of_an_evaluator_ends_and_is_replaced() -> None:
     pickled = evaluation_process.pickle_problem(aw.Problem(TASK, SPACE, evaluator=evaluator))
     process = evaluation_process.EvaluationProcess(pickled, timeout=60.0)
     design = SPACE.sample(1, 0)[0]
-    command = "import armwright.study.evaluation_process as it; it.IDLE_SECONDS = 0.0; it.main()"
+    command = "import armwright.study.workers.evaluation_process as it; it.IDLE_SECONDS = 0.0; it.main()"
 
     def start(module: str, connection: int, **options: Any) -> subprocess.Popen[Any]:
         return subprocess.Popen([sys.executable, "-c", command, str(connection)], start_new_session=True, **options)

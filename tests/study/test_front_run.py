@@ -10,18 +10,18 @@ import pytest
 
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
 from armwright.pareto import front_mask, hypervolume
+from armwright.pictures.figures import write_figures
 from armwright.problem.problem import Problem
+from armwright.proof.front_gap import known_front
+from armwright.proof.results import read_summary, verify_run
 from armwright.proposers.rules import RulesProposer
-from armwright.report.figures import write_figures
 from armwright.runs.folder import read_run
-from armwright.runs.front_gap import known_front
-from armwright.runs.results import read_summary, verify_run
-from armwright.search.front_search import LATE_SHARE, SMALLEST_BATCH, FrontSearch
-from armwright.search.screening import CANDIDATES
+from armwright.search.front.front_search import LATE_SHARE, SMALLEST_BATCH, FrontSearch
+from armwright.search.front.screening import CANDIDATES
 from armwright.spaces.design_space import default_space, paper_space
-from armwright.study.direct_search import SHORT_FIRST_BATCH, FrontRun
-from armwright.study.front_run import find_front
-from armwright.study.search_budget import SearchProgress
+from armwright.study.front.direct_search import SHORT_FIRST_BATCH, FrontRun
+from armwright.study.front.front_run import find_front
+from armwright.study.front.search_budget import SearchProgress
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task

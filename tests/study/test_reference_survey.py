@@ -6,7 +6,7 @@ import pytest
 
 import armwright as aw
 from armwright.problem.problem import Outcomes, Problem
-from armwright.study.reference_survey import ReferenceSurvey
+from armwright.study.front.reference_survey import ReferenceSurvey
 from armwright.tasks.task import Task
 
 TASK = Task.model_validate(

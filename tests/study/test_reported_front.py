@@ -13,8 +13,8 @@ from armwright.problem.reduction import reduced
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_config
 from armwright.spaces.design_space import DesignSpace
-from armwright.study.front_run import find_front
-from armwright.study.reported_front import reported_front
+from armwright.study.front.front_run import find_front
+from armwright.study.front.reported_front import reported_front
 from armwright.tasks.task import Task
 
 SPACE = {

@@ -20,7 +20,7 @@ from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.search.samplers import SamplerFactory
 from armwright.spaces.parameters import Design
-from armwright.study.front_run import find_front
+from armwright.study.front.front_run import find_front
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task

@@ -13,14 +13,14 @@ from armwright.cli.progress import search_progress
 from armwright.exceptions import SettingsError
 from armwright.kinematics.devices import Compilation
 from armwright.problem.problem import Outcomes, Problem
+from armwright.proof.results import read_summary
+from armwright.proof.verification import Verification
 from armwright.runs.history import History
-from armwright.runs.results import read_summary
-from armwright.runs.verification import Verification
 from armwright.spaces.design_space import default_space
-from armwright.study import direct_search
-from armwright.study.front_run import find_front
-from armwright.study.search_budget import SearchBudget, SearchProgress, read_seconds
-from armwright.study.time_plan import ChunkSize, ResultCosts, TimePlan
+from armwright.study.front import direct_search
+from armwright.study.front.front_run import find_front
+from armwright.study.front.search_budget import SearchBudget, SearchProgress, read_seconds
+from armwright.study.front.time_plan import ChunkSize, ResultCosts, TimePlan
 from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))

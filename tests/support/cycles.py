@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from armwright.kinematics.arm_arrays import ArmArrays, carrying, stack_arms
-from armwright.kinematics.cycle_path import CyclePaths, find_paths
+from armwright.kinematics.arms.arm_arrays import ArmArrays, carrying, stack_arms
+from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths
 from armwright.robot.arm import Actuator, Arm
 from armwright.tasks.motions import CyclePlan
 from armwright.tasks.task import Task

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from armwright.kinematics.arm_arrays import ArmArrays
-from armwright.kinematics.torque_terms import inverse_dynamics_torques
+from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.cycle.torque_terms import inverse_dynamics_torques
 from tests.support.reference_kinematics import Array
 
 

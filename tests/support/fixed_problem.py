@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.cycle_path import CyclePaths
+from armwright.kinematics.cycle.cycle_path import CyclePaths
 from armwright.pareto import default_reference_point
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from Pynite import FEModel3D
 
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.compliance import Stiffness
-from armwright.kinematics.forward import forward_kinematics
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.arms.forward import forward_kinematics
+from armwright.kinematics.reach.compliance import Stiffness
 from armwright.robot.arm import GRAVITY, Arm
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ import pytest
 import uvicorn
 
 import armwright as aw
-from armwright.report import live_server as live
+from armwright.page import live_server as live
 from tests.support.command_line import PATIENCE
 
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from armwright.kinematics import ik as solve
-from armwright.kinematics.arm_arrays import FIXED, ArmArrays
-from armwright.kinematics.ik import Postures
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.ik import ik as solve
+from armwright.kinematics.ik.ik import Postures
 from tests.support import single_update
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics import ik
-from armwright.kinematics.arm_arrays import ArmArrays, Floats
-from armwright.kinematics.devices import load
+from armwright.kinematics.arms.arm_arrays import ArmArrays, Floats
+from armwright.kinematics.devices import load_kernels
+from armwright.kinematics.ik import ik
 from armwright.tasks.targets import TargetArrays
 
 
@@ -29,7 +29,7 @@ def update_once(
     # Only the target's position relative to the base matters, so each arm is moved and all share the target 0.
     shifted = replace(arms, base=np.asarray(arms.base - points, dtype=arms.precision))
     lanes = ik.LANES["cpu"]
-    wp, kernels = load(arms.precision, lanes, arms.motions, ik._kind_of(target_arrays), "cpu")
+    wp, kernels = load_kernels("ik.ik_kernels", "cpu", arms.precision, lanes, arms.motions, ik._kind_of(target_arrays))
     columns = ik._target_columns(np.zeros((1, 3)), np.zeros(1), target_arrays)
     columns_, q_last, h_last = (
         wp.array(ik._in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")

@@ -16,13 +16,13 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import RunConflictError, TaskError
+from armwright.page.page import write_report
+from armwright.page.repeat_command import repeat_command
+from armwright.pictures.solids import clipped
 from armwright.problem.objectives import CLEARANCE_QUANTITIES, CLEARANCES, FAR, OBJECTIVES, named_objectives
 from armwright.problem.problem import Problem
-from armwright.report.page import write_report
-from armwright.report.repeat_command import repeat_command
-from armwright.report.solids import clipped
+from armwright.proof.verification import verify
 from armwright.runs.folder import read_run
-from armwright.runs.verification import verify
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.obstacles import SHAPES, Box, Cylinder

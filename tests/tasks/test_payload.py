@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.arm_arrays import carrying, stack_arms
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.arms.arm_arrays import carrying, stack_arms
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.llm.prompt import load_prompt
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem

@@ -13,10 +13,10 @@ from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
 from armwright.problem.problem import Problem
 from armwright.problem.unreached_reason import unreached_reason
+from armwright.proof.verification import verify
 from armwright.robot.arm import Arm, Joint, MountedTool, uniform_link
 from armwright.rotations import rotation_from_rpy
 from armwright.runs.folder import read_config
-from armwright.runs.verification import verify
 from armwright.spaces.design_space import paper_space
 from armwright.study.study import optimize
 from armwright.tasks.targets import Target

@@ -7,9 +7,9 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.forward import joint_positions
-from armwright.kinematics.ik import solve_postures
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.arms.forward import joint_positions
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.problem import Problem
 from armwright.robot.arm import MountedTool
 from armwright.rotations import rotation_from_rpy

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import SettingsError, TaskError
-from armwright.kinematics.solve import solve
+from armwright.kinematics.ik.solve import solve
 from armwright.problem.evaluation import Evaluation, evaluate
 from armwright.problem.objectives import DEXTEROUS_VOLUME, OBJECTIVES, UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION
 from armwright.problem.problem import Outcomes, Problem

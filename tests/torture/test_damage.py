@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 
 from armwright.exceptions import ArmwrightError, RunConflictError
+from armwright.page.page import write_report
+from armwright.pictures.figures import write_figures
 from armwright.problem.problem import Problem
-from armwright.report.figures import write_figures
-from armwright.report.page import write_report
+from armwright.proof.selection import pick_from
 from armwright.runs.config import versions
 from armwright.runs.folder import read_config, read_run
-from armwright.runs.selection import pick_from
-from armwright.study.front_run import find_front
+from armwright.study.front.front_run import find_front
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task

@@ -181,7 +181,9 @@ def test_killed_study_with_model_calls_in_flight(
 
 
 # Its state is written every 5 s; here more often, so that short searches go on, too.
-OFTEN = "import armwright.study.direct_search as f; f.SAVE_SECONDS = 0.1; from armwright.cli.app import main; main()"
+OFTEN = (
+    "import armwright.study.front.direct_search as f; f.SAVE_SECONDS = 0.1; from armwright.cli.app import main; main()"
+)
 BUDGET = 30_000
 
 

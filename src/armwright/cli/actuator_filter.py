@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
+from armwright.problem.conditions import Condition, read_bound, read_condition
 from armwright.robot.actuators import UNITS, ActuatorRecord, value_of
-from armwright.runs.conditions import Condition, read_bound, read_condition
 
 VALUES = {"torque": "peak_torque"}  # options whose name is shorter than that of the value
 

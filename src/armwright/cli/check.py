@@ -150,7 +150,7 @@ def run_check(
         findings, n_samples = find_faults(problem, written, deep)
     if picture is not None:
         with activity("drawing the picture"):
-            from armwright.report.task_figure import write_task_figure
+            from armwright.pictures.task_figure import write_task_figure
 
             write_task_figure(problem, picture)
     if json_:

@@ -13,7 +13,7 @@ from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
     from armwright.robot.urdf_reader import UrdfArm
-    from armwright.runs.datasheet.sheet import DataSheet
+    from armwright.sheet.record import DataSheet
 
 
 def datasheet(
@@ -53,11 +53,11 @@ def datasheet(
     json_: Json = False,
 ) -> None:
     """Write the data sheet of a design of RUN or of an existing arm as JSON, and as HTML that prints on two pages."""
-    from armwright.report.datasheet import sheet_record, write_datasheet
+    from armwright.proof.design_folders import DESIGNS, design_name
     from armwright.robot.robot_descriptions import find_urdf
     from armwright.robot.urdf_reader import read_urdf
-    from armwright.runs.datasheet.design_sheet import design_sheet
-    from armwright.runs.design_folders import DESIGNS, design_name
+    from armwright.sheet.design_sheet import design_sheet
+    from armwright.sheet.writer import sheet_record, write_datasheet
 
     if Path(source).is_dir():
         of_urdf = {"--actuators": actuators, "--task": task, "--space": space, "--base": base, "--price": price,
@@ -97,8 +97,8 @@ def _sheet_of_urdf(
 ) -> "DataSheet":
     """Return the data sheet of an arm, in its place on a task if one is named."""
     from armwright.cli.options import load_problem
-    from armwright.experiments.base_placement import placed
-    from armwright.runs.datasheet.urdf_sheet import Job, driven, read_actuators, urdf_sheet
+    from armwright.existing.base_placement import placed
+    from armwright.sheet.urdf_sheet import Job, driven, read_actuators, urdf_sheet
 
     named = {} if actuators is None else read_actuators(actuators, described.joints)
     described, stated = driven(described, named), None if price is None else parse_price(price)

@@ -60,9 +60,9 @@ def experiment(
     from armwright.experiments import outcome, plan
     from armwright.experiments import runner as running
     from armwright.experiments.cells import plan_cells
+    from armwright.experiments.tables import write_tables
     from armwright.llm.configuration import load_model_options
-    from armwright.report.comparison_figures import write_experiment_figures
-    from armwright.report.tables import write_tables
+    from armwright.pictures.comparison_figures import write_experiment_figures
 
     if print_:
         print_text(plan.builtin_text(name), end="")
@@ -128,8 +128,8 @@ def compare(
     from armwright.cli.show_comparisons import show_comparison, show_files
     from armwright.experiments.compare_runs import compare_summaries
     from armwright.experiments.run_list import read_finished_runs
-    from armwright.report.table_records import row_records
-    from armwright.report.tables import comparison_record, write_tables
+    from armwright.experiments.table_records import row_records
+    from armwright.experiments.tables import comparison_record, write_tables
 
     console = open_console(check_formats(json_, csv_))
     with activity("comparing the runs"):
@@ -147,7 +147,7 @@ def compare(
         tables = write_tables(out, comparison, title, notes=notes)
         drawn: list[Path] = []
         if figures:
-            from armwright.report.comparison_figures import write_comparison_figures
+            from armwright.pictures.comparison_figures import write_comparison_figures
 
             with activity("drawing the figures"):
                 drawn = write_comparison_figures(out, comparison)
@@ -183,7 +183,7 @@ def compare_arms(
 ) -> None:
     """Evaluate existing arms on TASK, and compare them with the designs of a run."""
     from armwright.cli.show_comparisons import arm_rows, show_arms
-    from armwright.experiments.compare_arms import compare_arms, comparison_record
+    from armwright.existing.compare_arms import compare_arms, comparison_record
     from armwright.spaces.design_space import load_space
 
     check_formats(json_, csv_)
@@ -201,8 +201,8 @@ def compare_arms(
         )
     drawn: list[Path] = []
     if run is not None and figures:
-        from armwright.report.figures import write_figures
-        from armwright.report.page import write_report
+        from armwright.page.page import write_report
+        from armwright.pictures.figures import write_figures
 
         with activity("drawing the page and the figures"):
             drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]

@@ -113,7 +113,7 @@ def tasks(
     """List the built-in tasks, or describe the tasks given."""
     from armwright.cli.show_inputs import show_task, show_tasks, task_rows
     from armwright.experiments.baselines import baselines_of
-    from armwright.runs.front_gap import best_known_hypervolume
+    from armwright.proof.front_gap import best_known_hypervolume
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
     check_formats(json_, csv_)

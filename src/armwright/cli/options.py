@@ -8,7 +8,7 @@ import typer
 
 if TYPE_CHECKING:
     from armwright.problem.problem import Problem
-    from armwright.study.cluster import Workers
+    from armwright.study.workers.cluster import Workers
 
 # Groups of options in `--help`
 TASK, SEARCH, MODEL = "Task", "Search", "Language model"
@@ -170,7 +170,7 @@ def load_problem(
 
 def select_workers(n_workers: int | None, scheduler: str | None) -> "Workers | None":
     """Return the workers of --workers and --scheduler; None to evaluate in this process."""
-    from armwright.study.cluster import Workers
+    from armwright.study.workers.cluster import Workers
 
     if not n_workers and not scheduler:
         return None

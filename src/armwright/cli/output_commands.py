@@ -41,8 +41,8 @@ def pick(
 ) -> None:
     """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee."""
     from armwright.cli.show_picked import picked_records, picked_rows, show_picked, show_picked_table
-    from armwright.runs.conditions import read_condition, read_weights
-    from armwright.runs.selection import pick_from, survival_of
+    from armwright.problem.conditions import read_condition, read_weights
+    from armwright.proof.selection import pick_from, survival_of
 
     check_formats(json_, csv_)
     if n < 1:
@@ -87,10 +87,10 @@ def export(
 
     Any design of the run can be exported, not only those of the front.
     """
-    from armwright.runs.export import OPTUNA, export_design
+    from armwright.proof.export import OPTUNA, export_design
 
     if format_ == OPTUNA:
-        from armwright.runs.optuna_export import export_study
+        from armwright.study.optuna_export import export_study
 
         if design is not None:
             raise SettingsError(f"--design {design} does not go with --format optuna, which exports the whole run")
@@ -112,7 +112,7 @@ def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
 ) -> None:
     """Write report.html into each RUN: one file for any browser, without a network."""
-    from armwright.report.page import write_report
+    from armwright.page.page import write_report
 
     for run in runs:
         with activity(f"writing the page of {run}"):
@@ -129,7 +129,7 @@ def live(
     follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
 ) -> None:
     """Serve the live page of RUN to browsers on this machine until Ctrl-C."""
-    from armwright.report.live_server import serve
+    from armwright.page.live_server import serve
     from armwright.runs.folder import read_config
 
     if not follow:

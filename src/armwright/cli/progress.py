@@ -11,9 +11,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Column
 
 from armwright.kinematics.devices import compilation
-from armwright.report.style import look
+from armwright.runs.history import source_label
+from armwright.study.front.search_budget import SearchProgress
 from armwright.study.progress import Progress as StudyProgress
-from armwright.study.search_budget import SearchProgress
 
 LINE_INTERVAL = 10  # counted trials between two plain lines of a study
 VERIFYING = "verifying"  # after the hypervolume, in place of the rest of the state, which a narrow terminal would cut
@@ -34,8 +34,8 @@ def study_progress(console: Console) -> Generator[Callable[[StudyProgress], None
             if progress.note:
                 console.print(_note(progress))
             if progress.reason and progress.source != "rules":  # the rules are explained in the report
-                console.print(f"trial {progress.number}, {look(progress.source).label}: {progress.reason}")
-            source, done = look(progress.source).label, progress.iteration
+                console.print(f"trial {progress.number}, {source_label(progress.source)}: {progress.reason}")
+            source, done = source_label(progress.source), progress.iteration
             volume = _volume(progress.hypervolume)
             new = {kind: text for kind, text in progress.latest_failures.items() if shown.get(kind) != text}
             if new.keys() - shown.keys() or (new and progress.iteration >= due):

@@ -15,7 +15,7 @@ from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
     from armwright.arrays import Array
-    from armwright.kinematics.reach_map import ReachMap
+    from armwright.kinematics.reach.reach_map import ReachMap
     from armwright.robot.arm import Arm
     from armwright.robot.urdf_reader import UrdfArm
     from armwright.tasks.task import Task
@@ -93,11 +93,11 @@ def reach_map(
     json_: Json = False,
 ) -> None:
     """Map in which directions an arm can hold its tool at each point of a grid."""
-    from armwright.kinematics.reach_map import reach_map
-    from armwright.report.page import write_report
-    from armwright.report.page_reach_maps import MOST_POINTS, fingerprint
-    from armwright.report.reach_figure import write_reach_figure
-    from armwright.runs.results import read_summary
+    from armwright.kinematics.reach.reach_map import reach_map
+    from armwright.page.page import write_report
+    from armwright.page.reach_maps import MOST_POINTS, fingerprint
+    from armwright.pictures.reach_figure import write_reach_figure
+    from armwright.proof.results import read_summary
 
     if not 0.0 < share <= 1.0:
         raise SettingsError(f"--share {share}: expected more than 0 and at most 1")
@@ -154,10 +154,10 @@ def reach_map(
 
 def _subject(source: str, design: int | None, tip: str | None, task: str | None) -> _Subject:
     """Return the arm of a run or of a URDF."""
+    from armwright.proof.selection import pick
     from armwright.robot.robot_descriptions import find_urdf
     from armwright.robot.urdf_reader import read_urdf
     from armwright.runs.folder import REACH_MAPS, read_run
-    from armwright.runs.selection import pick
     from armwright.tasks.catalogue import load_task
 
     if not Path(source).is_dir():
@@ -180,7 +180,7 @@ def _subject(source: str, design: int | None, tip: str | None, task: str | None)
 
 
 def _surroundings(subject: _Subject, conditions: str) -> Any:
-    from armwright.report.reach_figure import Surroundings
+    from armwright.pictures.reach_figure import Surroundings
 
     task = subject.task
     targets = None if task is None else task.target_positions

@@ -75,9 +75,9 @@ def design(
     from armwright.cli.progress import announce_compilation, search_progress
     from armwright.cli.show_results import show_search
     from armwright.proposers.factory import choose_proposer
-    from armwright.study.front_run import find_front
-    from armwright.study.search_budget import SearchBudget
-    from armwright.study.time_plan import TimePlan
+    from armwright.study.front.front_run import find_front
+    from armwright.study.front.search_budget import SearchBudget
+    from armwright.study.front.time_plan import TimePlan
 
     if from_ is not None and proposer is not None:
         raise SettingsError("--from and --proposer both set the initial designs; use one of them")
@@ -221,7 +221,7 @@ def optimize(
         console.print(note)
     check_before_search(console, problem, check_files(task, space), folder)
     if live:
-        from armwright.report.live_server import start_server
+        from armwright.page.live_server import start_server
 
         console.print(f"live: {start_server(folder)}")
     try:
@@ -273,10 +273,10 @@ def optimize(
 
 def _draw(folder: Path) -> list[Path]:
     """Return the figures of a finished run; draw them and the page if they are missing."""
-    from armwright.report.figures import write_figures
-    from armwright.report.page import write_report
+    from armwright.page.page import write_report
+    from armwright.pictures.figures import write_figures
+    from armwright.proof.results import FIGURES, REPORT
     from armwright.runs.folder import RunFolder
-    from armwright.runs.results import FIGURES, REPORT
 
     with activity("drawing the page and the figures"), RunFolder(folder):
         existing = sorted((folder / FIGURES).glob("*.png"))

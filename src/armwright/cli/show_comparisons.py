@@ -10,19 +10,19 @@ from rich.console import Console
 from armwright.cli.notes import payload_note
 from armwright.cli.streams import list_files
 from armwright.cli.tables import Column, Table, numbers, print_table
+from armwright.existing.compare_arms import MEASURES, ArmComparison, ComparedArm
 from armwright.experiments.cells import Cell, Skipped
-from armwright.experiments.compare_arms import MEASURES, ArmComparison, ComparedArm
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
 from armwright.experiments.runner import CellOutcome
+from armwright.experiments.table_cells import remarks_on
+from armwright.experiments.tables import markdown, sections
 from armwright.extras import install_command, missing_packages
 from armwright.llm.servers import describe_server
 from armwright.problem.objectives import TORQUE_SCALE
-from armwright.report.table_cells import remarks_on
-from armwright.report.tables import markdown, sections
 from armwright.robot.mounting import Mounting
-from armwright.runs.datasheet.sheet import NOT_MODELLED
-from armwright.study.cluster import Workers
+from armwright.sheet.record import NOT_MODELLED
+from armwright.study.workers.cluster import Workers
 from armwright.tasks.moments import MAX_MASS
 
 

@@ -11,14 +11,13 @@ from rich.text import Text
 from armwright.cli.show_results import format_value
 from armwright.cli.streams import format_point, print_named
 from armwright.cli.tables import Column, Table, numbers, print_table
+from armwright.problem.assumptions import assumed_values, count_assumed
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import QUANTITIES, TORQUE, TORQUE_SCALE
-from armwright.report.style import look
-from armwright.runs.assumptions import assumed_values, count_assumed
-from armwright.runs.history import FrontMember, History
-from armwright.runs.path_report import describe_extremes, path_record
-from armwright.runs.selection import quantities_of_front
-from armwright.runs.supply_record import supply_of
+from armwright.problem.supply import supply_of
+from armwright.proof.cycle_faults import describe_extremes, path_record
+from armwright.proof.selection import quantities_of_front
+from armwright.runs.history import FrontMember, History, source_label
 from armwright.spaces.custom_parameters import describe_custom
 from armwright.spaces.parameters import CategoricalParameter
 
@@ -70,7 +69,7 @@ def show_picked_table(console: Console, history: History, picked: Sequence[Front
     rows = [
         [
             str(member.number),
-            look(member.source).label,
+            source_label(member.source),
             *(format_value(quantities[member.number][name]) for name in minimised),
             *(f"{quantities[member.number][name]:.4g}" for name in further),
             member.design.joints,
@@ -111,7 +110,7 @@ def show_picked(
     for member in picked[:most]:
         values = ", ".join(map(_format_objective, history.problem.objectives, member.values))
         links = ", ".join(f"{length:.3f}" for length in member.design.links)
-        print_named(console, f"#{member.number}", f" ({look(member.source).label}): {values}")
+        print_named(console, f"#{member.number}", f" ({source_label(member.source)}): {values}")
         motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
         tubes = f", tubes {', '.join(member.design.tubes)}" if member.design.tubes else ""
         base = format_point([round(value, 3) for value in member.design.origin])

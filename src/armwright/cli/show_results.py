@@ -11,17 +11,16 @@ from rich.console import Console
 from armwright.cli.notes import payload_note, unused_parts
 from armwright.cli.streams import list_files
 from armwright.cli.tables import Column, Table, numbers, print_table
+from armwright.problem.assumptions import count_assumed
 from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
-from armwright.report.style import look
-from armwright.runs.assumptions import count_assumed
-from armwright.runs.history import History
-from armwright.runs.infeasibility import describe_infeasibility
-from armwright.runs.results import REPORT
+from armwright.proof.infeasibility import describe_infeasibility
+from armwright.proof.results import REPORT
+from armwright.runs.history import History, source_label
 from armwright.spaces.custom_parameters import describe_custom
-from armwright.study.direct_search import FrontRun
+from armwright.study.front.direct_search import FrontRun
+from armwright.study.front.time_plan import MAX_DESIGNS
 from armwright.study.progress import StudyResult
-from armwright.study.time_plan import MAX_DESIGNS
 
 SHORT_NAMES = {POSITION_ERROR: "error [m]", TORQUE: "torque"}
 MAX_ROWS = 16  # of the front; front.csv has all
@@ -36,7 +35,7 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
     _show_hypervolume(console, history, summary, "more trials")
     n_infeasible = int((~history.feasible & ~history.failed).sum())
     infeasible = f", {n_infeasible} infeasible" if problem.constraints else ""
-    sources = ", ".join(f"{count} {look(source).label}" for source, count in summary["by_source"].items())
+    sources = ", ".join(f"{count} {source_label(source)}" for source, count in summary["by_source"].items())
     seconds = summary["seconds"]
     parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
     console.print(f"{summary['n_trials']} trials{infeasible}: {sources}; {seconds['total']:.1f} s ({parts})")
@@ -221,7 +220,7 @@ def _front_table(history: History, robust: set[int] | None) -> Table:
     rows = [
         [
             str(member.number),
-            look(member.source).label,
+            source_label(member.source),
             *(() if robust is None else ("robust" if member.number in robust else "sensitive",)),
             *map(format_value, member.values),
             member.design.joints,
@@ -251,7 +250,7 @@ def _attribution_table(attribution: dict[str, dict[str, Any]]) -> Table:
     """Return a table of trials and gained hypervolume by source; useful only with a proposer."""
     rows = [
         [
-            look(source).label,
+            source_label(source),
             str(share["trials"]),
             str(share["front"]),
             "-" if share["hypervolume_gained"] is None else f"{share['hypervolume_gained']:.3f}",

@@ -20,8 +20,8 @@ _SHOW_CURSOR = "\x1b[?25h"  # progress lines hide it
 # What a command may wait for, by the module that waits.
 _WAITS = {
     "armwright.problem.evaluators": "the evaluator",
-    "armwright.study.cluster": "the workers",
-    "armwright.study.evaluation_process": "the process of the evaluator",
+    "armwright.study.workers.cluster": "the workers",
+    "armwright.study.workers.evaluation_process": "the process of the evaluator",
     "armwright.llm": "the language model",
     "warp": "the kernels",
     "optuna": "the sampler",

@@ -15,8 +15,8 @@ from armwright.exceptions import SettingsError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from armwright.runs.simulated_run import Simulator
-    from armwright.runs.simulation import SimulatedDesign
+    from armwright.proof.simulated_run import Simulator
+    from armwright.proof.simulation import SimulatedDesign
 
 
 def simulate(
@@ -33,12 +33,12 @@ def simulate(
     """
     import json
 
-    from armwright.report.simulation_figure import write_simulation_figure
+    from armwright.pictures.simulation_figure import write_simulation_figure
+    from armwright.proof.results import SUMMARY, read_summary
+    from armwright.proof.simulated_run import Simulator
+    from armwright.proof.simulation_files import SIMULATION, simulation_record, write_simulated
     from armwright.runs.folder import RunFolder as Folder
     from armwright.runs.folder import read_run
-    from armwright.runs.results import SUMMARY, read_summary
-    from armwright.runs.simulated_run import Simulator
-    from armwright.runs.simulation_files import SIMULATION, simulation_record, write_simulated
 
     check_formats(json_, csv_)
     if (design is not None) + recommended + all_ > 1:
@@ -75,7 +75,7 @@ def _simulate_chosen(simulator: "Simulator", design: int | None, every: bool) ->
     """Simulate the chosen designs; return the recommended ones if those were chosen."""
     from pydantic_core import to_jsonable_python
 
-    from armwright.runs.recommendation import recommend
+    from armwright.proof.recommendation import recommend
 
     if design is None and not every:
         return to_jsonable_python(recommend(simulator.history, simulator))
@@ -103,8 +103,8 @@ def _show(
     console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: Sequence[dict[str, Any]]
 ) -> None:
     from armwright.cli.show_results import show_recommended
-    from armwright.runs.design_folders import DESIGNS
-    from armwright.runs.simulation import PASS, mujoco_version
+    from armwright.proof.design_folders import DESIGNS
+    from armwright.proof.simulation import PASS, mujoco_version
 
     if not results:
         console.print(f"nothing to simulate: {run} has no feasible design")

@@ -34,8 +34,8 @@ from armwright.editor.edited_files import MAX_BYTES, ChangedOnDiskError, EditedF
 from armwright.editor.editor_page import editor_shell
 from armwright.editor.yaml_edits import Edit, edit_text
 from armwright.exceptions import ArmwrightError, SpaceError, TaskError
-from armwright.report.live_app import LivePage, OpenPages, show_shell
-from armwright.report.request_guard import read_request
+from armwright.page.live_app import LivePage, OpenPages, show_shell
+from armwright.page.request_guard import read_request
 from armwright.tasks.points_file import parse_points
 from armwright.tasks.task import Task
 from armwright.yaml_documents import parse_document

@@ -2,7 +2,7 @@
 
 from importlib import resources
 
-from armwright.report.page_assembly import SHARED, PageSource, assemble
+from armwright.page.assembly import SHARED, PageSource, assemble
 
 EDITOR = PageSource(
     template="editor.html",

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from armwright.editor.edited_files import EditedFiles
 from armwright.extras import check_extra
-from armwright.report.live_server import LOOPBACK, serve_app
+from armwright.page.live_server import LOOPBACK, serve_app
 
 
 def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0, opens_browser: bool = False) -> None:
@@ -26,7 +26,7 @@ def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0,
     """
     check_extra("live", "the editor")
     from armwright.editor.app import SHELLS, editor_app
-    from armwright.report.live_app import OpenPages
+    from armwright.page.live_app import OpenPages
 
     pages = OpenPages()
     with TemporaryDirectory(prefix="armwright-") as private:

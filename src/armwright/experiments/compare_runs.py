@@ -11,9 +11,9 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.experiments.run_list import read_finished_runs
-from armwright.experiments.run_summary import RunSummary
+from armwright.experiments.run_record import RunSummary
 from armwright.experiments.statistics import Interval, PairedTest, can_reject, holm, interval, paired_test
-from armwright.runs.front_gap import known_front
+from armwright.proof.front_gap import known_front
 
 LEVELS = (0.5, 0.75, 0.9, 0.95)  # shares of the best known hypervolume, for times to target
 

@@ -10,9 +10,9 @@ from armwright.exceptions import FailureError
 from armwright.experiments.cells import Cell
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.plan import ExperimentPlan
-from armwright.experiments.run_summary import read_run_summary
+from armwright.experiments.run_record import read_run_summary
 from armwright.files import check_no_links, naming_write_errors, replace_file
-from armwright.runs.results import read_summary
+from armwright.proof.results import read_summary
 
 PLAN = "experiment.yaml"  # in the experiment's folder
 

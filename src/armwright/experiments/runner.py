@@ -14,16 +14,16 @@ from armwright.extras import missing_packages
 from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
+from armwright.proof.results import read_summary
 from armwright.runs.config import check_same_run
 from armwright.runs.folder import read_config
-from armwright.runs.results import read_summary
 from armwright.search.samplers import sampler_factory, sampler_for
 from armwright.spaces.design_space import default_space, load_space
 from armwright.spaces.tolerance import TOLERANCE
-from armwright.study.cluster import MAX_LOSSES, Cluster, Finished, Workers
-from armwright.study.front_run import find_front
+from armwright.study.front.front_run import find_front
 from armwright.study.settings import run_config, study_method
 from armwright.study.study import optimize
+from armwright.study.workers.cluster import MAX_LOSSES, Cluster, Finished, Workers
 from armwright.tasks.catalogue import load_task
 
 POLL = 1.0  # [s] between two checks of the cluster

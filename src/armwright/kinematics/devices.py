@@ -3,13 +3,13 @@
 import os
 import threading
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import cache
+from importlib import import_module
 from typing import Any, Literal, cast, get_args
 
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.kinematics.arm_arrays import Motions, Precision, TargetKind
 from armwright.kinematics.kernel_cache import init_warp, make_cache_writable, report_cache_errors
 
 Device = Literal["cpu", "cuda"]
@@ -78,40 +78,16 @@ def find_cache() -> None:
         _warp()
 
 
-def load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> tuple[Any, Any]:
-    """Return Warp and one variant of the kernels, compiled and loaded on a device, so that threads only launch."""
+def load_kernels(name: str, device: Device, *variant: Hashable) -> tuple[Any, Any]:
+    """Return Warp and one variant of kernels, compiled and loaded on a device, so that threads only launch.
+
+    Args:
+        name: A module of this package, such as `ik.ik_kernels`; its function of the same name makes the variant.
+        device: Where they run.
+        variant: The arguments of that function.
+    """
     with _loading:
-        return _warp(), _load(precision, lanes, motions, kind, device)
-
-
-def load_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
-    """Return Warp and one variant of the clearance kernels."""
-    with _loading:
-        return _warp(), _load_clearance(precision, device)
-
-
-def load_motor_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
-    """Return Warp and one variant of the kernels of clearance for the bodies of actuators."""
-    with _loading:
-        return _warp(), _load_motor_clearance(precision, device)
-
-
-def load_column_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
-    """Return Warp and one variant of the kernels of clearance for columns."""
-    with _loading:
-        return _warp(), _load_column_clearance(precision, device)
-
-
-def load_path(device: Device) -> tuple[Any, Any]:
-    """Return Warp and the kernels along lines."""
-    with _loading:
-        return _warp(), _load_path(device)
-
-
-def load_dynamics(device: Device) -> tuple[Any, Any]:
-    """Return Warp and the kernel of inverse dynamics."""
-    with _loading:
-        return _warp(), _load_dynamics(device)
+        return _warp(), _kernels(name, device, *variant)
 
 
 def _has_cuda() -> bool:
@@ -130,71 +106,20 @@ def _warp() -> Any:
 
 
 @cache
-def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> Any:
+def _kernels(name: str, device: Device, *variant: Hashable) -> Any:
     with report_cache_errors():
-        from armwright.kinematics.ik_kernels import ik_kernels
-
-        kernels = ik_kernels(precision, lanes, motions, kind)
-        _load_modules((kernels.solve_ik, kernels.static_torque), device)
-    return kernels
-
-
-@cache
-def _load_clearance(precision: Precision, device: Device) -> Any:
-    with report_cache_errors():
-        from armwright.kinematics.clearance_kernels import clearance_kernels
-
-        kernels = clearance_kernels(precision)
-        _load_modules((kernels.link_axes, kernels.self_clearance, kernels.obstacle_clearance), device)
-    return kernels
+        made: Any = getattr(import_module(f"{__package__}.{name}"), name.rpartition(".")[2])(*variant)
+        parts: dict[str, Any] = vars(made)
+        _load_modules([part.module for part in parts.values() if hasattr(part, "adj")], device)  # of kernels
+    return made
 
 
-@cache
-def _load_motor_clearance(precision: Precision, device: Device) -> Any:
-    with report_cache_errors():
-        from armwright.kinematics.motor_kernels import motor_kernels
-
-        kernels = motor_kernels(precision)
-        _load_modules((kernels.motor_frames, kernels.self_clearance, kernels.obstacle_clearance), device)
-    return kernels
-
-
-@cache
-def _load_column_clearance(precision: Precision, device: Device) -> Any:
-    with report_cache_errors():
-        from armwright.kinematics.column_kernels import column_kernels
-
-        kernels = column_kernels(precision)
-        _load_modules((kernels.link_clearance, kernels.motor_clearance), device)
-    return kernels
-
-
-@cache
-def _load_path(device: Device) -> Any:
-    with report_cache_errors():
-        from armwright.kinematics.path_kernels import path_kernels
-
-        kernels = path_kernels()
-        _load_modules((kernels.follow, kernels.tool_errors), device)
-    return kernels
-
-
-@cache
-def _load_dynamics(device: Device) -> Any:
-    with report_cache_errors():
-        from armwright.kinematics.dynamics_kernels import dynamics_kernels
-
-        kernels = dynamics_kernels()
-        _load_modules((kernels.torque_terms,), device)
-    return kernels
-
-
-def _load_modules(kernels: Sequence[Any], device: Device) -> None:
-    """Load the modules of kernels on a device; compile those that are not in the cache."""
+def _load_modules(modules: Sequence[Any], device: Device) -> None:
+    """Load modules of kernels on a device; compile those that are not in the cache."""
     # Warp launches with this size on the CPU. Modules of another size would have to be compiled again.
     block_dim = 1 if device == "cpu" else None
     warp = _warp()
-    for module in (kernel.module for kernel in kernels):
+    for module in modules:
         folder = os.path.join(str(warp.config.kernel_cache_dir), module.get_module_identifier(block_dim))
         is_cached = os.path.exists(folder)
         if not is_cached:

@@ -37,7 +37,7 @@ from armwright.llm.session import LlmSession
 from armwright.llm.transcript import Transcript
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
-from armwright.runs.summary import ProposerSummary
+from armwright.proof.summary_file import ProposerSummary
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.catalogue import builtin_names
 from armwright.tasks.task import Task

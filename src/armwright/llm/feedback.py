@@ -12,8 +12,8 @@ from armwright.llm.answer import MAX_REASON_LENGTH
 from armwright.llm.answer_format import NOTHING, SINGLE, module_lists
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import AT_LIMIT, unreached_reason
+from armwright.proof.attribution import hypervolume_gains
 from armwright.robot.arm import GRAVITY
-from armwright.runs.attribution import hypervolume_gains
 from armwright.runs.history import BBO, History
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.design_space import DesignSpace

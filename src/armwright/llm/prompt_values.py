@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from armwright.kinematics.ik import UPDATES
+from armwright.kinematics.ik.ik import UPDATES
 from armwright.llm.answer_format import SINGLE, module_lists
 from armwright.llm.feedback import MAX_PROPOSED, MIN_PROPOSED, Feedback, Record, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions

@@ -22,7 +22,7 @@ from armwright.llm.backend import (
 from armwright.llm.budget import CallBudget
 from armwright.llm.conversation import Conversation, conversation, new_part
 from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, output_mode_of, total_cost
-from armwright.runs.summary import ProposerSummary
+from armwright.proof.summary_file import ProposerSummary
 
 UNBILLED = ("missing", "cancelled")  # faults of calls that cost nothing unless a request was answered
 

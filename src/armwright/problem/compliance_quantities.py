@@ -4,15 +4,15 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.kinematics.arm_arrays import ArmArrays
-from armwright.kinematics.compliance import (
+from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.reach.compliance import (
     Stiffness,
     backlash_errors,
     own_loads,
     tip_displacements,
     unit_payload,
 )
-from armwright.kinematics.payload_limits import payload_limits, torques_by_payload
+from armwright.kinematics.reach.payload_limits import payload_limits, torques_by_payload
 from armwright.problem.drive_quantities import require_ratings
 from armwright.problem.evaluation import Evaluation
 from armwright.tasks.moments import MAX_MASS

@@ -6,8 +6,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.kinematics.arm_arrays import ArmArrays
-from armwright.kinematics.reachable_poses import PoseSearch, PostureConditions, Tolerances, sample_postures
+from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.reach.reachable_poses import PoseSearch, PostureConditions, Tolerances, sample_postures
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.targets import ALIGNED, REACHED
 from armwright.tasks.workspace import Region, sample_regions

@@ -7,9 +7,9 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.kinematics.actuation import Actuation
-from armwright.kinematics.drive_limits import torque_speed_utilisation
-from armwright.kinematics.supply import SupplyCurrents
+from armwright.kinematics.arms.actuation import Actuation
+from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
+from armwright.kinematics.cycle.supply import SupplyCurrents
 from armwright.problem.evaluation import Evaluation
 from armwright.robot.actuators import UNITS
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arm_arrays import ArmArrays
+from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.objectives import (
     JOINTS,

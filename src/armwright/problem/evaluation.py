@@ -9,17 +9,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
-from armwright.kinematics.arm_arrays import ArmArrays, carrying, stack_arms
-from armwright.kinematics.clearance import clearances, straight_motor_clearance
-from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads, holding_torques
-from armwright.kinematics.cycle_path import CyclePaths, find_paths, rough_paths
+from armwright.kinematics.arms.arm_arrays import ArmArrays, carrying, stack_arms
+from armwright.kinematics.arms.forward import Frames, forward_kinematics
+from armwright.kinematics.arms.jacobian import jacobian_of
+from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
+from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_loads, holding_torques
+from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths, rough_paths
+from armwright.kinematics.cycle.supply import SupplyCurrents, supply_currents
+from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
-from armwright.kinematics.forward import Frames, forward_kinematics
-from armwright.kinematics.ik import UPDATES, Postures, solve_postures
-from armwright.kinematics.jacobian import jacobian_of
-from armwright.kinematics.restarts import nearer_postures, random_starts
-from armwright.kinematics.supply import SupplyCurrents, supply_currents
-from armwright.kinematics.torque_terms import TorqueTerms, inertia_matrices, torque_terms
+from armwright.kinematics.ik.ik import UPDATES, Postures, solve_postures
+from armwright.kinematics.ik.restarts import nearer_postures, random_starts
 from armwright.problem.dexterous_volume import dexterous_volumes
 from armwright.robot.arm import Arm
 from armwright.spaces.tool_mount import carrying_tool

@@ -6,7 +6,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.kinematics.arm_arrays import FIXED
+from armwright.kinematics.arms.arm_arrays import FIXED
 from armwright.problem import compliance_quantities as compliance
 from armwright.problem import drive_quantities as drives
 from armwright.problem.evaluation import CYCLE_GAP, Evaluation

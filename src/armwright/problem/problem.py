@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError, did_you_mean
-from armwright.kinematics.arm_arrays import ArmArrays, Precision
+from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints

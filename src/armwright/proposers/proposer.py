@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from armwright.problem.problem import Problem
+from armwright.proof.summary_file import ProposerSummary
 from armwright.runs.history import History
-from armwright.runs.summary import ProposerSummary
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
 

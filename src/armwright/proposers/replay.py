@@ -15,13 +15,13 @@ from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording_file import find_recording, shipped_recordings
 from armwright.llm.replay_backend import ReplayBackend
 from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Call, Transcript, hints_of, last_call
+from armwright.proof.summary_file import ProposerSummary
 from armwright.proposers.prompted import PromptedProposer
 from armwright.proposers.proposer import Proposal
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Hint
 from armwright.runs.folder import CONFIG, read_config, read_run
 from armwright.runs.history import History
-from armwright.runs.summary import ProposerSummary
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.trials_file import TRIALS
 from armwright.yaml_documents import check_document

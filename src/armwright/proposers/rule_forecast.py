@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arm_arrays import PRISMATIC, carrying
+from armwright.kinematics.arms.arm_arrays import PRISMATIC, carrying
 from armwright.problem.objectives import TORQUE_SCALE
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY

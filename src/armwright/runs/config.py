@@ -88,7 +88,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
 
 
 class FrontMethod(BaseModel, frozen=True, extra="forbid"):
-    """The search settings of a direct search (study/front_run.py): its initial designs."""
+    """The search settings of a direct search (study/front/front_run.py): its initial designs."""
 
     search: Literal["front_search"] = "front_search"
     initial_designs: dict[str, Any] | None = None

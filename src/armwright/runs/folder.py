@@ -4,8 +4,8 @@
     trials.jsonl       one line per finished trial, written before the next begins
     transcripts.jsonl  every call to a language model (llm/transcript.py)
     control.json, status.json  channel between a running study and its watchers (control.py)
-    search.npz, proposals/  state and initial designs of a direct search (study/front_run.py)
-    trials.csv, front.csv, summary.json, designs/NNNN/ (results.py), and figures/ (report/figures.py)
+    search.npz, proposals/  state and initial designs of a direct search (study/front/front_run.py)
+    trials.csv, front.csv, summary.json, designs/NNNN/ (results.py), and figures/ (pictures/figures.py)
 
 The files of the last line are derived from the finished trials and can be written again.
 """

@@ -32,9 +32,21 @@ BBO = "bbo"
 INITIAL_DESIGN = "initial_design"  # of the user, such as an existing arm
 FRONT_SEARCH = "front_search"
 NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, FRONT_SEARCH)
+_LABELS = {  # of sources, where they differ from the name
+    BBO: "black box",
+    INITIAL_DESIGN: "initial design",
+    FRONT_SEARCH: "front search",
+    "llm": "language model",
+    "scripted": "scripted stand-in",
+}
 FEW = 5  # successful trials that a reference point is chosen from
 # Properties that a longer history extends.
 CACHED = ("values", "violations", "masked_objectives", "front", "proposed", "_hypervolumes", "_first_of")
+
+
+def source_label(source: str) -> str:
+    """Return how tables and figures call a source of trials."""
+    return _LABELS.get(source, source)
 
 
 @dataclass(frozen=True)

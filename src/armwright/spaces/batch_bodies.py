@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.kinematics.arm_arrays import FIXED, PRISMATIC
-from armwright.kinematics.motor_bodies import body_values, without_bodies
+from armwright.kinematics.arms.arm_arrays import FIXED, PRISMATIC
+from armwright.kinematics.arms.motor_bodies import body_values, without_bodies
 from armwright.robot.arm import AXES
 from armwright.robot.motor_body import placed_body
 from armwright.spaces.joint_modules import DIRECTIONS, MOUNTS, mounted_body

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.actuation import FIXED_RATINGS, actuation_at_joints, ratings_of
-from armwright.kinematics.arm_arrays import (
+from armwright.kinematics.arms.actuation import FIXED_RATINGS, actuation_at_joints, ratings_of
+from armwright.kinematics.arms.arm_arrays import (
     FIXED,
     PRISMATIC,
     ArmArrays,
@@ -22,9 +22,9 @@ from armwright.kinematics.arm_arrays import (
     round_down,
     stack_tools,
 )
-from armwright.kinematics.columns import Columns, columns_of
-from armwright.kinematics.motor_bodies import MotorBodies, bodies_in
-from armwright.kinematics.rigid_bodies import Bodies, Tools
+from armwright.kinematics.arms.columns import Columns, columns_of
+from armwright.kinematics.arms.motor_bodies import MotorBodies, bodies_in
+from armwright.kinematics.arms.rigid_bodies import Bodies, Tools
 from armwright.robot.arm import AXES
 from armwright.spaces.batch_bodies import motor_body_values
 from armwright.spaces.design_space import DesignSpace

@@ -5,8 +5,8 @@ from typing import Any
 
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
-from armwright.study.evaluation_backend import Evaluated
 from armwright.study.proposal_requests import ProposalSlot
+from armwright.study.workers.evaluation_backend import Evaluated
 
 
 @dataclass

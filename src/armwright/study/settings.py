@@ -15,7 +15,7 @@ from armwright.runs.config import FrontMethod, Method, RunConfig, record_objecti
 from armwright.search.samplers import SamplerFactory, sampler_name
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
-from armwright.study.cluster import Workers
+from armwright.study.workers.cluster import Workers
 
 MAX_INTEGER = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")

@@ -18,28 +18,18 @@ from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.evaluators import evaluator_error
 from armwright.problem.problem import Outcome, Problem
+from armwright.proof.results import complete_summary, discard_results, summarize, write_results
+from armwright.proof.verification import verify_front
 from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
-from armwright.runs.results import complete_summary, discard_results, summarize, write_results
-from armwright.runs.verification import verify_front
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for
 from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
-from armwright.study.cluster import Workers
-from armwright.study.dask_backend import DaskBackend
-from armwright.study.evaluation_backend import (
-    Evaluated,
-    EvaluationBackend,
-    InProcessBackend,
-    ProcessBackend,
-    describe_design,
-)
-from armwright.study.failure_watch import FailureWatch
 from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.pending_trial import PendingTrial, new_trial
 from armwright.study.progress import Activity, Progress, StudyResult
@@ -47,6 +37,16 @@ from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, pa
 from armwright.study.sampler_advice import sampler_advice
 from armwright.study.schedule import ReplaySchedule, Schedule
 from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, run_config, study_method
+from armwright.study.workers.cluster import Workers
+from armwright.study.workers.dask_backend import DaskBackend
+from armwright.study.workers.evaluation_backend import (
+    Evaluated,
+    EvaluationBackend,
+    InProcessBackend,
+    ProcessBackend,
+    describe_design,
+)
+from armwright.study.workers.failure_watch import FailureWatch
 
 POLL_SECONDS = 0.1  # between two checks for requests of the watcher while the study waits
 
@@ -88,7 +88,7 @@ def optimize(
         screen: whether the surrogate decides which proposals are evaluated; the sampler replaces the others.
         on_model_failure: if the model fails before the first trial, "stop" raises ModelError, and "continue" runs
             black-box trials only. A run that has started always continues.
-        verify: whether the final front is verified (`runs/verification.py`); never with an evaluator.
+        verify: whether the final front is verified (`proof/verification.py`); never with an evaluator.
         workers: processes that evaluate the designs; None: this process.
         evaluation_timeout: ends a call of the custom evaluator after so many seconds; the design is infeasible then.
         allow_failures: whether the run goes on if its first five evaluations all fail with the same exception.

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import armwright as aw
+from armwright.page.repeat_command import repeat_command
 from armwright.problem.problem import Problem
+from armwright.proof.results import read_summary
 from armwright.proposers.rule_helpers import rule_of
 from armwright.proposers.rules import STRUCTURE, RulesProposer
-from armwright.report.repeat_command import repeat_command
 from armwright.runs.folder import read_run
 from armwright.runs.history import BBO, History
-from armwright.runs.results import read_summary
 from armwright.runs.trial import FinishedTrial, ScreenedOut, parse_trial, trial_line
 from armwright.search.samplers import sampler_for
 from armwright.search.surrogate import candidates

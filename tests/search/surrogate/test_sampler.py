@@ -14,8 +14,8 @@ from armwright.cli.show_results import show_result
 from armwright.exceptions import SettingsError
 from armwright.problem.evaluators import Evaluator
 from armwright.problem.problem import Problem
+from armwright.proof.results import read_summary
 from armwright.runs.history import BBO, RANDOM, History
-from armwright.runs.results import read_summary
 from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_factory, sampler_for, sampler_name
 from armwright.search.surrogate import candidates

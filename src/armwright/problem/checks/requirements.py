@@ -1,7 +1,7 @@
 """What the objectives and constraints of a problem require of its task and space, found without evaluating a design."""
 
 from armwright.exceptions import SettingsError
-from armwright.kinematics.cycle_loads import check_durations
+from armwright.kinematics.cycle.cycle_loads import check_durations
 from armwright.problem.compliance_quantities import require_sections
 from armwright.problem.dexterous_volume import NO_DIRECTIONS
 from armwright.problem.drive_quantities import RATINGS, require_ratings

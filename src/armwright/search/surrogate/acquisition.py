@@ -16,7 +16,7 @@ from scipy.special import ndtr
 
 from armwright.arrays import Array
 from armwright.pareto import front_mask
-from armwright.search.survival import thinned
+from armwright.search.front.selection import thinned
 
 LONGEST_FRONT = {1: 1, 2: 200, 3: 30, 4: 14, 5: 8}  # by number of objectives; more points make too many boxes
 

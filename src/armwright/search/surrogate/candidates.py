@@ -8,9 +8,9 @@ from armwright.arrays import Array
 from armwright.problem.problem import Problem
 from armwright.runs.history import found_reference_point
 from armwright.search.encoding import DesignEncoding
-from armwright.search.front_search import FrontSearch
-from armwright.search.survival import ranks
-from armwright.search.variation import offspring
+from armwright.search.front.front_search import FrontSearch
+from armwright.search.front.selection import ranks
+from armwright.search.front.variation import offspring
 from armwright.seeding import derived_seed
 
 RANDOM = 2000  # designs uniform in the space

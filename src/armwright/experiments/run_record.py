@@ -1,0 +1,161 @@
+"""A finished run, read from its summary, and the short description of its method."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.exceptions import RunFolderError
+from armwright.pareto import hypervolume
+from armwright.proof.attribution import attribution_by_source
+from armwright.proof.results import read_summary
+from armwright.runs.config import FrontMethod, RunConfig
+from armwright.runs.folder import read_config, read_run
+from armwright.runs.history import BBO, RANDOM, History
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """A finished run.
+
+    reference_point: bounds its hypervolume. If it differs from that of the run itself, all hypervolumes are computed
+        again from the trials (for a front search, from the designs it kept).
+    """
+
+    folder: Path
+    method: str
+    task: str
+    seed: int
+    config: RunConfig
+    summary: Mapping[str, Any]
+    reference_point: tuple[float, ...]
+
+    @cached_property
+    def curve(self) -> Array:
+        """Hypervolume over the counted trials (I,); empty for a front search."""
+        if isinstance(self.config.method, FrontMethod):
+            return np.zeros(0)
+        if self._has_own_reference_point:
+            return np.array(self.summary["hypervolume"]["history"])
+        return self.history().hypervolume
+
+    @cached_property
+    def final(self) -> float:
+        """Hypervolume at the end."""
+        if len(self.curve):
+            return float(self.curve[-1])
+        if self._has_own_reference_point:
+            return float(self.summary["hypervolume"]["final"])
+        return hypervolume(self.history().masked_objectives, self.reference_point)
+
+    @cached_property
+    def gained(self) -> Mapping[str, float]:
+        """Share of the final hypervolume that each source's trials added when they were evaluated."""
+        if self._has_own_reference_point:
+            gained = {
+                source: attribution["hypervolume_gained"] or 0.0
+                for source, attribution in self.summary["attribution"].items()
+            }
+        else:
+            attributions = attribution_by_source(self.history())
+            gained = {source: attribution.hypervolume_gained or 0.0 for source, attribution in attributions.items()}
+        total = sum(gained.values())
+        return {source: share / total for source, share in gained.items()} if total else dict.fromkeys(gained, 0.0)
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the run [s]."""
+        return float(
+            self.summary["search"]["seconds"] if "search" in self.summary else self.summary["seconds"]["total"]
+        )
+
+    @property
+    def proposer(self) -> Mapping[str, Any]:
+        """The proposer's part of the summary; empty without a proposer."""
+        return self.summary.get("proposer") or {}
+
+    @property
+    def is_flagged(self) -> bool:
+        """True if too many proposals failed for the run to represent its method."""
+        return bool(self.proposer.get("flagged"))
+
+    @property
+    def is_scripted(self) -> bool:
+        """True if a scripted stand-in answered instead of a model."""
+        return self.proposer.get("origin") == "scripted"
+
+    @property
+    def _has_own_reference_point(self) -> bool:
+        return self.reference_point == self.config.reference_point
+
+    def history(self) -> History:
+        """Read the trials from the run's folder."""
+        _, history = read_run(self.folder)
+        task = history.problem.task.model_copy(update={"reference_point": self.reference_point})
+        return replace(history, problem=replace(history.problem, task=task))
+
+
+@dataclass(frozen=True)
+class SourceShare:
+    """What the designs of one source contributed, averaged over runs.
+
+    trials: their number. front: share of the final front. gained: as in `RunSummary.gained`.
+    """
+
+    source: str
+    trials: float
+    front: float
+    gained: float
+
+
+def shares_by_source(runs: Sequence[RunSummary]) -> list[SourceShare]:
+    """Return the mean shares of all sources of these runs, random trials and the black box first.
+
+    Front searches have no such shares and do not count.
+    """
+    runs = [run for run in runs if "attribution" in run.summary]
+    sources = dict.fromkeys(source for run in runs for source in run.summary["attribution"])
+    shares: list[SourceShare] = []
+    for source in sorted(sources, key=lambda source: (source != RANDOM, source != BBO)):
+        of_runs = [run.summary["attribution"].get(source, {"trials": 0, "front": 0}) for run in runs]
+        front = [own["front"] / max(1, run.summary["front_size"]) for own, run in zip(of_runs, runs, strict=True)]
+        trials, gained = [own["trials"] for own in of_runs], [run.gained.get(source, 0.0) for run in runs]
+        shares.append(SourceShare(source, *(float(np.mean(values)) for values in (trials, front, gained))))
+    return shares
+
+
+def read_run_summary(folder: Path, method: str | None = None) -> RunSummary:
+    """Read a finished run.
+
+    Args:
+        folder: The run folder.
+        method: Name of its method; by default a description of its settings.
+    """
+    config, summary = read_config(folder), read_summary(folder)
+    if summary is None:
+        raise RunFolderError(f"{folder} is not finished; repeat the command that started it")
+    label = method or describe_method(config)
+    return RunSummary(folder, label, config.task.name, config.seed, config, summary, config.reference_point or ())
+
+
+def describe_method(config: RunConfig) -> str:
+    """Describe a run's search in a few words; only settings that differ from the defaults are named."""
+    method = config.method
+    if isinstance(method, FrontMethod):
+        return "front search"
+    text = "BBO" if method.sampler == "tpe" else f"BBO ({method.sampler})"
+    if method.proposer is not None:
+        name = str(method.proposer["name"])
+        text += "/LLM" if name == "llm" else f"/{name}"
+        text += {"plus": "+", "minus": "-", "full": " full"}.get(str(method.proposer.get("prompt", "")), "")
+        if model := method.proposer.get("model"):
+            text += f" {model}"
+        if method.n_step != 10:
+            text += f" (N_step {method.n_step})"
+    if method.n_total != 200:
+        text += f" ({method.n_total} trials)"
+    return text

@@ -1,0 +1,1 @@
+"""Arms in arrays: chains, bodies, drives; where their joints are."""

@@ -1,0 +1,96 @@
+"""Ratings of the actuators of stacked arms."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.rigid_bodies import PerArm
+from armwright.robot.arm import Actuator, Arm
+
+FIXED_RATINGS = (np.inf, np.inf, np.inf, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.inf)
+
+
+@dataclass(frozen=True)
+class Actuation(PerArm):
+    """Actuators of N arms of up to D joints, by the motion of their joints: of a slide in m, N and kg.
+
+    NaN where a value is unknown. A fixed joint has infinite torques, speeds and stiffness; its other values are 0.
+    """
+
+    peak: Array  # (N, D) largest torque, at rest and up to the corner speed [N m] or [N]
+    continuous: Array  # (N, D) torque that can be held forever [N m] or [N]
+    corner_speed: Array  # (N, D) from which on the available torque falls linearly [rad/s] or [m/s]
+    no_load_speed: Array  # (N, D) at which it is 0 [rad/s] or [m/s]
+    rotor_inertia: Array  # (N, D) of rotor and gear [kg m²] or [kg]
+    coulomb: Array  # (N, D) friction at any speed [N m] or [N]
+    viscous: Array  # (N, D) friction by speed [N m s/rad] or [N s/m]
+    voltage: Array  # (N, D) of the supply [V]
+    current: Array  # (N, D) from the supply at the peak torque [A]
+    backlash: Array  # (N, D) [rad] or [m]
+    joint_stiffness: Array  # (N, D) from the motor to the joint [N m/rad] or [N/m]
+    price: Array  # (N,) of all actuators of an arm [USD]; NaN if one has no price
+    safety_factor: Array  # (N,) by which required torques are multiplied
+
+
+def actuation_at_joints(ratings: Array, travel: Array, price: Array, safety_factor: Array) -> Actuation:
+    """Return the actuation of joints by the ratings of their actuators.
+
+    Args:
+        ratings: (N, D, R) as from `ratings_of`; FIXED_RATINGS for fixed joints.
+        travel: (N, D) of a joint for each radian of its actuator [m/rad]; 1 for revolute joints.
+        price: (N,) of all actuators of an arm [USD].
+        safety_factor: (N,) by which required torques are multiplied.
+    """
+    peak, continuous, corner, no_load, inertia, coulomb, viscous, *others = np.moveaxis(ratings, -1, 0)
+    voltage, current, backlash, stiffness = others
+    return Actuation(
+        peak=peak / travel,
+        continuous=continuous / travel,
+        corner_speed=corner * travel,
+        no_load_speed=no_load * travel,
+        rotor_inertia=inertia / travel**2,
+        coulomb=coulomb / travel,
+        viscous=viscous / travel**2,
+        voltage=voltage.copy(),
+        current=current.copy(),
+        backlash=backlash * travel,
+        joint_stiffness=stiffness / travel**2,
+        price=price,
+        safety_factor=safety_factor,
+    )
+
+
+def ratings_of(actuator: Actuator) -> tuple[float, ...]:
+    """Return what `actuation_at_joints` needs of an actuator; NaN for unknown values."""
+    stated = (
+        actuator.peak_torque,
+        actuator.continuous_torque,
+        actuator.corner_speed,
+        actuator.speed,
+        actuator.rotor_inertia,
+        actuator.coulomb_friction,
+        actuator.viscous_friction,
+        actuator.voltage,
+        actuator.current,
+        actuator.backlash,
+        actuator.joint_stiffness,
+    )
+    return tuple(np.nan if value is None else value for value in stated)
+
+
+def actuation_of(arms: Sequence[Arm], travel: Array) -> Actuation | None:
+    """Return the actuation of N arms, None if a moving joint has no actuator; travel: (N, D) as above."""
+    ratings = np.empty((*travel.shape, len(FIXED_RATINGS)))
+    ratings[:] = FIXED_RATINGS
+    prices = np.zeros(len(arms))
+    for i, arm in enumerate(arms):
+        for j, joint in enumerate(arm.joints):
+            if joint.kind == "fixed":
+                continue
+            if joint.actuator is None:
+                return None
+            ratings[i, j] = ratings_of(joint.actuator)
+            prices[i] += np.nan if joint.actuator.price is None else joint.actuator.price
+    return actuation_at_joints(ratings, travel, prices, np.array([arm.safety_factor for arm in arms]))

@@ -1,0 +1,236 @@
+"""Arms stacked into arrays, the input of the kernels."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.exceptions import ArmError, SettingsError, did_you_mean
+from armwright.kinematics.arms.actuation import Actuation, actuation_of
+from armwright.kinematics.arms.columns import Columns, stack_columns
+from armwright.kinematics.arms.motor_bodies import MotorBodies, stack_bodies
+from armwright.kinematics.arms.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
+from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
+from armwright.tasks.payload import POINT_LOAD, LoadShape
+
+MAX_JOINTS = 16
+MAX_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
+PRISMATIC, FIXED = 3, 6  # motions: 0 to 2 rotate about local x, y, z; 3 to 5 translate along them; 6 is fixed
+
+Precision = Literal["float32", "float64"]
+Motions = Literal["revolute", "any"]  # of all joints of some arms
+TargetKind = Literal["position", "pose"]  # points alone, or some with an axis or orientation of the tool
+Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
+Ints = NDArray[np.int32]
+
+FLOATS = ("base", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_side", "payload_center")
+ARRAYS = ("motion", *FLOATS)  # fields of `ArmArrays` that the kernels of inverse kinematics read
+
+
+@dataclass(frozen=True)
+class ArmArrays(PerArm):
+    """N arms of up to D joints. A shorter arm ends with fixed joints that have neither length nor mass.
+
+    All floats that the kernels read are of one precision; the others are float64.
+    """
+
+    base: Floats  # (N, 3) [m]
+    motion: Ints  # (N, D) 0 to 2: rotates about local x, y, z; 3 to 5: translates along them; 6: fixed
+    lower: Floats  # (N, D) [rad] or [m]; ±1 for fixed joints, so that nothing divides by 0
+    upper: Floats  # (N, D) [rad] or [m]
+    offset: Floats  # (N, D, 3) from a joint to the next, or to the tip of the tool [m]
+    com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next, or the tool [m]
+    mass: Floats  # (N, D) [kg]; of the last link with the tool
+    radius: Floats  # (N, D) of the link after a joint [m]; 0 if there is none
+    bending_stiffness: Array  # (N, D) EI of the link after a joint [N m²]; infinite without length, NaN if unknown
+    torsional_stiffness: Array  # (N, D) GJ likewise [N m²]
+    tool: Tools  # included in the last link's `offset`, `com` and `mass`
+    tool_axis: Floats  # (N, 3) the tool's own z in the world with all joints at 0, and so in the last local frame
+    tool_side: Floats  # (N, 3) likewise the tool's own x
+    payload_center: Floats  # (N, 3) of a payload's mass, from the tip in the last local frame [m]
+    payload_gyration: Array  # (N, 3, 3) inertia of a payload about that centre, per mass, in the same frame [m²]
+    n_joints: Ints  # (N,) number of an arm's joints, at most D
+    travel: Array  # (N, D) of a joint for each radian of its actuator: 1 for revolute joints [m/rad]
+    length: Array  # (N,) of all links [m]
+    base_mass: Array  # (N,) mass that does not move, the column included [kg]
+    structure_price: Array  # (N,) of all links and of the column [USD]
+    bodies: Bodies  # without tools; for dynamics alone
+    actuation: Actuation | None = None  # None unless all moving joints have actuators
+    motor_bodies: MotorBodies | None = None  # None if the bodies of actuators do not count
+    columns: Columns | None = None  # None if no base stands on a column
+
+    def __len__(self) -> int:
+        return len(self.base)
+
+    @property
+    def precision(self) -> Precision:
+        """Precision of the arrays that the kernels read."""
+        return "float64" if self.base.dtype == np.float64 else "float32"
+
+    @property
+    def dof(self) -> int:
+        """Number D of joints of the longest arm, fixed ones included."""
+        return self.motion.shape[1]
+
+    @property
+    def rigid_bodies(self) -> RigidBodies:
+        """What moves with each joint, the tool included."""
+        return rigid_bodies(self.bodies, self.tool, self.n_joints - 1)
+
+    @property
+    def motions(self) -> Motions:
+        """The kernel variant that all arms need."""
+        return "revolute" if np.all(self.motion < PRISMATIC) else "any"
+
+    @property
+    def prismatic(self) -> NDArray[np.bool_]:
+        """(N, D) True for joints that translate."""
+        return (self.motion >= PRISMATIC) & (self.motion < FIXED)
+
+    @property
+    def ranges_include_zero(self) -> bool:
+        """True if every joint can be at 0."""
+        return bool(np.all(self.lower <= 0.0) and np.all(self.upper >= 0.0))
+
+
+def check_precision(name: str) -> Precision:
+    """Return `name` if it is a precision, else raise SettingsError."""
+    allowed = get_args(Precision)
+    if name not in allowed:
+        raise SettingsError(f'precision = "{name}" is not one of {", ".join(allowed)}.{did_you_mean(name, allowed)}')
+    return cast("Precision", name)
+
+
+def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArrays:
+    """Stack arms into arrays.
+
+    Args:
+        arms: N arms of at most MAX_JOINTS joints.
+        precision: The precision of the arrays that the kernels read.
+
+    Raises:
+        ArmError: If there is no arm, or one that the kernels do not support.
+    """
+    if not arms:
+        raise ArmError("expected at least one arm, got none")
+    for arm in arms:
+        _check(arm)
+    n, dof = len(arms), max(len(arm.joints) for arm in arms)
+    motion = np.full((n, dof), FIXED, dtype=np.int32)
+    lower, upper, travel = np.full((3, n, dof), 1.0)
+    lower *= -1.0
+    mass, radius = np.zeros((2, n, dof))
+    stiffness = np.full((2, n, dof), np.inf)  # bending and torsional
+    offset, com = np.zeros((2, n, dof, 3))
+    bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,))))
+    for i, arm in enumerate(arms):
+        own = slice(len(arm.joints))
+        motion[i, own] = [_motion(joint) for joint in arm.joints]
+        lower[i, own] = [-1.0 if joint.kind == "fixed" else joint.lower for joint in arm.joints]
+        upper[i, own] = [1.0 if joint.kind == "fixed" else joint.upper for joint in arm.joints]
+        travel[i, own] = [joint.travel for joint in arm.joints]
+        offset[i, own] = [link.offset for link in arm.links]
+        com[i, own] = [link.total_com for link in arm.links]
+        mass[i, own] = [link.total_mass for link in arm.links]
+        radius[i, own] = [link.radius if link.length > 0.0 else 0.0 for link in arm.links]
+        stiffness[:, i, own] = np.transpose([_stiffness(link) for link in arm.links])
+        for part in fields(Bodies):
+            getattr(bodies, part.name)[i, own] = [getattr(link, part.name) for link in arm.links]
+    n_joints = np.array([len(arm.joints) for arm in arms], dtype=np.int32)
+    tool = stack_tools([arm.tool for arm in arms])
+    add_tools(tool, n_joints - 1, offset, com, mass)
+    return ArmArrays(
+        base=np.array([arm.base for arm in arms], dtype=precision),
+        motion=motion,
+        lower=-round_down(-lower, precision),
+        upper=round_down(upper, precision),
+        offset=offset.astype(precision),
+        com=com.astype(precision),
+        mass=mass.astype(precision),
+        radius=radius.astype(precision),
+        bending_stiffness=stiffness[0],
+        torsional_stiffness=stiffness[1],
+        tool=tool,
+        tool_axis=tool.axis.astype(precision),
+        tool_side=tool.side.astype(precision),
+        payload_center=np.zeros((n, 3), dtype=precision),
+        payload_gyration=np.zeros((n, 3, 3)),
+        n_joints=n_joints,
+        travel=travel,
+        length=np.array([arm.length for arm in arms]),
+        base_mass=np.array([arm.standing_mass for arm in arms]),
+        structure_price=np.array([arm.structure_price for arm in arms]),
+        bodies=bodies,
+        actuation=actuation_of(arms, travel),
+        motor_bodies=stack_bodies(arms, dof, precision),
+        columns=stack_columns(arms, precision),
+    )
+
+
+def stack_tools(tools: Sequence[MountedTool]) -> Tools:
+    """Stack tools into arrays."""
+    return Tools(*(np.array([getattr(tool, part.name) for tool in tools]) for part in fields(Tools)))
+
+
+def add_tools(tools: Tools, last: NDArray[np.integer], offset: Array, com: Array, mass: Array) -> None:
+    """Add tools to the last links of N arms, in place.
+
+    Args:
+        tools: The tools.
+        last: (N,) index of the last link.
+        offset: (N, D, 3) of the links [m].
+        com: (N, D, 3) [m].
+        mass: (N, D) [kg].
+    """
+    own = np.arange(len(last)), last
+    if tools.mass.any():
+        mass[own], com[own] = joined(mass[own], com[own], tools.mass, offset[own] + tools.com)
+    offset[own] += tools.tip
+
+
+def carrying(arms: ArmArrays, shape: LoadShape) -> ArmArrays:
+    """Return arms whose payloads have this shape in their tip frames."""
+    if shape == POINT_LOAD:
+        return arms
+    x, z = arms.tool.side, arms.tool.axis
+    frame = np.stack([x, np.cross(z, x), z], axis=-1)  # (N, 3, 3) of the tip
+    center = (frame @ np.array(shape.center)).astype(arms.precision)
+    gyration = frame @ np.diag(shape.gyration) @ frame.swapaxes(-1, -2)
+    return replace(arms, payload_center=center, payload_gyration=gyration)
+
+
+def round_down(limits: Array, precision: Precision) -> Any:
+    """Return upper limits in this precision, none above its exact value.
+
+    2.4 rad in float32 is 1e-7 rad above the limit, which no joint angle may exceed.
+    """
+    near = limits.astype(precision)
+    return np.where(near > limits, np.nextafter(near, near.dtype.type(-np.inf)), near)
+
+
+def _check(arm: Arm) -> None:
+    if len(arm.joints) > MAX_JOINTS:
+        raise ArmError(f"an arm has {len(arm.joints)} joints; the kernels support at most {MAX_JOINTS}")
+    for number, joint in enumerate(arm.joints, start=1):
+        if joint.kind == "revolute" and max(-joint.lower, joint.upper) > MAX_ANGLE:
+            raise ArmError(
+                f"joint {number}: limits [{joint.lower:g}, {joint.upper:g}] rad are outside [-2π, 2π]; narrow them"
+            )
+
+
+def _stiffness(link: Link) -> tuple[float, float]:
+    """Return EI and GJ of a link [N m²]; infinite without length, NaN if unknown."""
+    if link.length == 0.0:
+        return math.inf, math.inf
+    bending, torsional = link.bending_stiffness, link.torsional_stiffness
+    return math.nan if bending is None else bending, math.nan if torsional is None else torsional
+
+
+def _motion(joint: Joint) -> int:
+    if joint.kind == "fixed":
+        return FIXED
+    return AXES.index(joint.axis) + (PRISMATIC if joint.kind == "prismatic" else 0)

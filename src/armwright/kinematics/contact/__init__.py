@@ -1,0 +1,1 @@
+"""Distances of links, motors and columns from each other and from obstacles."""

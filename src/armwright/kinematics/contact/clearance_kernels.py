@@ -1,0 +1,182 @@
+"""Warp kernels of clearance: distances of the links of posed arms from each other and from obstacles.
+
+A link is a capsule: all points within its radius of its axis, a segment. A thread takes one arm at one target, and
+branches: a bound excludes distant obstacles. docs/method.md §13 defines the distances.
+"""
+
+# Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from armwright.kinematics.arms.arm_arrays import FIXED, Precision
+from armwright.kinematics.arms.frame_math import frame_math
+from armwright.kinematics.arms.ik_math import kernel
+from armwright.kinematics.contact.solid_math import solid_math
+
+
+@dataclass(frozen=True)
+class ClearanceKernels:
+    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
+
+    real: Any
+    Vector3: Any
+    Matrix3: Any
+    link_axes: Any
+    self_clearance: Any
+    obstacle_clearance: Any
+
+
+@cache
+def clearance_kernels(precision: Precision) -> ClearanceKernels:
+    """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
+    base = frame_math(precision)
+    real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
+    translate, rotate = base.translate, base.rotate
+    solids = solid_math(precision)
+    signed_distance, along_segment = solids.signed_distance, solids.along_segment
+    zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
+    tiny = real(1e-30)
+    parallel = real(1e-12)  # square of the sine of an angle that is 0 in float32
+
+    @kernel
+    def link_axes(
+        base: wp.array(dtype=Vector3),
+        motion: wp.array2d(dtype=int),
+        offset: wp.array2d(dtype=Vector3),
+        q: wp.array3d(dtype=real),
+        starts: wp.array3d(dtype=Vector3),
+        ends: wp.array3d(dtype=Vector3),
+    ):
+        """Compute start and end of the axis of each link by forward kinematics.
+
+        base: (N,) [m].  motion: (N, D).  offset: (N, D) [m].  q: (N, T, D) [rad] or [m].  starts, ends: (N, T, D) [m].
+        """
+        arm, target = wp.tid()
+        x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
+        p = base[arm]
+        for j in range(motion.shape[1]):
+            value = q[arm, target, j]
+            p = translate(motion[arm, j], p, value, x, y, z)
+            x, y, z = rotate(motion[arm, j], x, y, z, wp.sin(value), wp.cos(value))
+            starts[arm, target, j] = p
+            along = offset[arm, j]
+            p = p + along[0] * x + along[1] * y + along[2] * z
+            ends[arm, target, j] = p
+
+    @wp.func
+    def to_segment(p: Vector3, a: Vector3, u: Vector3):
+        """Return the squared distance of a point from the segment from a to a + u."""
+        t = wp.clamp(wp.dot(p - a, u) / wp.max(wp.dot(u, u), tiny), zero, one)
+        return wp.length_sq(p - a - t * u)
+
+    @wp.func
+    def between_segments(a: Vector3, u: Vector3, b: Vector3, v: Vector3):
+        """Return the distance between the segments from a to a + u and from b to b + v.
+
+        The nearest points are an end of a segment or the feet of the common perpendicular. The cross product
+        determines the feet well even if the segments are nearly parallel.
+        """
+        square = wp.min(
+            wp.min(to_segment(a, b, v), to_segment(a + u, b, v)),
+            wp.min(to_segment(b, a, u), to_segment(b + v, a, u)),
+        )
+        n = wp.cross(u, v)
+        nn = wp.dot(n, n)
+        if nn > parallel * wp.dot(u, u) * wp.dot(v, v):
+            w = b - a
+            s = wp.clamp(wp.dot(wp.cross(w, v), n) / nn, zero, one)
+            t = wp.clamp(wp.dot(wp.cross(w, u), n) / nn, zero, one)
+            square = wp.min(square, wp.length_sq(w + t * v - s * u))
+        return wp.sqrt(square)
+
+    @kernel
+    def self_clearance(
+        motion: wp.array2d(dtype=int),
+        starts: wp.array3d(dtype=Vector3),
+        ends: wp.array3d(dtype=Vector3),
+        radius: wp.array2d(dtype=real),
+        clearance: wp.array2d(dtype=real),
+    ):
+        """Compute the smallest distance between links of an arm that are neither neighbours nor rigidly connected.
+
+        motion: (N, D).  starts, ends: (N, T, D) [m].  radius: (N, D) [m], 0 for links to ignore.  clearance: (N, T)
+        [m], lowered to the distance.
+        """
+        arm, target = wp.tid()
+        nearest = clearance[arm, target]
+        for i in range(radius.shape[1]):
+            r = radius[arm, i]
+            a = starts[arm, target, i]
+            u = ends[arm, target, i] - a
+            length = wp.length(u)
+            links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
+            n_joints = int(0)  # noqa: RUF046, UP018
+            between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
+            for j in range(i + 1, radius.shape[1]):
+                b = starts[arm, target, j]
+                between += wp.length(b - ends[arm, target, j - 1])  # displacement of a prismatic joint
+                if motion[arm, j] < wp.static(FIXED):
+                    n_joints += 1
+                v = ends[arm, target, j] - b
+                other_length = wp.length(v)
+                radii = r + radius[arm, j]
+                if r > zero and radius[arm, j] > zero:
+                    # Parts of the arm that are this near along it cannot be farther apart, so they are excluded.
+                    excluded = half * wp.max(two * radii - between, zero)
+                    if links_between > 0 and n_joints > 0 and excluded <= wp.min(length, other_length):
+                        u_counted = u * (one - excluded / wp.max(length, tiny))
+                        v_excluded = v * (excluded / wp.max(other_length, tiny))
+                        nearest = wp.min(
+                            nearest, between_segments(a, u_counted, b + v_excluded, v - v_excluded) - radii
+                        )
+                    links_between += 1
+                between += other_length
+        clearance[arm, target] = nearest
+
+    @kernel
+    def obstacle_clearance(
+        starts: wp.array3d(dtype=Vector3),
+        ends: wp.array3d(dtype=Vector3),
+        radius: wp.array2d(dtype=real),
+        shape: wp.array(dtype=int),
+        centre: wp.array(dtype=Vector3),
+        into: wp.array(dtype=Matrix3),
+        size: wp.array(dtype=Vector3),
+        clearance: wp.array2d(dtype=real),
+    ):
+        """Compute the smallest distance of a link of an arm from an obstacle.
+
+        starts, ends: (N, T, D) [m].  radius: (N, D) [m], 0 for links to ignore.  shape, centre, into (rotation into
+        the obstacle's frame), size (half sides or radii): (O,).  clearance: (N, T) [m], lowered to the distance.
+        """
+        arm, target = wp.tid()
+        nearest = clearance[arm, target]
+        for j in range(radius.shape[1]):
+            r = radius[arm, j]
+            if r > zero:
+                a = starts[arm, target, j]
+                along = ends[arm, target, j] - a
+                foot = real(0.0)  # share of the first link that is its foot, where the arm is mounted
+                if j == 0:
+                    foot = two * r / wp.max(wp.length(along), tiny)
+                if foot < one:
+                    for o in range(shape.shape[0]):
+                        base = into[o] * (a - centre[o])
+                        v = into[o] * along
+                        p = base + foot * v
+                        v = (one - foot) * v
+                        # No point of the link is nearer than this: distance changes by no more than the path length.
+                        bound = signed_distance(shape[o], p + half * v, size[o]) - half * wp.length(v)
+                        if bound - r < nearest:
+                            distance = along_segment(shape[o], p, v, size[o]) - r
+                            mounted = j == 0 and signed_distance(shape[o], base, size[o]) <= r
+                            # The first link is always close to what the arm is mounted on: only overlaps count.
+                            if not mounted or distance < zero:
+                                nearest = wp.min(nearest, distance)
+        clearance[arm, target] = nearest
+
+    return ClearanceKernels(real, Vector3, Matrix3, link_axes, self_clearance, obstacle_clearance)

@@ -1,0 +1,174 @@
+"""Choice of one candidate per block of a cycle, for the cycle as a whole, by dynamic programming."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.cycle.line_following import BlockPaths, IndexArray, follow_lines
+from armwright.kinematics.devices import Device
+from armwright.tasks.motions import CyclePlan, LineSamples
+from armwright.tasks.obstacles import Obstacle
+
+MAX_STEP = 0.05  # [rad] between neighbouring samples
+MAX_SLIDE = 0.005  # [m] likewise of sliding joints
+JOINT_STEPS = 16  # of a joint motion
+HOPELESS = 10.0  # times the tolerance that a path is off, beyond which it is not refined
+ROUNDS = 4  # at least, of choosing candidates again where the chosen ones collide
+LOOPS = 3  # of a closed cycle without joint motions, until it ends where it began
+DISTINCT = 1e-3  # [rad] or [m] between candidates; nearer ones are the same
+CLOSED = 1e-3  # [rad] or [m] between the ends of a closed cycle
+ON_LIMIT = 1e-6  # [rad] or [m] from the limit of a joint
+LARGE_STEP = 0.5  # [rad] or [m] between coarse samples, where a jump is possible
+SUSPECT = 100.0  # cost of such a step: above any detour, below what is certain to be infeasible
+DEPTH = 1e-3  # [m] of a collision that costs as much as a path that is off by its tolerance
+BLOCKED = 1e3  # cost in seconds or radians of a chain that is off by its tolerance, far above any detour
+
+
+@dataclass(frozen=True)
+class ChosenPostures:
+    """What N arms take at the first pose of each of B blocks.
+
+    Attributes:
+        entry: (N, B, D) the postures.
+        step_ratios: (N, 2) the largest step of coarse samples relative to the allowed one, along lines and along joint
+            motions.
+        hopeless: (N,) True if the path is so far off that more samples cannot mend it.
+    """
+
+    entry: Array
+    step_ratios: Array
+    hopeless: NDArray[np.bool_]
+
+
+def choose_postures(
+    arms: ArmArrays, plan: CyclePlan, entry: Array, obstacles: Sequence[Obstacle], device: Device
+) -> ChosenPostures:
+    """Choose among the candidates (N, B, K, D) at the first pose of each block."""
+    samples = plan.sample()
+    lines = follow_lines(arms, samples, entry, device)
+    starts, ends = lines.ends(samples)
+    for _ in range(LOOPS if plan.is_loop else 0):
+        lines = follow_lines(arms, samples, ends, device)
+        starts, ends = lines.ends(samples)
+    speed = _speeds(arms)
+    blocks = _block_costs(arms, lines, samples, speed)
+    same = np.abs(starts[:, :, :, None] - starts[:, :, None]).max(axis=-1) < DISTINCT  # (N, B, K, K)
+    blocks[np.tril(same, -1).any(axis=-1)] = np.inf  # equal to an earlier candidate
+    if plan.is_loop:
+        blocks += cost_of(np.abs(ends - starts).max(axis=-1) / CLOSED - 1.0)
+    following = starts[:, [(b + 1) % len(plan.blocks) for b in range(len(plan.joint_motions))]]
+    change = np.abs(following[:, :, None] - ends[:, : len(plan.joint_motions), :, None])  # (N, E, K, K, D)
+    edges = (change / speed[:, None, None, None]).max(axis=-1)
+    choice = _avoid_collisions(arms, plan, samples, lines, blocks.copy(), edges.copy(), obstacles, device)
+    index, block = np.arange(len(arms), dtype=np.intp), np.arange(len(plan.blocks))
+    chosen, arm = lines.choose(samples, choice, index), index[:, None]
+    steps = np.abs(np.diff(chosen, axis=1))
+    steps[:, samples.first[1:-1] - 1] = 0.0  # from one block to the next
+    joint_motion = np.arange(len(plan.joint_motions))
+    turn = change[arm, joint_motion, choice[:, joint_motion], choice[:, (joint_motion + 1) % len(plan.blocks)]]
+    allowed = np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
+    ratios = [(part / allowed).max(axis=(1, 2), initial=0.0) for part in (steps, turn / JOINT_STEPS)]
+    hopeless = blocks[arm, block, choice].max(axis=1) > HOPELESS * BLOCKED
+    return ChosenPostures(starts[arm, block, choice], np.stack(ratios, axis=1), hopeless)
+
+
+def _speeds(arms: ArmArrays) -> Array:
+    """Return the (N, D) speeds of the joints, 1 rad/s or 1 m/s if unknown, for costs."""
+    if arms.actuation is None:
+        return np.ones(arms.motion.shape)
+    speed = arms.actuation.no_load_speed
+    return np.where(np.isfinite(speed), speed, 1.0)
+
+
+def _block_costs(arms: ArmArrays, lines: BlockPaths, samples: LineSamples, speed: Array) -> Array:
+    """Return the (N, B, K) cost of each block: least time along its lines, what it is off by, and what may jump."""
+    poses, first = samples.poses, samples.first[:-1]
+    off = np.maximum(lines.position_error / poses.tolerance, lines.angle_error / poses.angle_tolerance)
+    change = np.zeros(lines.q.shape)
+    change[:, :, 1:] = np.abs(np.diff(lines.q, axis=2))
+    change[:, :, first] = 0.0
+    lower, upper = arms.lower[:, None, None], arms.upper[:, None, None]
+    on_limit = np.minimum(lines.q - lower, upper - lines.q) <= ON_LIMIT
+    on_limit = np.any(on_limit & (arms.motion < FIXED)[:, None, None], axis=-1)
+    on_limit[:, :, first] = False
+    blocked = BLOCKED * on_limit + SUSPECT * (change.max(axis=-1) > LARGE_STEP)
+    step = (change / speed[:, None, None]).max(axis=-1)
+    worst = np.maximum.reduceat(off, first, axis=2).swapaxes(1, 2)
+    cost = np.add.reduceat(step, first, axis=2).swapaxes(1, 2) + cost_of(worst - 1.0)
+    return cost + np.maximum.reduceat(blocked, first, axis=2).swapaxes(1, 2)
+
+
+def cost_of(excess: Array) -> Array:
+    """Return the cost of exceeding a tolerance; excess: relative to the tolerance."""
+    return np.where(excess > 0.0, BLOCKED * (1.0 + np.minimum(excess, 1e6)), 0.0)
+
+
+def _avoid_collisions(
+    arms: ArmArrays,
+    plan: CyclePlan,
+    samples: LineSamples,
+    lines: BlockPaths,
+    blocks: Array,
+    edges: Array,
+    obstacles: Sequence[Obstacle],
+    device: Device,
+) -> IndexArray:
+    """Return the (N, B) candidates with the least cost, collisions included, which are measured only if chosen."""
+    closed = plan.cycle.closed and not plan.is_loop
+    choice = choose_candidates(blocks, edges, closed)
+    index = np.arange(len(arms))
+    share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
+    n_blocks, n_edges, candidates = blocks.shape[1], edges.shape[1], blocks.shape[2]
+    for _ in range(max(ROUNDS, candidates) if candidates > 1 else 0):
+        part = arms[index]
+        chosen = lines.choose(samples, choice, index)  # (n, S, D)
+        start = chosen[:, samples.first[1:] - 1][:, :n_edges]
+        change = chosen[:, [samples.first[(b + 1) % n_blocks] for b in range(n_edges)]] - start
+        between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)
+        q = np.concatenate([chosen, between.reshape(len(index), -1, arms.dof)], axis=1)
+        depth = np.maximum(0.0, -np.minimum(*clearances(part, q, obstacles, device)))
+        in_blocks = np.maximum.reduceat(depth[:, : chosen.shape[1]], samples.first[:-1], axis=1)
+        in_edges = depth[:, chosen.shape[1] :].reshape(len(index), n_edges, len(share)).max(axis=2, initial=0.0)
+        colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)
+        if not colliding.any():
+            break
+        edge = np.arange(n_edges, dtype=np.intp)
+        blocks[index[:, None], np.arange(n_blocks), choice[index]] += cost_of(in_blocks / DEPTH)
+        following = choice[index][:, (edge + 1) % n_blocks]
+        edges[index[:, None], edge, choice[index][:, :n_edges], following] += cost_of(in_edges / DEPTH)
+        index = index[colliding]
+        choice[index] = choose_candidates(blocks[index], edges[index], closed)
+    return choice
+
+
+def choose_candidates(blocks: Array, edges: Array, closed: bool) -> IndexArray:
+    """Return the (N, B) candidates with the least sum of costs.
+
+    Args:
+        blocks: (N, B, K) cost of each block from each of its candidates.
+        edges: (N, E, K, K) cost of the joint motion from candidate i of block b to candidate j of the next one; of the
+            last block to the first one if the cycle is closed by a joint motion (E = B), else E = B - 1.
+        closed: Whether a joint motion leads from the last block to the first.
+    """
+    n, b, k = blocks.shape
+    # total[:, s, j]: cost of the best chain from candidate s of the first block to candidate j of the present one.
+    total = np.where(np.eye(k, dtype=bool), blocks[:, 0, :, None], np.inf)
+    came_from: list[IndexArray] = []
+    for block in range(1, b):
+        through = total[:, :, :, None] + edges[:, block - 1, None]  # (N, s, i, j)
+        came_from.append(through.argmin(axis=2))
+        total = through.min(axis=2) + blocks[:, block, None]
+    if closed:
+        total = total + edges[:, b - 1].swapaxes(1, 2)  # from candidate j of the last block to s
+    start, end = np.divmod(total.reshape(n, -1).argmin(axis=1), k)
+    arm = np.arange(n, dtype=np.intp)
+    choice = np.empty((n, b), dtype=np.intp)
+    choice[:, -1] = end
+    for block in range(b - 1, 0, -1):
+        choice[:, block - 1] = came_from[block - 1][arm, start, choice[:, block]]
+    return choice

@@ -1,0 +1,184 @@
+"""Durations, torques and speeds along a cycle, each motion from rest to rest with a fifth-order profile.
+
+s = 10 τ³ - 15 τ⁴ + 6 τ⁵ at the share τ of a motion's duration T: the profile of least jerk (Flash & Hogan 1985). So
+s' = s_τ / T and s'' = s_ττ / T², and the torque is a polynomial in 1 / T at each instant.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from armwright.arrays import Array
+from armwright.exceptions import SettingsError
+from armwright.kinematics.arms.actuation import Actuation
+from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
+from armwright.kinematics.cycle.drive_limits import MotionLoad, least_time, motion_load
+from armwright.kinematics.cycle.torque_terms import TorqueTerms
+from armwright.tasks.motions import CyclePlan
+
+ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite of rounding
+MIN_TIME, MAX_TIME = 0.15, 1e3  # [s] of a motion that is as fast as possible; drives cannot follow shorter ones
+BETWEEN = 16  # times as many instants of a sharp path, of which the largest values count
+
+
+@dataclass(frozen=True)
+class CycleLoads:
+    """N arms along the M motions of a cycle, at F instants of each, equally spaced in time.
+
+    Of sharp paths (`CycleGroup`), the largest values around each instant are kept.
+
+    Attributes:
+        durations: (N, M) [s].
+        dwells: (M,) time at rest after each motion [s].
+        torques: (N, M, F, D) torques of the drives at the joints [N m], or forces [N].
+        speeds: (N, M, F, D) joint speeds [rad/s] or [m/s].
+        holding: (N, M, D) torques at rest after each motion [N m], or forces [N].
+    """
+
+    durations: Array
+    dwells: Array
+    torques: Array
+    speeds: Array
+    holding: Array
+
+    @property
+    def cycle_time(self) -> Array:
+        """(N,) duration of the cycle [s]."""
+        return self.durations.sum(axis=1) + self.dwells.sum()
+
+    @property
+    def rms_torques(self) -> Array:
+        """(N, D) root mean square of the torques over the cycle, dwells included [N m], or forces [N]."""
+        return np.sqrt(self.mean(self.torques**2, self.holding**2))
+
+    def mean(self, moving: Array, resting: Array) -> Array:
+        """Return the (N, ...) means over the cycle of (N, M, F, ...) values in motion and (N, M, ...) after motions."""
+        weights = np.full(moving.shape[2], 1.0 / (moving.shape[2] - 1))
+        weights[[0, -1]] /= 2.0
+        total = np.einsum("nm,f,nmf...->n...", self.durations, weights, moving)
+        total += np.einsum("m,nm...->n...", self.dwells, resting)
+        return (total.T / self.cycle_time).T
+
+
+def holding_torques(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> Array:
+    """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
+    torques = np.empty((len(paths.jumps), len(paths.plan.motions), paths.instants, paths.groups[0].arms.dof))
+    for group, of_motions in zip(paths.groups, terms, strict=True):
+        density = _density(group)
+        for i, part in enumerate(of_motions):
+            torques[group.index, i] = _thinned(
+                _instants(part.gravity.shape[1], paths.instants, density)[0] @ part.gravity, density
+            )
+    return torques
+
+
+def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> CycleLoads:
+    """Return the loads of arms along a cycle.
+
+    Args:
+        paths: N arms.
+        terms: Their torque terms, from `torque_terms`.
+
+    Raises:
+        SettingsError: A step should be as fast as possible, but the arms have no actuators with known speeds.
+    """
+    plan, n = paths.plan, len(paths.jumps)
+    m, dof = len(plan.motions), paths.groups[0].arms.dof
+    durations, holding = np.empty((n, m)), np.empty((n, m, dof))
+    torques, speeds = np.empty((2, n, m, paths.instants, dof))
+    for group, of_motions in zip(paths.groups, terms, strict=True):
+        density = _density(group)
+        loads = [_load(part, group.arms, paths.instants, density) for part in of_motions]
+        times = _durations(group.arms, plan, loads)
+        durations[group.index] = times
+        for i, load in enumerate(loads):
+            torques[group.index, i] = _thinned(load.torque(times[:, i]), density)
+            speeds[group.index, i] = _thinned(load.velocity / times[:, i, None, None], density)
+            holding[group.index, i - 1] = of_motions[i].gravity[:, 0]
+        if not plan.cycle.closed:
+            holding[group.index, -1] = of_motions[-1].gravity[:, -1]
+    return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding)
+
+
+def _density(group: CycleGroup) -> int:
+    """Return how many times as many instants are evaluated as are kept."""
+    return BETWEEN if group.is_sharp else 1
+
+
+def _thinned(values: Array, density: int) -> Array:
+    """Return (n, F, D) of values (n, density (F - 1) + 1, D): the largest in magnitude from instant to instant.
+
+    The first and the last one, at rest, stay as they are.
+    """
+    if density == 1:
+        return values
+    nearby = sliding_window_view(values, 2 * density + 1, axis=1)[:, ::density]  # (n, F - 2, D, 2 density + 1)
+    largest = np.abs(nearby).argmax(axis=-1)[..., None]
+    return np.concatenate([values[:, :1], np.take_along_axis(nearby, largest, axis=-1)[..., 0], values[:, -1:]], axis=1)
+
+
+def _load(terms: TorqueTerms, arms: ArmArrays, instants: int, density: int) -> MotionLoad:
+    """Return the load of a motion; the drives' own inertia and friction count where they are known."""
+    weights, s_t, s_tt = _instants(terms.gravity.shape[1], instants, density)
+    q_s, q_ss, drag, push = (weights @ values for values in (terms.q_s, terms.q_ss, terms.drag, terms.push))
+    rate, change = s_t[:, None], s_tt[:, None]
+    gravity, inertial, velocity = weights @ terms.gravity, drag * rate**2 + push * change, q_s * rate
+    if arms.actuation is None:
+        nothing = np.zeros(gravity.shape)
+        return MotionLoad(gravity, nothing, nothing, inertial, velocity)
+    drives = arms.actuation
+    known = {name: np.nan_to_num(getattr(drives, name)) for name in ("rotor_inertia", "coulomb", "viscous")}
+    return motion_load(gravity, inertial, velocity, q_ss * rate**2 + q_s * change, replace(drives, **known))
+
+
+@cache
+def _instants(samples: int, instants: int, density: int) -> tuple[Array, Array, Array]:
+    """Return (F, R) weights that interpolate between R samples at F instants, and s_τ and s_ττ there (F,)."""
+    t = np.linspace(0.0, 1.0, density * (instants - 1) + 1)
+    s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    at = s * (samples - 1)
+    before = np.minimum(at.astype(np.intp), samples - 2)
+    weights = np.zeros((len(t), samples))
+    rows = np.arange(len(t))
+    weights[rows, before] = 1.0 - (at - before)
+    weights[rows, before + 1] += at - before
+    return weights, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
+
+
+def check_durations(drives: Actuation | None, plan: CyclePlan) -> Actuation | None:
+    """Return the drives if their torques and speeds are known, else None.
+
+    Raises:
+        SettingsError: They are not known, and a step should be as fast as possible.
+    """
+    if drives is not None and not np.isnan(drives.peak + drives.no_load_speed + drives.corner_speed).any():
+        return drives
+    if any(plan.times[motion.step] is None for motion in plan.motions):
+        raise SettingsError(
+            "cycle_time and other quantities of time need the duration of each step, or actuators with known torques "
+            "and speeds; try cycle: {time: 1.5, ...}"
+        )
+    return None
+
+
+def _durations(arms: ArmArrays, plan: CyclePlan, loads: Sequence[MotionLoad]) -> Array:
+    """Return the (N, M) durations: the least for torques and speeds, scaled to a step's own time if it states one.
+
+    Without known torques and speeds, the motions of a step share its time by the largest travel of a joint.
+    """
+    drives = check_durations(arms.actuation, plan)
+    travel = np.stack([np.abs(load.velocity).max(axis=(1, 2)) for load in loads], axis=1)  # (N, M)
+    durations = travel + 1e-9
+    if drives is not None:
+        least = np.stack([least_time(load, drives) for load in loads], axis=1)
+        durations = np.clip(np.where(np.isfinite(least), ROUNDING * least, MAX_TIME), MIN_TIME, MAX_TIME)
+    for step in {motion.step for motion in plan.motions}:
+        own = [i for i, motion in enumerate(plan.motions) if motion.step == step]
+        time = plan.times[step]
+        if time is not None:
+            durations[:, own] *= time / durations[:, own].sum(axis=1, keepdims=True)
+    return durations

@@ -1,0 +1,266 @@
+"""One continuous joint path through a cycle.
+
+A block's first pose has K postures from different starts of the inverse kinematics (entry_postures.py). Each is
+followed along the block's lines, coarsely; joint motions join the blocks. Which candidate each block takes is chosen
+for the cycle as a whole (cycle_choice.py), as in the ladder graph of Descartes (ROS-Industrial). The chosen path is
+then followed with as many samples as it takes for neighbours to be near.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.cycle.cycle_choice import CLOSED, JOINT_STEPS, MAX_SLIDE, MAX_STEP, ON_LIMIT, choose_postures
+from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures, postures_near
+from armwright.kinematics.cycle.line_following import IndexArray, follow_lines, tool_errors
+from armwright.kinematics.cycle.motion_path import MotionPath
+from armwright.kinematics.devices import Device
+from armwright.tasks.motions import CyclePlan, stack_poses
+from armwright.tasks.obstacles import Obstacle
+
+MAX_REFINEMENT = 64  # of the samples
+SHARP = 4.0  # times the mean step of a line that makes its largest one a peak
+REDUCED = 0.75  # a step that twice the samples leave above this share of it is a jump
+INSTANTS = 33  # of a motion, equally spaced in time, at which its loads are evaluated
+ROUGH, ROUGH_INSTANTS = 0.25, 5  # refinement and instants of a rough path
+
+
+@dataclass(frozen=True)
+class CycleGroup:
+    """Arms whose paths have equally many samples, and are all sharp or not.
+
+    Attributes:
+        index: (n,) which of the N arms they are.
+        arms: The arms.
+        paths: Their path along each of the M motions.
+        is_sharp: Whether joints move several times as fast in a short part of a line as on average.
+    """
+
+    index: IndexArray
+    arms: ArmArrays
+    paths: tuple[MotionPath, ...]
+    is_sharp: bool
+
+
+@dataclass(frozen=True)
+class CyclePaths:
+    """N arms along the M motions of a cycle.
+
+    Attributes:
+        plan: The cycle.
+        entry: (N, B, D) posture at the first pose of each block.
+        groups: The joint paths.
+        path_error: (N, M) largest distance of the tip from the line [m]; 0 for joint motions.
+        path_angle: (N, M) largest angle of the tool from its direction along the line [rad].
+        self_clearance: (N, M) smallest distance of two links or motor bodies that are not neighbours [m].
+        obstacle_clearance: (N, M) smallest distance of a link or motor body from an obstacle [m].
+        limit_distance: (N, M) smallest distance of a joint from its limits [rad] or [m].
+        jumps: (N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that
+            speeds are not.
+        worst: (N, M, 3) share of the motion at which path error, angle and clearance are worst.
+        instants: F, the number of instants of a motion, equally spaced in time, at which its loads are evaluated.
+    """
+
+    plan: CyclePlan
+    entry: Array
+    groups: tuple[CycleGroup, ...]
+    path_error: Array
+    path_angle: Array
+    self_clearance: Array
+    obstacle_clearance: Array
+    limit_distance: Array
+    jumps: NDArray[np.bool_]
+    worst: Array
+    instants: int = INSTANTS
+
+    def of_arm(self, row: int) -> tuple[ArmArrays, tuple[MotionPath, ...]]:
+        """Return an arm, as one of one, and its path along each motion."""
+        for group in self.groups:
+            (at,) = np.nonzero(group.index == row)
+            if len(at):
+                return group.arms[at], tuple(MotionPath(path.motion, path.q[at]) for path in group.paths)
+        raise IndexError(f"expected an arm from 0 to {len(self.jumps) - 1}, got {row}")
+
+    def postures(self, n_poses: int) -> Array:
+        """Return (N, T, D) joint values at the first T poses of the plan, NaN where the cycle does not stop."""
+        n, dof = len(self.jumps), self.groups[0].arms.dof
+        q = np.full((n, n_poses, dof), np.nan)
+        for group in self.groups:
+            for path in reversed(group.paths):
+                if path.motion.end < n_poses:
+                    q[group.index, path.motion.end] = path.q[:, -1]
+            first = group.paths[0]
+            if first.motion.start < n_poses:
+                q[group.index, first.motion.start] = first.q[:, 0]
+        return q
+
+
+def find_paths(
+    arms: ArmArrays,
+    plan: CyclePlan,
+    obstacles: Sequence[Obstacle] = (),
+    candidates: int = CANDIDATES,
+    device: Device = "cpu",
+    near: Array | None = None,
+) -> CyclePaths:
+    """Find the joint paths of N arms through a cycle. A path that is off is a result, never an exception.
+
+    Args:
+        arms: N arms.
+        plan: The cycle.
+        obstacles: The obstacles.
+        candidates: K, the number of postures at the first pose of each block to choose from.
+        device: The device to compute on.
+        near: (N, B, D) postures at the first pose of each block that the arms are to keep, as far as they can, instead
+            of choosing from candidates.
+    """
+    if near is None:
+        postures = entry_postures(arms, plan, obstacles, candidates, device)
+    else:
+        postures = postures_near(arms, plan, near, device)
+    chosen = choose_postures(arms, plan, postures, obstacles, device)
+    n, entry, ratios = len(arms), chosen.entry, chosen.step_ratios
+    is_line = np.array([motion.by == "line" for motion in plan.motions])
+    refinement, before = _refined(np.ones(n, dtype=np.intp), ratios.max(axis=1)), ratios[:, 0]
+    jumps = np.zeros((n, len(plan.motions)), dtype=bool)
+    groups: list[CycleGroup] = []
+    unfinished = np.arange(n)
+    while len(unfinished):
+        factor = int(refinement[unfinished].min())
+        index = unfinished[refinement[unfinished] == factor]
+        part = arms[index]
+        paths = _follow(part, plan, entry[index], factor, device)
+        steps = np.stack([_step_ratio(part, path) for path in paths], axis=1)  # (n, M)
+        along = np.where(is_line, steps, 0.0).max(axis=1)
+        is_jump = (along > 1.0) & ((along > REDUCED * before[index]) | (factor >= MAX_REFINEMENT))
+        done = (steps.max(axis=1) <= 1.0) | is_jump | chosen.hopeless[index] | (factor >= MAX_REFINEMENT)
+        jumps[index] = is_jump[:, None] & is_line & (steps > 1.0)
+        sharp = _is_sharp(part, paths) & ~is_jump & ~chosen.hopeless[index]
+        for rows, kind in ((np.flatnonzero(done & ~sharp), False), (np.flatnonzero(done & sharp), True)):
+            if len(rows):
+                found = tuple(MotionPath(path.motion, path.q[rows]) for path in paths)
+                groups.append(CycleGroup(index[rows], part[rows], found, kind))
+        before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
+        unfinished = np.setdiff1d(unfinished, index[done])
+    return _measure(plan, entry, groups, jumps, obstacles, device)
+
+
+def rough_paths(
+    arms: ArmArrays, plan: CyclePlan, near: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu"
+) -> CyclePaths:
+    """Estimate the joint paths of N arms through a cycle by a few samples.
+
+    Nothing is chosen or refined. Of jumps only those are found that come from a joint at its limit.
+
+    Args:
+        arms: N arms.
+        plan: The cycle.
+        near: (N, B, D) postures near those at the first pose of each block.
+        obstacles: The obstacles.
+        device: The device to compute on.
+    """
+    entry = np.clip(near, arms.lower[:, None], arms.upper[:, None])
+    paths = _follow(arms, plan, entry, ROUGH, device)
+    group = CycleGroup(np.arange(len(arms)), arms, paths, is_sharp=False)
+    jumps = np.zeros((len(arms), len(paths)), dtype=bool)
+    return replace(_measure(plan, entry, [group], jumps, obstacles, device, between=1), instants=ROUGH_INSTANTS)
+
+
+def _refined(refinement: IndexArray, ratio: Array) -> IndexArray:
+    """Return the refinement that should bring the largest step down to what is allowed, doubled at least."""
+    doublings = np.ceil(np.log2(np.clip(ratio, 1.0, 8.0))).astype(np.intp)
+    return np.minimum(refinement * 2 ** np.where(ratio > 1.0, np.maximum(doublings, 1), 0), MAX_REFINEMENT)
+
+
+def _step_ratio(arms: ArmArrays, path: MotionPath) -> Array:
+    """Return the (N,) largest step of any joint relative to the allowed one."""
+    return (path.largest_steps / np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)).max(axis=1)
+
+
+def _is_sharp(arms: ArmArrays, paths: Sequence[MotionPath]) -> NDArray[np.bool_]:
+    """Return (N,) whether a step along a line is several times as large as the mean of the line."""
+    sharp = np.zeros(len(arms), dtype=bool)
+    allowed = np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
+    for path in paths:
+        if path.motion.by == "line":
+            steps = (np.abs(np.diff(path.q, axis=1)) / allowed).max(axis=2)
+            sharp |= steps.max(axis=1) > SHARP * steps.mean(axis=1)
+    return sharp
+
+
+def _follow(
+    arms: ArmArrays, plan: CyclePlan, entry: Array, refinement: float, device: Device
+) -> tuple[MotionPath, ...]:
+    """Return the path of arms along each motion; entry: (N, B, D) postures at the first pose of each block."""
+    samples = plan.sample(refinement)
+    q = follow_lines(arms, samples, entry[:, :, None], device).q[:, 0]  # (N, S, D)
+    share = np.linspace(0.0, 1.0, math.ceil(refinement * JOINT_STEPS) + 1)[:, None]
+    paths: list[MotionPath] = []
+    for index, motion in enumerate(plan.motions):
+        if motion.by == "line":
+            first, last = samples.of_motion[index]
+            paths.append(MotionPath(motion, q[:, first : last + 1]))
+        else:
+            block = plan.joint_motions.index(index)
+            start = q[:, samples.first[block + 1] - 1, None]
+            end = q[:, samples.first[(block + 1) % len(plan.blocks)], None]
+            paths.append(MotionPath(motion, (1.0 - share) * start + share * end))
+    return tuple(paths)
+
+
+def _measure(
+    plan: CyclePlan,
+    entry: Array,
+    groups: Sequence[CycleGroup],
+    jumps: NDArray[np.bool_],
+    obstacles: Sequence[Obstacle],
+    device: Device,
+    between: int = 2,
+) -> CyclePaths:
+    """Return the paths with what they are off by and how near they come; between: as in `_line_errors`."""
+    n, m = jumps.shape
+    values = np.zeros((5, n, m))
+    worst = np.zeros((n, m, 3))
+    for group in groups:
+        if plan.is_loop:
+            gap = np.abs(group.paths[-1].q[:, -1] - group.paths[0].q[:, 0]).max(axis=1)
+            jumps[group.index, -1] |= gap > CLOSED
+        errors = _line_errors(group, plan, device, between)
+        q = np.concatenate([path.q for path in group.paths], axis=1)
+        clearance = np.stack(clearances(group.arms, q, obstacles, device))  # (2, n, R)
+        margin = np.minimum(q - group.arms.lower[:, None], group.arms.upper[:, None] - q)
+        margin = np.where(group.arms.motion[:, None] == FIXED, np.inf, margin).min(axis=2)
+        at = 0
+        for i, path in enumerate(group.paths):
+            end = at + path.q.shape[1]
+            own = clearance[:, :, at:end]
+            if errors[i] is not None:
+                values[:2, group.index, i] = errors[i].max(axis=1).T
+                worst[group.index, i, :2] = errors[i].argmax(axis=1) / (errors[i].shape[1] - 1)
+            values[2:4, group.index, i] = own.min(axis=2)
+            worst[group.index, i, 2] = own.min(axis=0).argmin(axis=1) / (path.q.shape[1] - 1)
+            values[4, group.index, i] = margin[:, at:end].min(axis=1)
+            if path.motion.by == "line":  # where a joint meets its limit, the speeds of the others jump
+                jumps[group.index, i] |= (margin[:, at + 1 : end - 1] <= ON_LIMIT).any(axis=1)
+            at = end
+    path_error, path_angle, own, clear, margin = values
+    return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
+
+
+def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> list[Any]:
+    """Return (n, between R + 1, 2) distance [m] and angle [rad] off each line of R + 1 samples; None for others."""
+    lines = [path for path in group.paths if path.motion.by == "line"]
+    if not lines:
+        return [None] * len(group.paths)
+    shares = [np.linspace(0.0, 1.0, between * (path.q.shape[1] - 1) + 1) for path in lines]
+    poses = stack_poses([plan.line(path.motion, share) for path, share in zip(lines, shares, strict=True)])
+    q = np.concatenate([path.at(share) for path, share in zip(lines, shares, strict=True)], axis=1)
+    errors = iter(np.split(tool_errors(group.arms, poses, q, device), np.cumsum([len(s) for s in shares])[:-1], axis=1))
+    return [next(errors) if path.motion.by == "line" else None for path in group.paths]

@@ -1,0 +1,220 @@
+"""What the drives of joints can deliver, and the least time of a motion that respects it.
+
+A motor that pushes in the direction of its motion delivers the smaller of its peak torque P and the line through
+(corner speed, P) and (no-load speed, 0). A motor that brakes delivers P. Required torques count with the safety factor.
+Drives of which a rating is unknown give NaN.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.actuation import Actuation
+
+MAX_RATE = 1e9  # [1/s] of motions without any limit, which take no time
+ALLOWED = 1.0 + 1e-10  # of a limit relative to the peak torque
+STILL = 1e-6  # [rad] or [m] in a duration of 1 s; a joint that rests moves by less, from rounding
+ROUNDING = 1e-13  # of a sum relative to its terms
+
+
+@dataclass(frozen=True)
+class MotionLoad:
+    """What a motion of N arms requires of D joints at S samples, for any duration T.
+
+    The torque at a sample is gravity + coulomb + viscous / T + inertial / T², the speed is velocity / T. Sliding joints
+    have N, m/s and m instead of N m, rad/s and rad.
+    """
+
+    gravity: Array  # (N, S, D) [N m]
+    coulomb: Array  # (N, S, D) friction in the direction of the velocity, 0 at rest [N m]
+    viscous: Array  # (N, S, D) friction at T = 1 s [N m s]
+    inertial: Array  # (N, S, D) of links and rotors, with Coriolis terms, at T = 1 s [N m s²]
+    velocity: Array  # (N, S, D) at T = 1 s [rad]
+
+    def torque(self, time: Array) -> Array:
+        """Return the (N, S, D) torques [N m] for durations (N,) [s]."""
+        duration = time[:, None, None]
+        return self.gravity + self.coulomb + self.viscous / duration + self.inertial / duration**2
+
+
+def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: Array, drives: Actuation) -> MotionLoad:
+    """Return the load of a motion, with friction and rotor inertia of the drives.
+
+    Args:
+        gravity: (N, S, D) torques that hold the arm [N m].
+        inertial: (N, S, D) torques that move its links in T = 1 s, without gravity [N m s²].
+        velocity: (N, S, D) of the joints, for T = 1 s [rad].
+        acceleration: (N, S, D) of the joints, for T = 1 s [rad].
+        drives: Actuation of the N arms.
+    """
+    coulomb, viscous, rotor = (each[:, None] for each in (drives.coulomb, drives.viscous, drives.rotor_inertia))
+    return MotionLoad(
+        gravity=gravity,
+        coulomb=coulomb * np.sign(np.where(np.abs(velocity) > STILL, velocity, 0.0)),
+        viscous=viscous * velocity,
+        inertial=inertial + rotor * acceleration,
+        velocity=velocity,
+    )
+
+
+def available_torque(torque: Array, velocity: Array, drives: Actuation) -> Array:
+    """Return how much torque drives can deliver in the direction of the torques that are required.
+
+    Args:
+        torque: (N, K, D) of which the direction counts [N m].
+        velocity: (N, K, D) [rad/s].
+        drives: Actuation of the N arms.
+
+    Returns:
+        (N, K, D) absolute torques [N m].
+    """
+    peak, no_load = drives.peak[:, None], drives.no_load_speed[:, None]
+    gap, speed = _falling_range(drives)[:, None], np.abs(velocity)
+    share = np.where(gap == 0.0, speed <= no_load, (no_load - speed) / np.where(gap == 0.0, 1.0, gap))
+    motoring = torque * velocity > 0.0
+    return np.where(motoring, peak * np.clip(np.where(motoring, share, 1.0), 0.0, 1.0), peak)
+
+
+def torque_speed_utilisation(torque: Array, velocity: Array, drives: Actuation) -> Array:
+    """Return the factor by which torque and speed together exceed what drives can deliver.
+
+    It is the largest ratio of the point (required torque, speed) to the border of the available torques in the same
+    direction from (0, 0): at most 1 if the drive can deliver the torque, and at rest the share of the peak torque.
+
+    Args:
+        torque: (N, K, D) required, without the safety factor [N m].
+        velocity: (N, K, D) [rad/s].
+        drives: Actuation of the N arms.
+
+    Returns:
+        (N, K, D) utilisations; 0 for fixed joints.
+    """
+    share = drives.safety_factor[:, None, None] * np.abs(torque) / drives.peak[:, None]
+    along_line = (share * _falling_range(drives)[:, None] + np.abs(velocity)) / drives.no_load_speed[:, None]
+    return np.where(torque * velocity > 0.0, np.maximum(share, along_line), share)
+
+
+def least_time(load: MotionLoad, drives: Actuation) -> Array:
+    """Return the least durations (N,) of motions that drives can follow [s]; infinite if there is none.
+
+    With u = 1 / T, each limit at each sample is a quadratic inequality α u² + β u + γ <= 0. Turned so that the velocity
+    w is not negative, and with the safety factor k, the torque is τ(u) = a + b u + c u² and the limits are
+
+        k τ <= P,   -k τ <= P,   k τ + P w u / (ω₀ - ω_c) <= P ω₀ / (ω₀ - ω_c),   w u <= ω₀
+
+    The third one, the falling line, always holds for τ <= 0 within the speed limit, so a motor that brakes needs no
+    case of its own. α >= 0 allows an interval of u, α < 0 excludes one: gravity may permit a motion that is impossible
+    at a lower speed. So the result is the largest u that all inequalities allow together, not the least of their ends.
+    From the speed limit, u descends to the roots of the inequalities that do not hold there, until all hold. An arm
+    that could not stop on the way, because k |gravity| > P, has none.
+
+    Args:
+        load: Load of the motions of N arms.
+        drives: Actuation of the N arms.
+
+    Examples:
+        A motor of 2 N m and 10 rad/s turns a disc of 0.1 kg m² by 1 rad at a constant speed.
+
+        >>> import numpy as np
+        >>> from armwright.kinematics.arms.actuation import actuation_at_joints, ratings_of
+        >>> from armwright.robot.arm import Actuator
+        >>> motor = Actuator("servo", 0.1, peak_torque=2.0, speed=10.0, corner_speed=0.0, rotor_inertia=0.1,
+        ...                  coulomb_friction=0.0, viscous_friction=0.0)
+        >>> ratings = np.array([[ratings_of(motor)]])
+        >>> drives = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
+        >>> still, turn = np.zeros((1, 1, 1)), np.ones((1, 1, 1))
+        >>> float(least_time(motion_load(still, still, turn, still, drives), drives)[0])
+        0.1
+    """
+    limits = _Limits.of(load, drives)
+    holds = (drives.safety_factor[:, None, None] * np.abs(load.gravity) <= drives.peak[:, None]).all(axis=(1, 2))
+    rate, rows = np.where(holds, limits.fastest, -np.inf), np.flatnonzero(holds)
+    while len(rows):  # each step passes at least one root for good
+        lower = limits.largest_root_below(rate, rows)
+        rows, lower = rows[lower < np.inf], lower[lower < np.inf]
+        rate[rows] = lower
+        rows = rows[lower > 0.0]
+    with np.errstate(divide="ignore", over="ignore"):
+        time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0))
+    known = ~np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
+    return np.where(known & ~np.isnan(load.coulomb + load.viscous + load.inertial).any(axis=(1, 2)), time, np.nan)
+
+
+def _falling_range(drives: Actuation) -> Array:
+    """Return the (N, D) range of speeds over which the available torque falls [rad/s]; 0 for fixed joints."""
+    fixed = np.isinf(drives.no_load_speed)
+    return np.where(fixed, 0.0, drives.no_load_speed - np.where(fixed, 0.0, drives.corner_speed))
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """Limits of N motions: a + b u + c u² within ±1, plus d u at most the level, for M joints and samples.
+
+    Attributes:
+        a, b, c: (N, M) torque in the direction of the motion, with the safety factor, relative to the peak torque.
+        d: (N, M) speed relative to the range of falling torque [s].
+        level: (N, M) no-load speed relative to that range; infinite without one.
+        fastest: (N,) largest u by the no-load speeds, at most MAX_RATE [1/s].
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+    level: Array
+    fastest: Array
+
+    @classmethod
+    def of(cls, load: MotionLoad, drives: Actuation) -> Self:
+        """Return the limits of a load."""
+        n, samples, _ = load.gravity.shape
+        scale = np.where(load.velocity < 0.0, -1.0, 1.0) * (drives.safety_factor[:, None] / drives.peak)[:, None]
+        torques = (load.gravity + load.coulomb, load.viscous, load.inertial)
+        speed, gap = np.abs(load.velocity), _falling_range(drives)
+        falls = gap > 0.0
+        width = np.where(falls, gap, 1.0)
+        level = np.where(falls, np.where(falls, drives.no_load_speed, 1.0) / width, np.inf)
+        with np.errstate(divide="ignore", over="ignore"):
+            fastest = (drives.no_load_speed / speed.max(axis=1)).min(axis=1)
+        return cls(
+            *((scale * torque).reshape(n, -1) for torque in torques),
+            d=(speed * np.where(falls, 1.0 / width, 0.0)[:, None]).reshape(n, -1),
+            level=np.repeat(level[:, None], samples, axis=1).reshape(n, -1),
+            fastest=np.minimum(fastest, MAX_RATE),
+        )
+
+    def largest_root_below(self, rate: Array, rows: NDArray[np.intp]) -> Array:
+        """Return, for each row, the least over the limits that its rate exceeds of their largest smaller roots.
+
+        No u between is allowed. It is infinite if no limit is exceeded, and -infinite if one has no smaller root.
+        """
+        u = rate[rows, None]
+        a, b, c, d, level = (each[rows] for each in (self.a, self.b, self.c, self.d, self.level))
+        torque = a + (b + c * u) * u
+        lower = np.full(len(rows), np.inf)
+        for sign, exceeded in ((1.0, torque > ALLOWED), (-1.0, torque < -ALLOWED)):
+            i, j = np.nonzero(exceeded)
+            roots = _largest_root_below(sign * c[i, j], sign * b[i, j], sign * a[i, j] - 1.0, u[i, 0])
+            np.minimum.at(lower, i, roots)
+        i, j = np.nonzero(torque + d * u > level + (ALLOWED - 1.0))
+        roots = _largest_root_below(c[i, j], b[i, j] + d[i, j], a[i, j] - level[i, j], u[i, 0])
+        np.minimum.at(lower, i, roots)
+        return lower
+
+
+def _largest_root_below(alpha: Array, beta: Array, gamma: Array, u: Array) -> Array:
+    """Return the largest root of α x² + β x + γ below u, where it is positive; infinite where it is 0 but for rounding.
+
+    -infinite without such a root. Roots are free of cancellation (Press et al. 2007, section 5.6).
+    """
+    terms = np.stack([alpha * u**2, beta * u, gamma])
+    discriminant = beta**2 - 4.0 * alpha * gamma
+    q = -0.5 * (beta + np.copysign(np.sqrt(np.maximum(discriminant, 0.0)), beta))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        roots = np.stack([q / alpha, gamma / q])
+    below = np.where(roots < u, roots, -np.inf).max(axis=0)  # NaN is not below
+    positive = terms.sum(axis=0) > ROUNDING * np.abs(terms).sum(axis=0)
+    return np.where(positive, np.where(discriminant >= 0.0, below, -np.inf), np.inf)

@@ -1,0 +1,162 @@
+"""Warp kernel of inverse dynamics by recursive Newton-Euler (Luh, Walker & Paul 1980), one posture per thread, float64.
+
+Along a motion, joint values are q(s) with the share s(t). The torque is
+
+    gravity(q) + drag(q, q_s, q_ss) s'² + push(q, q_s) s'',   push = M q_s,   drag = M q_ss + C(q, q_s) q_s
+
+(Bobrow et al. 1985). The kernel computes the three terms from one pass of forward kinematics.
+"""
+
+# Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from armwright.kinematics.arms.arm_arrays import FIXED, MAX_JOINTS, PRISMATIC
+from armwright.kinematics.arms.frame_math import frame_math
+from armwright.kinematics.arms.ik_math import kernel
+from armwright.robot.arm import GRAVITY
+
+TERMS = ("gravity", "drag", "push")
+
+
+@dataclass(frozen=True)
+class DynamicsKernels:
+    """The kernel and its types; it compiles when it is first loaded, and is cached on disk."""
+
+    real: Any
+    Bodies: Any
+    torque_terms: Any
+
+
+@cache
+def dynamics_kernels() -> DynamicsKernels:
+    """Return the kernel."""
+    base = frame_math("float64")
+    real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
+    translate, rotate, axis_of = base.translate, base.rotate, base.axis_of
+    Vectors = wp.types.matrix(shape=(MAX_JOINTS, 3), dtype=real)
+    zero, one, two = real(0.0), real(1.0), real(2.0)
+
+    @wp.struct
+    class Bodies:
+        """Arms as rigid bodies."""
+
+        dof: int
+        base: wp.array(dtype=Vector3)  # (N,)
+        motion: wp.array2d(dtype=int)  # (N, D)
+        offset: wp.array2d(dtype=Vector3)  # (N, D)
+        mass: wp.array2d(dtype=real)  # (N, D)
+        com: wp.array2d(dtype=Vector3)  # (N, D)
+        inertia: wp.array2d(dtype=Matrix3)  # (N, D) about the centre of mass
+        payload_mass: real
+        payload_com: wp.array(dtype=Vector3)  # (N,) from the tip, in the last frame
+        payload_inertia: wp.array(dtype=Matrix3)  # (N,) about its centre of mass, in the last frame
+
+    @wp.func
+    def row(values: Vectors, j: int):
+        return Vector3(values[j, 0], values[j, 1], values[j, 2])
+
+    @kernel
+    def torque_terms(
+        bodies: Bodies,
+        q: wp.array3d(dtype=real),
+        q_s: wp.array3d(dtype=real),
+        q_ss: wp.array3d(dtype=real),
+        carried: wp.array(dtype=real),
+        terms: wp.array4d(dtype=real),
+    ):
+        """Compute the terms of the torque along a motion.
+
+        q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  carried: (S,) share of
+        the payload that is carried.  terms: (3, N, S, D) gravity, drag and push [N m] or [N].
+        """
+        arm, sample = wp.tid()
+        # Frames of all links: position of the joint, its axis, and the x and y axes of what it carries.
+        place, axis, along_x, along_y = Vectors(), Vectors(), Vectors(), Vectors()
+        x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
+        p = bodies.base[arm]
+        for j in range(bodies.dof):
+            motion = bodies.motion[arm, j]
+            value = q[arm, sample, j]
+            p = translate(motion, p, value, x, y, z)
+            a = axis_of(motion, x, y, z)
+            x, y, z = rotate(motion, x, y, z, wp.sin(value), wp.cos(value))
+            offset = bodies.offset[arm, j]
+            for i in range(3):
+                place[j, i] = p[i]
+                axis[j, i] = a[i]
+                along_x[j, i] = x[i]
+                along_y[j, i] = y[i]
+            p = p + offset[0] * x + offset[1] * y + offset[2] * z
+        tip = p
+        for term in range(3):
+            force, moment = Vectors(), Vectors()  # on each link, about the joint
+            omega, alpha, acceleration = Vector3(), Vector3(), Vector3()
+            if term == 0:
+                acceleration = Vector3(zero, zero, real(GRAVITY))  # as of a base that accelerates upwards
+            before = bodies.base[arm]
+            if bodies.dof > 0:
+                before = row(place, 0)
+            for j in range(bodies.dof):
+                motion = bodies.motion[arm, j]
+                a = row(axis, j)
+                rate = real(0.0)
+                change = real(0.0)
+                if term == 1:
+                    rate = q_s[arm, sample, j]
+                    change = q_ss[arm, sample, j]
+                if term == 2:
+                    change = q_s[arm, sample, j]
+                here = row(place, j)
+                lever = here - before
+                acceleration = acceleration + wp.cross(alpha, lever) + wp.cross(omega, wp.cross(omega, lever))
+                if motion < wp.static(PRISMATIC):
+                    alpha = alpha + change * a + rate * wp.cross(omega, a)
+                    omega = omega + rate * a
+                elif motion < wp.static(FIXED):
+                    acceleration = acceleration + change * a + (two * rate) * wp.cross(omega, a)
+                before = here
+                lx = row(along_x, j)
+                ly = row(along_y, j)
+                frame = wp.matrix_from_cols(lx, ly, wp.cross(lx, ly))
+                lever = frame * bodies.com[arm, j]
+                f = bodies.mass[arm, j] * (
+                    acceleration + wp.cross(alpha, lever) + wp.cross(omega, wp.cross(omega, lever))
+                )
+                local = wp.transpose(frame)
+                inertia = bodies.inertia[arm, j]
+                spin = local * omega
+                n = frame * (inertia * (local * alpha) + wp.cross(spin, inertia * spin)) + wp.cross(lever, f)
+                for i in range(3):
+                    force[j, i] = f[i]
+                    moment[j, i] = n[i]
+            # The payload moves with the last link; x, y, z are its axes.
+            frame = wp.matrix_from_cols(x, y, z)
+            lever = tip - before + frame * bodies.payload_com[arm]
+            total_force = (carried[sample] * bodies.payload_mass) * (
+                acceleration + wp.cross(alpha, lever) + wp.cross(omega, wp.cross(omega, lever))
+            )
+            local = wp.transpose(frame)
+            inertia = carried[sample] * bodies.payload_inertia[arm]
+            spin = local * omega
+            total_moment = frame * (inertia * (local * alpha) + wp.cross(spin, inertia * spin))
+            total_moment = total_moment + wp.cross(lever, total_force)
+            after = before
+            for step in range(bodies.dof):
+                j = bodies.dof - 1 - step
+                here = row(place, j)
+                total_moment = total_moment + wp.cross(after - here, total_force) + row(moment, j)
+                total_force = total_force + row(force, j)
+                load = real(0.0)
+                if bodies.motion[arm, j] < wp.static(PRISMATIC):
+                    load = wp.dot(row(axis, j), total_moment)
+                elif bodies.motion[arm, j] < wp.static(FIXED):
+                    load = wp.dot(row(axis, j), total_force)
+                terms[term, arm, sample, j] = load
+                after = here
+
+    return DynamicsKernels(real, Bodies, torque_terms)

@@ -1,0 +1,122 @@
+"""Terms of the joint torques along the motions of a cycle, independent of their durations."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.chunks import SAMPLES, in_chunks
+from armwright.kinematics.cycle.cycle_path import CyclePaths
+from armwright.kinematics.cycle.motion_path import MotionPath
+from armwright.kinematics.devices import Device, load_kernels
+
+
+@dataclass(frozen=True)
+class TorqueTerms:
+    """Terms of N arms at the R samples of a motion, with s the share of the motion.
+
+    The torque is gravity + drag s'² + push s'' [N m], or a force [N].
+
+    Attributes:
+        gravity: (N, R, D).
+        drag: (N, R, D).
+        push: (N, R, D).
+        q_s: (N, R, D) derivative of the joint values by s [rad] or [m].
+        q_ss: (N, R, D) second derivative.
+    """
+
+    gravity: Array
+    drag: Array
+    push: Array
+    q_s: Array
+    q_ss: Array
+
+
+def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[TorqueTerms, ...]]:
+    """Return, for each group of arms, the terms along each motion; payload: its mass when carried [kg]."""
+    found: list[tuple[TorqueTerms, ...]] = []
+    for group in paths.groups:
+        q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
+        counts = [path.q.shape[1] for path in group.paths]
+        carried = np.repeat([float(path.motion.carries) for path in group.paths], counts)
+        terms = _terms(group.arms, q, q_s, q_ss, carried, payload, device)  # (3, n, S, D)
+        spans = np.cumsum([0, *counts])
+        found.append(
+            tuple(
+                TorqueTerms(terms[0, :, a:b], terms[1, :, a:b], terms[2, :, a:b], q_s[:, a:b], q_ss[:, a:b])
+                for a, b in pairwise(spans)
+            )
+        )
+    return found
+
+
+def inverse_dynamics_torques(
+    arms: ArmArrays, q: Array, qd: Array, qdd: Array, carried: Array, payload: float, device: Device = "cpu"
+) -> Array:
+    """Return (N, S, D) torques of N arms in S states, without rotors and friction [N m], or forces [N].
+
+    Args:
+        arms: N arms.
+        q: (N, S, D) joint values [rad] or [m].
+        qd: (N, S, D) speeds [rad/s] or [m/s].
+        qdd: (N, S, D) accelerations [rad/s²] or [m/s²].
+        carried: (S,) share of the payload that is carried.
+        payload: Its mass [kg].
+        device: The device to compute on.
+    """
+    gravity, drag, _ = _terms(arms, q, qd, qdd, carried, payload, device)  # M q_ss + C q_s, with the time as share
+    return gravity + drag
+
+
+def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, device: Device = "cpu") -> Array:
+    """Return (N, S, D, D) joint-space inertia matrices of N arms in S postures, without rotors, in SI units.
+
+    Args:
+        arms: N arms.
+        q: (N, S, D) joint values [rad] or [m].
+        carried: (S,) share of the payload that is carried.
+        payload: Its mass [kg].
+        device: The device to compute on.
+    """
+    rest = np.zeros_like(q)
+    units = (np.broadcast_to(unit, q.shape) for unit in np.eye(arms.dof))
+    return np.stack([_terms(arms, q, unit, rest, carried, payload, device)[2] for unit in units], axis=-1)
+
+
+def _values(path: MotionPath, order: int) -> Array:
+    """Return (n, R, D) joint values at the samples, or their derivatives."""
+    if order == 0:
+        return path.q
+    return np.broadcast_to(path.at(path.share, order), path.q.shape)
+
+
+def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device) -> Array:
+    """Return (3, N, S, D) gravity, drag and push of N arms at S samples."""
+    wp, kernels = load_kernels("cycle.dynamics_kernels", device)
+    terms = np.empty((3, *q.shape))
+
+    def solve(chunk: slice) -> None:
+        part = arms[chunk]
+        bodies = kernels.Bodies()
+        bodies.dof, bodies.payload_mass = arms.dof, wp.float64(payload)
+        values: dict[str, Any] = {name: getattr(part, name).astype(np.float64) for name in ("base", "offset")}
+        values |= {"motion": part.motion} | vars(part.rigid_bodies)
+        values |= {"payload_com": part.payload_center.astype(np.float64)}
+        values |= {"payload_inertia": payload * part.payload_gyration}
+
+        def on_device(array: Array, dtype: Any) -> Any:
+            return wp.array(np.ascontiguousarray(array), dtype=dtype, device=device, copy=False)
+
+        for name, array in values.items():
+            setattr(bodies, name, on_device(array, kernels.Bodies.vars[name].type.dtype))
+        inputs = [on_device(array[chunk], kernels.real) for array in (q, q_s, q_ss)]
+        found = wp.empty((3, *q[chunk].shape), dtype=kernels.real, device=device)
+        inputs = [bodies, *inputs, on_device(carried, kernels.real), found]
+        wp.launch(kernels.torque_terms, q[chunk].shape[:2], inputs=inputs, device=device)
+        terms[:, chunk] = found.numpy()
+
+    in_chunks(solve, len(arms), max(1, SAMPLES[device] // q.shape[1]), device)
+    return terms

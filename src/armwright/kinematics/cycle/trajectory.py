@@ -1,0 +1,111 @@
+"""The motion of an arm through its cycle in time, sampled for controllers and simulators."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.cycle.motion_path import MotionPath
+from armwright.kinematics.cycle.torque_terms import inverse_dynamics_torques
+from armwright.tasks.motions import CyclePlan
+
+PERIOD = 0.004  # [s] between rows
+SAME_TIME = 1e-9  # [s]
+STILL = 1e-6  # [rad/s] or [m/s]; rounding moves a joint that rests at less, and its friction would follow the sign
+
+IndexArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """R rows of the D moving joints of an arm, every 4 ms from rest to rest.
+
+    Attributes:
+        time: (R,) [s].
+        step: (R,) number of the step, counted from 1.
+        target: (R,) index of the target on the last row of each dwell or arrival, else -1.
+        payload: (R,) mass carried from the row on [kg].
+        q: (R, D) joint values [rad] or [m].
+        qd: (R, D) speeds [rad/s] or [m/s].
+        qdd: (R, D) accelerations [rad/s²] or [m/s²].
+        tau: (R, D) torques of the drives at the joints [N m], or forces [N].
+    """
+
+    time: Array
+    step: IndexArray
+    target: IndexArray
+    payload: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+
+
+def sample_trajectory(
+    arm: ArmArrays, paths: tuple[MotionPath, ...], plan: CyclePlan, durations: Array, dwells: Array, payload: float
+) -> Trajectory:
+    """Sample the cycle of one arm.
+
+    Args:
+        arm: The arm, as one of one.
+        paths: Its path along each of the M motions of the plan.
+        plan: The cycle.
+        durations: (M,) of the motions [s].
+        dwells: (M,) time at rest after each motion [s].
+        payload: Mass of the payload [kg].
+    """
+    begin = np.concatenate([[0.0], np.cumsum(durations + dwells)])
+    time = np.arange(int(np.ceil((begin[-1] - SAME_TIME) / PERIOD)) + 1, dtype=np.float64) * PERIOD
+    # The row at which a motion begins is the last one of the dwell before it.
+    motion = np.maximum(np.searchsorted(begin[:-1], time - SAME_TIME) - 1, 0)
+    q, qd, qdd = np.empty((3, len(time), arm.dof))
+    for index, path in enumerate(paths):
+        rows = motion == index
+        q[rows], qd[rows], qdd[rows] = _states(path, time[rows] - begin[index], durations[index])
+    step, target, carried = _events(plan, motion)
+    tau = _drive_torques(arm, q, qd, qdd, carried, payload)
+    moves = arm.motion[0] != FIXED
+    return Trajectory(time, step, target, payload * carried, q[:, moves], qd[:, moves], qdd[:, moves], tau[:, moves])
+
+
+def _states(path: MotionPath, time: Array, duration: float) -> tuple[Array, Array, Array]:
+    """Return (F, D) joint values, speeds and accelerations at times (F,) from the start of a motion [s]."""
+    t = np.clip(time / duration, 0.0, 1.0)
+    s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    rate = (30.0 * t**2 * (1.0 - t) ** 2 / duration)[:, None]
+    change = (60.0 * t * (1.0 - t) * (1.0 - 2.0 * t) / duration**2)[:, None]
+    q, q_s, q_ss = (path.at(s, order)[0] for order in range(3))
+    qd = q_s * rate
+    return q, np.where(np.abs(qd) < STILL, 0.0, qd), q_ss * rate**2 + q_s * change
+
+
+def _events(plan: CyclePlan, motion: IndexArray) -> tuple[IndexArray, IndexArray, Array]:
+    """Return (R,) number of the step, index of the target where one ends, and 1 where the payload is carried."""
+    motions, steps = plan.motions, plan.cycle.steps
+    step = np.array([one.step for one in motions])[motion] + 1
+    carried = np.array([float(one.carries) for one in motions])[motion]
+    target = np.full(len(motion), -1)
+    last_rows = np.append(np.flatnonzero(np.diff(motion)), len(motion) - 1)
+    for row in last_rows:
+        at = motions[motion[row]]
+        if at.arrives:
+            do = steps[at.step].do
+            target[row] = plan.targets[at.step]
+            carried[row] = float(at.carries if do is None else do == "pick")
+    if not plan.cycle.closed:
+        step[0], target[0] = 1, plan.targets[0]
+    return step, target, carried
+
+
+def _drive_torques(arm: ArmArrays, q: Array, qd: Array, qdd: Array, carried: Array, payload: float) -> Array:
+    """Return (R, D) torques of the drives [N m], or forces [N]."""
+    torques = inverse_dynamics_torques(arm, q[None], qd[None], qdd[None], carried, payload)[0]
+    drives = arm.actuation
+    if drives is None:
+        return torques
+    inertia, coulomb, viscous = (
+        np.nan_to_num(values[0]) for values in (drives.rotor_inertia, drives.coulomb, drives.viscous)
+    )
+    return torques + inertia * qdd + viscous * qd + coulomb * np.sign(qd)

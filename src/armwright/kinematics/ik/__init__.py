@@ -1,0 +1,1 @@
+"""Joint angles that bring the tool to poses."""

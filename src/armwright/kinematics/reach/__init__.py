@@ -1,0 +1,1 @@
+"""What an arm reaches, carries and yields over its reach."""

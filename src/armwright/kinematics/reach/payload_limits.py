@@ -1,0 +1,80 @@
+"""Payloads that motors hold at rest, in known postures and over the reach of an arm."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.arms.forward import Frames, forward_kinematics
+from armwright.kinematics.reach.reach_postures import ReachPostures, postures_over_reach
+from armwright.robot.arm import GRAVITY, Arm
+from armwright.tasks.moments import MAX_MASS
+
+
+@dataclass(frozen=True)
+class ReachPayloads:
+    """Payloads of an arm at fractions of its horizontal reach.
+
+    Attributes:
+        reach: The largest horizontal distance of the tip from the first joint [m].
+        payloads: The payload held in all postures found at each fraction [kg]; NaN where none was found.
+    """
+
+    reach: float
+    payloads: tuple[float, ...]
+
+
+def payload_limits(arms: ArmArrays, frames: Frames, torques: Array, peak: Array) -> Array:
+    """Return the (N, K) largest payloads that all motors hold at rest [kg], at most MAX_MASS.
+
+    Torques are linear in the mass of the payload, so each motor holds up to a limit of its own. An arm that does not
+    hold itself holds nothing.
+
+    Args:
+        arms: N arms.
+        frames: Their frames in K postures.
+        torques: (N, K, D) that hold the arms without payload [N m], or forces [N].
+        peak: (N, D) torques [N m], or forces [N], that may be used at rest.
+    """
+    by_mass, allowed = torques_by_payload(arms, frames), peak[:, None]
+    loaded = by_mass != 0.0
+    room = (allowed - np.sign(by_mass) * torques) / np.where(loaded, np.abs(by_mass), 1.0)
+    limits = np.where(loaded, room, np.inf).min(axis=-1)
+    holds_itself = (np.abs(torques) <= allowed).all(axis=-1)
+    return np.where(holds_itself, np.clip(limits, 0.0, MAX_MASS), 0.0)
+
+
+def torques_by_payload(arms: ArmArrays, frames: Frames) -> Array:
+    """Return the (N, K, D) torques that hold a payload, by its mass [N m/kg], or forces [N/kg]."""
+    center = frames.tip + (frames.rotation[:, :, -1] @ arms.payload_center.astype(np.float64)[:, None, :, None])[..., 0]
+    rises = np.cross(frames.axis, center[:, :, None] - frames.position)[..., 2]
+    return GRAVITY * np.where(arms.prismatic[:, None], frames.axis[..., 2], rises)
+
+
+def payloads_over_reach(arm: Arm, fractions: Sequence[float] = (0.5, 1.0)) -> ReachPayloads:
+    """Return the payloads that an arm holds at fractions of its horizontal reach, with its safety factor.
+
+    The least payload of all postures found is the one that the arm holds however it gets there. The payload is a point
+    at the tip.
+
+    Args:
+        arm: An arm with actuators.
+        fractions: Of the reach, each above 0 and at most 1.
+    """
+    return held_payloads(postures_over_reach(arm, fractions))
+
+
+def held_payloads(postures: ReachPostures) -> ReachPayloads:
+    """Return the payloads that an arm with actuators holds in postures over its reach, as `payloads_over_reach`."""
+    drives = postures.arms.actuation
+    assert drives is not None, "expected an arm with actuators"
+    allowed = drives.peak / drives.safety_factor[:, None]
+    least = np.full(len(postures.targets), np.nan)
+    for found, is_there in postures.found():
+        frames = forward_kinematics(postures.arms, found.q.astype(np.float64))
+        held = payload_limits(postures.arms, frames, found.torque.astype(np.float64), allowed)[0]
+        least = np.fmin(least, np.where(is_there, held, np.nan))
+    payloads = np.fmin.reduce(postures.by_fraction(least), axis=1)
+    return ReachPayloads(postures.reach, tuple(payloads.tolist()))

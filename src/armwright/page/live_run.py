@@ -1,0 +1,131 @@
+"""A run folder as the live server shows it: its content, and the status of the study."""
+
+import secrets
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from armwright.exceptions import ArmwrightError
+from armwright.existing.compare_arms import EXISTING_ARMS
+from armwright.llm.transcript import TRANSCRIPTS, used_hints
+from armwright.page.content import RunContent, design_files
+from armwright.proof.results import REPORT, SUMMARY
+from armwright.runs.control import (
+    CONTROL,
+    STATUS,
+    read_control,
+    read_status,
+)
+from armwright.runs.folder import CONFIG, REACH_MAPS, is_held, read_config
+from armwright.runs.trials_file import TRIALS
+from armwright.sheet.design_sheet import design_sheet
+from armwright.sheet.html import to_html
+
+BESIDE = (REACH_MAPS, EXISTING_ARMS, REPORT)  # what commands beside the run add to the page; they end with the report
+WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL, *BESIDE)
+RECENT = 20  # trials whose mean duration predicts the remaining time
+RUNNING = ("evaluating", "asking", "paused", "searching")
+
+
+class LiveRun:
+    """The current content of a run folder, which may not hold a run yet. Safe to use from several threads."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.fault = ""  # the reason why the folder cannot be read
+        self._content: RunContent | None = None
+        self._seen: list[tuple[int, ...] | None] = []
+        self._server = secrets.token_hex(8)  # tells a page that another server took over its address
+        self._run = 0  # number of runs seen in this folder since the server started
+        self._lock = threading.Lock()
+        self.status = self._status()
+
+    def look(self) -> None:
+        """Read the files that have changed."""
+        with self._lock:
+            seen = [_stamp(self.folder / name) for name in WATCHED]
+            if seen == self._seen and not (self.status["doing"] in RUNNING and not is_held(self.folder)):
+                return
+            self._seen = seen
+            try:
+                self._read()
+                self.fault = ""
+            except ArmwrightError as fault:
+                self.fault = str(fault)  # for example a file that is being rewritten; it is read again when it changes
+            except Exception as fault:  # noqa: BLE001 (the server must survive any folder content)
+                self.fault = f"the run folder cannot be read: {type(fault).__name__}: {fault}"
+            self.status = self._status()
+
+    def packed(self, designs: int, calls: int) -> bytes | None:
+        """Return what is new for a page; None while there is no run."""
+        with self._lock:
+            return None if self._content is None else self._content.packed(designs, calls, with_files=False)
+
+    def file(self, number: int, kind: str) -> str | None:
+        """Return a design as text; None if it does not exist. kind: urdf, mjcf or datasheet."""
+        with self._lock:
+            if self._content is None or number >= len(self._content.history):
+                return None
+            if kind == "datasheet":
+                return to_html(design_sheet(self.folder, number))
+            return design_files(self._content.history, number).get(kind)
+
+    def _read(self) -> None:
+        if not (self.folder / CONFIG).is_file():
+            return
+        if self._content is None or not self._content.is_still(read_config(self.folder)):
+            self._content = None  # an unreadable run must not appear as the previous one
+            self._run += 1
+            self._content = RunContent(self.folder)
+        elif self._content.refresh():
+            self._run += 1
+
+    def _status(self) -> dict[str, Any]:
+        """Return the content of the page's status bar."""
+        content, status, control = self._content, read_status(self.folder), read_control(self.folder)
+        trials = () if content is None else content.history.trials
+        calls = () if content is None else content.calls
+        study = None if content is None else content.study
+        is_finished = content is not None and content.summary is not None
+        doing = status.doing if status is not None else "finished" if is_finished else "unknown"
+        if doing == "unknown" and content is not None and content.study is None and is_held(self.folder):
+            doing = "searching"  # a direct search, which reports no status
+        if doing in RUNNING and not is_held(self.folder):
+            doing = "gone"
+        recent = [trial.seconds.get("total", 0.0) for trial in trials[-RECENT:]]
+        planned = None if study is None else study.n_trials
+        n_init = 0 if study is None else study.n_init
+        used = used_hints(calls)  # proposals, named PROPOSER-NUMBER, by hint
+        return {
+            "name": self.folder.resolve().name,
+            "run": f"{self._server}-{self._run}",
+            "doing": doing,
+            "since": 0.0 if status is None else status.since,
+            "designs": len(trials),
+            "calls": len(calls),
+            "planned": planned,
+            "finished": is_finished,
+            "beside": str([_stamp(self.folder / name) for name in BESIDE]),
+            "left": None if planned is None or not recent else (planned - len(trials)) * sum(recent) / len(recent),
+            "paused": control.paused,
+            "fault": self.fault or ("" if status is None else status.fault),
+            "takes_hints": study is not None and _asks_a_model(study.proposer or {}),
+            "hints": [
+                {"text": hint.text, "used": int(used[hint].rpartition("-")[2]) - n_init + 1 if hint in used else None}
+                for hint in control.hints
+            ],
+        }
+
+
+def _asks_a_model(proposer: Mapping[str, Any]) -> bool:
+    """Return whether a hint would reach a model; rules, people and replays take none."""
+    return "prompt" in proposer and "replay" not in proposer and proposer["name"] != "manual"
+
+
+def _stamp(path: Path) -> tuple[int, ...] | None:
+    try:
+        there = path.stat()
+    except OSError:
+        return None
+    return there.st_mtime_ns, there.st_ctime_ns, there.st_size, there.st_ino

@@ -1,0 +1,170 @@
+"""Serve the live page of a run to browsers on this machine, in this process or another.
+
+The server reads the run folder and writes the user's requests into control.json, so the study never waits for it.
+Needs the extra `live`.
+"""
+
+import asyncio
+import ipaddress
+import secrets
+import socket
+import subprocess
+import threading
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, cast
+
+from armwright.child_process import start_module
+from armwright.exceptions import FailureError, SettingsError
+from armwright.extras import check_extra
+
+if TYPE_CHECKING:
+    from starlette.applications import Starlette
+
+    from armwright.page.live_app import OpenPages
+
+LOOPBACK = "127.0.0.1"
+HTTP_PORT = 80  # omitted in addresses
+POLL = 0.25  # [s] between checks for open pages
+GRACE = 3.0  # [s] to wait for a first page after the study has ended
+LINGER = 60.0  # [s] to wait for a page to come back, such as a tab in the background
+
+
+def serve(
+    folder: Path, tell: Callable[[str], None], host: str = LOOPBACK, port: int = 0, study: BinaryIO | None = None
+) -> None:
+    """Serve the page of a run until Ctrl-C.
+
+    Args:
+        folder: The run folder.
+        tell: Called with the page's address, which holds the key, once it can be opened.
+        host: Address to listen on.
+        port: Port to listen on; 0 for any free one.
+        study: A pipe that closes when the study's process ends; the server then ends as soon as no page is open.
+
+    Raises:
+        MissingExtraError: The extra `live` is not installed.
+        FailureError: The address cannot be used.
+    """
+    check_extra("live", "the live page")
+    from armwright.page.live_app import OpenPages, live_app
+
+    pages = OpenPages()
+    serve_app(live_app(folder, pages), {"/"}, pages, tell, host, port, study)
+
+
+def serve_app(
+    app: "Starlette",
+    shells: Collection[str],
+    pages: "OpenPages",
+    tell: Callable[[str], None],
+    host: str,
+    port: int,
+    study: BinaryIO | None = None,
+) -> None:
+    """Serve an application as `serve` does, behind a guard with a key of 192 bits.
+
+    Args:
+        app: The application.
+        shells: The paths of its pages, which need no key.
+        pages: Counts the open pages.
+        tell: As in `serve`, like the rest.
+        host: Address.
+        port: Port.
+        study: Pipe.
+    """
+    import uvicorn
+
+    from armwright.page.request_guard import Guard
+
+    listener, key = _listen(host, port), secrets.token_urlsafe(24)
+    port = listener.getsockname()[1]
+    settings = uvicorn.Config(
+        Guard(app, key, shells, _hosts(host, listener)), log_config=None, access_log=False,
+        log_level="error",  # a client's invalid requests are not news
+        lifespan="on", timeout_graceful_shutdown=1, server_header=False,
+        proxy_headers=False,  # any user of this machine can send X-Forwarded-Proto and -For
+        ws="none",
+    )  # fmt: skip
+
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            # From here on Ctrl-C ends it in order.
+            tell(f"http://{f'[{host}]' if ':' in host else host}:{port}/#key={key}")
+
+    server = Server(settings)
+    is_alone = threading.Event()
+    if study is not None:
+        threading.Thread(target=lambda: (study.read(), is_alone.set()), daemon=True).start()
+
+    async def end() -> None:
+        idle = 0.0
+        while not server.should_exit:
+            await asyncio.sleep(POLL)
+            idle = idle + POLL if pages.count == 0 and is_alone.is_set() else 0.0
+            if idle >= (LINGER if pages.were_open else GRACE):
+                server.should_exit = True
+        pages.is_closing = True
+
+    async def run() -> None:
+        ending = asyncio.create_task(end())
+        await server.serve(sockets=[listener])
+        ending.cancel()
+
+    with suppress(KeyboardInterrupt):
+        asyncio.run(run())
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    if not host:
+        raise SettingsError("--host: expected an address, got an empty one; use 127.0.0.1 for this machine alone")
+    try:
+        kind = socket.AF_INET6 if ":" in host else socket.AF_INET
+        listener = socket.socket(kind, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(128)  # accepts connections before the address is announced
+    except OSError as fault:
+        raise FailureError(f"cannot listen on {host}, port {port}: {fault.strerror or fault}") from fault
+    except OverflowError as fault:
+        raise SettingsError(f"--port: expected a whole number from 0 to 65535, got {port}") from fault
+    return listener
+
+
+def _hosts(host: str, listener: socket.socket) -> Callable[[str], bool]:
+    """Return the check of Host headers for this address."""
+    address, port = cast("tuple[str, int]", listener.getsockname()[:2])
+    if not _is_loopback(address):
+        return lambda host: True  # on a network, any name may lead here
+    names = {f"[{name}]" if ":" in name else name for name in (host.lower(), address, "localhost", LOOPBACK, "::1")}
+    known = {f"{name}:{port}" for name in names}
+    return lambda host: host.lower() in known or (port == HTTP_PORT and host.lower() in names)
+
+
+def _is_loopback(address: str) -> bool:
+    ip = ipaddress.ip_address(address)
+    mapped = ip.ipv4_mapped if isinstance(ip, ipaddress.IPv6Address) else None
+    return (mapped or ip).is_loopback
+
+
+def start_server(folder: Path) -> str:
+    """Start a process that serves the page of this process's study, and return the page's address.
+
+    The server outlives the study while a page is open. If it crashes, the study goes on.
+    """
+    check_extra("live", "the live page")
+    # In a session of its own: after Ctrl-C the page still shows the results.
+    server = start_module(
+        "armwright", "live", folder.absolute(), "--follow", stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert server.stdout is not None
+    address = server.stdout.readline().decode().strip()
+    if not address.startswith("http://"):
+        raise FailureError("the live page's server did not start; its output is above")
+    _pipes.append(server)
+    return address
+
+
+_pipes: list[subprocess.Popen[bytes]] = []  # kept open: their closing tells the servers that the study has ended

@@ -1,0 +1,145 @@
+// The content of the page: unpacked from the bytes of a run, and extended while the run goes on.
+
+const VIEWS = {
+  uint8: Uint8Array, int32: Int32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
+};
+
+// A JSON head, and arrays that are views of the bytes (see page/content.py, pack).
+export function unpack(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const arrays = {};
+  for (const [name, [type, at, shape]] of Object.entries(head.arrays)) {
+    const size = shape.reduce((product, n) => product * n, 1);
+    arrays[name] = { data: new VIEWS[type](buffer, 4 + length + at, size), shape };
+  }
+  return { head, arrays };
+}
+
+// The bytes of a page that opens without a server.
+export async function embedded(text) {
+  const binary = atob(text.trim());
+  const bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = binary.charCodeAt(i);
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(stream).arrayBuffer();
+}
+
+export class Content {
+  constructor() {
+    this.head = null;
+    this.calls = [];
+    this._clear();
+  }
+
+  _clear() {
+    this.n = 0;
+    this._chunks = [];
+    this._chunk = []; // of each design
+    this._row = [];
+    this.proposals = {};
+    this.failures = {}; // why evaluations failed, which then have no finite values
+  }
+
+  // Adds a packed run, or only its new part.
+  add(buffer) {
+    const { head, arrays } = unpack(buffer);
+    if (head.designs_from === 0) this._clear();
+    if (head.designs_from !== this.n) throw new Error("designs are missing in between");
+    this.head = head;
+    this.curve = arrays.curve.data;
+    this.reach = Object.fromEntries(Object.entries(head.reach_maps).map(([i, map]) => [i, { ...map, levels: arrays[`reach_${i}`].data }]));
+    Object.assign(this.proposals, head.proposals);
+    Object.assign(this.failures, head.failures);
+    this.calls = [...this.calls.slice(0, head.calls_from), ...head.calls];
+    if (arrays.values) {
+      const rows = arrays.values.shape[0];
+      for (let row = 0; row < rows; row++) {
+        this._chunk.push(this._chunks.length);
+        this._row.push(row);
+      }
+      this._chunks.push(arrays);
+      this.n += rows;
+    }
+  }
+
+  // A view of the part of an array that belongs to a design.
+  _part(name, i) {
+    const { data, shape } = this._chunks[this._chunk[i]][name];
+    const size = data.length / shape[0];
+    return data.subarray(this._row[i] * size, (this._row[i] + 1) * size);
+  }
+
+  get objectives() { return this.head.config.objectives; }
+  get nInit() { return this.head.config.method.n_init ?? 0; }
+  get targets() { return this.head.targets; }
+  get obstacles() { return this.head.obstacles; }
+  source(i) { return this.head.sources[this._part("source", i)[0]]; }
+  look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
+  values(i) { return this._part("values", i); }
+  violations(i) { return this._part("violations", i); } // one per constraint; satisfied at <= 0
+  hasFailed(i) { return i in this.failures; }
+  isFeasible(i) { return !this.hasFailed(i) && this.violations(i).every((value) => value <= 0); }
+
+  // The active parameters: the arm has their module, and its type uses them.
+  params(i) {
+    const numbers = this._part("params", i), known = {};
+    return this.head.parameters.map((p, k) => ({ ...p, value: p.choices ? p.choices[numbers[k]] : numbers[k] })).filter((p) => {
+      if (p.needs) {
+        const [module, types] = p.needs;
+        if (module > Number(known.n_joints ?? module)) return false;
+        if (p.name !== `joint_${module}` && !types.includes(known[`joint_${module}`])) return false;
+      }
+      known[p.name] = p.value;
+      return true;
+    });
+  }
+
+  // The joint types in order, such as "PYR".
+  joints(i) {
+    return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
+  }
+
+  // The value of a parameter; undefined if it is not active.
+  param(i, name) { return this.params(i).find((p) => p.name === name)?.value; }
+
+  // The choices of KIND_1, KIND_2, … in order; KIND is "motor", "tube" or "direction".
+  chosen(i, kind) {
+    return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
+  }
+
+  arm(i) {
+    const arm = {}, n = this._part("joints", i)[0];
+    for (const name of ["base", "up", "tip", "tool_axis", "tool_side", "payload_center"]) arm[name] = this._part(name, i);
+    for (const name of ["kind", "axis", "lower", "upper", "travel", "mass", "radius"]) arm[name] = this._part(name, i).subarray(0, n);
+    for (const name of ["offset", "com"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
+    if (this.head.arrays.body_shape) {
+      arm.body_shape = this._part("body_shape", i).subarray(0, n);
+      for (const name of ["body_half", "body_centre"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
+    }
+    if (this.head.arrays.column_half) arm.column_half = this._part("column_half", i);
+    return arm;
+  }
+
+  // Joint values [rad] or [m] at a target.
+  q(i, target) {
+    const all = this._part("q", i), size = all.length / this.targets.length;
+    return all.subarray(target * size, target * size + this._part("joints", i)[0]);
+  }
+
+  isRobust(i) { return this.head.result.robust === null ? null : this.head.result.robust.includes(i); }
+  callsOf(i) {
+    const id = this.proposals[i]?.id;
+    return id ? this.calls.filter((call) => isOf(call, id)) : [];
+  }
+
+  // What was predicted of the designs of a call that were not evaluated.
+  screenedOf(call) {
+    return Object.values(this.proposals).filter((one) => one.screened && isOf(call, one.id)).map((one) => one.screened);
+  }
+}
+
+// Several designs of one call are named NAME-0042.1, .2, …
+function isOf(call, id) {
+  return call.proposal && (call.proposal === id || id.startsWith(call.proposal + "."));
+}

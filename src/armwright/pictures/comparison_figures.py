@@ -1,0 +1,253 @@
+"""Figures of a comparison: those of the paper, times to target and attainment surfaces."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from armwright.experiments.compare_runs import Comparison
+from armwright.experiments.plan import ExperimentPlan
+from armwright.experiments.run_record import shares_by_source
+from armwright.pareto import front_indices, hypervolume, paper_solution_indices
+from armwright.pictures.arm_figures import draw_arm, frame
+from armwright.pictures.attainment import draw_attainment
+from armwright.pictures.drawing import (
+    draw_dominated,
+    frame_plane,
+    legend_below,
+    method_handle,
+    one_panel,
+    several_panels,
+    write_drawn,
+)
+from armwright.pictures.figures import draw_samples
+from armwright.pictures.reason_figures import draw_reasons
+from armwright.pictures.style import BEST_KNOWN, FRONT, MISSED, TARGET, line, look
+from armwright.proof.results import FIGURES
+
+MAX_SHOWN = 12  # most tasks in the figure of targets
+COLUMNS = 3  # panels side by side
+MARKERS = 5  # markers on a curve
+
+
+@dataclass(frozen=True)
+class Curves:
+    """A figure of hypervolume curves."""
+
+    name: str
+    title: str
+    methods: Sequence[str]
+
+
+def write_comparison_figures(
+    place: Path, comparison: Comparison, curves: Sequence[Curves] = (), samples: Sequence[str] = ()
+) -> list[Path]:
+    """Draw a comparison into `place`/figures and return the PNG files.
+
+    Args:
+        place: Folder of the experiment.
+        comparison: The runs to compare.
+        curves: Figures of hypervolume curves; by default one with all methods.
+        samples: Methods to show in detail: the first one with runs is drawn; by default the last of all methods.
+    """
+    return write_drawn(place / FIGURES, _drawn(comparison, curves, samples))
+
+
+def write_experiment_figures(out: Path, plan: ExperimentPlan, found: Comparison) -> list[Path]:
+    """Draw the standard figures and those named in the plan; return the PNG files."""
+    labels = {key: method.label for key, method in plan.methods.items()}
+    curves = [Curves(key, f.title, [labels[method] for method in f.methods]) for key, f in plan.figures.items()]
+    return write_comparison_figures(out, found, curves, [labels[key] for key in plan.samples])
+
+
+def _drawn(comparison: Comparison, curves: Sequence[Curves], samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
+    yield "targets", draw_targets(comparison)
+    plane = all(len(run.config.objectives) > 1 for run in comparison.runs)  # figures of the first two objectives
+    with_curves = [
+        method for method in comparison.methods if any(len(comparison.curves(method, t)) for t in comparison.tasks)
+    ]
+    if with_curves:
+        if plane:
+            yield "area", draw_area(comparison)
+        for figure in curves or (Curves("methods", "", with_curves),):
+            methods = [method for method in figure.methods if method in with_curves]
+            if methods:
+                yield f"hypervolume-{figure.name}", draw_curves(comparison, methods, figure.title)
+        yield "time-to", draw_times(comparison, with_curves)
+    for task in comparison.tasks[: MAX_SHOWN if plane else 0]:
+        yield f"attainment-{task}", draw_attainment(comparison, task)
+    if any(run.proposer for run in comparison.runs):
+        yield "attribution", draw_attribution_shares(comparison)
+    yield from _details(comparison, samples)
+
+
+def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
+    """Yield figures of one run per task: its samples, Solutions 1 and 2, and the reasons for Solution 1."""
+    shown = next((method for method in samples if method in comparison.methods), comparison.methods[-1])
+    for task in comparison.tasks[:COLUMNS]:
+        runs = [run for run in comparison.runs_of(shown, task) if len(run.curve)]
+        if not runs:
+            continue
+        history = runs[0].history()
+        if len(history.problem.objectives) > 1:
+            yield f"samples-{task}", draw_samples(history)
+        solutions = paper_solution_indices(history.masked_objectives, comparison.reference_point(task))
+        for i, number in enumerate(dict.fromkeys(solutions or ()), start=1):
+            title = f"{task}, {shown}, seed {runs[0].seed}: Solution {i}"
+            yield f"solution-{i}-{task}", draw_arm(history, title, history.member(number))
+        reasons = draw_reasons(runs[0], history, solutions)
+        if reasons is not None:
+            yield f"reasoning-{task}", reasons
+
+
+def draw_targets(comparison: Comparison) -> Figure:
+    """Draw the targets of each task in space."""
+    shown = comparison.tasks[:MAX_SHOWN]
+    columns = min(len(shown), COLUMNS + 1)
+    rows = -(-len(shown) // columns)
+    figure = Figure(figsize=(3.2 * columns, 3.3 * rows))
+    figure.subplots_adjust(left=0.02, right=0.95, bottom=0.06 / rows, top=1 - 0.1 / rows, wspace=0.1, hspace=0.16)
+    for place, task in enumerate(shown, start=1):
+        points = comparison.first_run(task).config.task.target_positions
+        axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
+        axes.scatter(*points.T, marker="*", s=90, color=TARGET, edgecolors=FRONT, linewidths=0.5, depthshade=False)
+        low, high = points.min(axis=0), points.max(axis=0)
+        half = float(max(0.1, 0.55 * (high - low).max()))
+        floor = (low + high)[2] / 2 - half
+        for x, y, z in points.tolist():
+            axes.plot([x, x], [y, y], [floor, z], color="#BBBBBB", linewidth=0.6)
+        frame(axes, ((low + high) / 2, half))
+        axes.set_title(f"{task}: {len(points)} targets", y=1.0)
+    if len(shown) < len(comparison.tasks):
+        figure.suptitle(f"{len(shown)} of {len(comparison.tasks)} tasks", fontsize=10)
+    return figure
+
+
+def draw_area(comparison: Comparison) -> Figure:
+    """Draw the area that E_hv measures, between the front of one run and the reference point."""
+    run = next(
+        run
+        for method in [comparison.baseline, *comparison.methods]
+        for run in comparison.runs
+        if run.method == method and len(run.curve)
+    )
+    reference = np.array(run.reference_point)
+    history = run.history()
+    values, masked = history.values[:, :2], history.masked_objectives
+    evaluated = values[np.isfinite(values).all(axis=1)]
+    inside = values[[n for n in front_indices(masked[:, :2]) if np.all(values[n] < reference[:2])]]
+    figure, axes = one_panel(4.4, 3.8)
+    axes.scatter(*evaluated.T, s=12, color="#9A9A9A", label="designs")
+    if len(inside):
+        fill = {"facecolor": "#F0E442", "alpha": 0.5, "hatch": "///", "edgecolor": "#B8AE2C"}
+        draw_dominated(axes, inside, run.reference_point, label="area measured", **fill)
+        axes.scatter(*inside.T, s=34, color=MISSED, edgecolors="white", linewidths=0.5, zorder=4, label="Pareto front")
+    axes.annotate("reference point", reference[:2], xytext=(-4, 5), textcoords="offset points", ha="right")
+    limits = np.column_stack([np.zeros(2), 1.15 * reference[:2]])  # the area reaches to the reference point
+    frame_plane(axes, history.problem, run.reference_point, limits)
+    area = hypervolume(masked, run.reference_point)
+    axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: E_hv = {area:.2f}")
+    axes.legend(loc="lower left")
+    return figure
+
+
+def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> Figure:
+    """Draw the mean and standard deviation of the hypervolume over the seeds, with a panel for each task."""
+    figure, panels = _panels(comparison.tasks, 2.6)
+    for axes, task in zip(panels, comparison.tasks, strict=True):
+        for method in methods:
+            curves = comparison.curves(method, task)
+            if not len(curves):
+                continue
+            style = line(comparison.methods.index(method))
+            iterations = np.arange(1, len(curves[0]) + 1)
+            mean, deviation = curves.mean(axis=0), curves.std(axis=0)
+            low, high = mean - deviation, mean + deviation
+            axes.fill_between(iterations, low, high, color=style.colour, alpha=0.15, linewidth=0)
+            axes.plot(iterations, mean, **style.curve, markevery=max(1, len(mean) // MARKERS), marker=style.marker)
+        known = comparison.best_known(task)
+        if known is not None:
+            axes.axhline(known, **BEST_KNOWN)
+        axes.set(title=task, xlabel="Iteration")
+        axes.margins(y=0.08)
+        axes.set_ylim(bottom=0)
+        axes.set_xlim(left=0)
+    for axes in panels[:: _columns(comparison.tasks)]:
+        axes.set_ylabel("Hypervolume")
+    handles = [method_handle(comparison, method) for method in methods]
+    if any(comparison.best_known(task) is not None for task in comparison.tasks):
+        handles.append(Line2D([], [], **BEST_KNOWN, label="best known"))
+    legend_below(figure, handles)
+    seeds = {len(comparison.runs_of(method, task)) for method in methods for task in comparison.tasks} - {0}
+    runs = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else f"{seeds.pop()}"
+    caption = f"mean and standard deviation of {runs} runs"
+    figure.suptitle(f"{title}: {caption}" if title else caption.capitalize(), fontsize=10)
+    return figure
+
+
+def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
+    """Draw the share of runs that reached a level of the best known hypervolume, over the counted trials."""
+    levels = sorted({time.level for time in comparison.times})
+    figure = several_panels(10.4, 3.2)
+    panels: Any = np.atleast_1d(figure.subplots(1, len(levels), sharey=True))
+    for axes, level in zip(panels, levels, strict=True):
+        for method in methods:
+            reached = sorted(n for task in comparison.tasks for n in comparison.trials_to(method, task, level))
+            longest: int = max(comparison.curves(method, task).shape[1] for task in comparison.tasks)
+            trials = np.arange(longest + 1)
+            share = np.searchsorted(reached, trials, side="right") / len(reached)
+            axes.step(trials, share, where="post", **line(comparison.methods.index(method)).curve)
+        axes.set(title=f"{level:.0%} of the best known", xlabel="Iteration", ylim=(-0.02, 1.02))
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    panels[0].set_ylabel("Runs that reached it")
+    legend_below(figure, [method_handle(comparison, method, with_marker=False) for method in methods])
+    return figure
+
+
+def draw_attribution_shares(comparison: Comparison) -> Figure:
+    """Draw each source's share of the final hypervolume per method, averaged over the runs."""
+    pairs = [
+        (task, method)
+        for task in comparison.tasks
+        for method in comparison.methods
+        if any(run.proposer for run in comparison.runs_of(method, task))
+    ]
+    figure, axes = one_panel(6.4, 1.3 + 0.32 * len(pairs))
+    sources: dict[str, None] = {}
+    for row, (task, method) in enumerate(pairs):
+        left = 0.0
+        for share in shares_by_source(comparison.runs_of(method, task)):
+            axes.barh(row, share.gained, left=left, height=0.7, linewidth=0, **look(share.source).fill)
+            left += share.gained
+            sources[share.source] = None
+    axes.set_yticks(range(len(pairs)), [f"{task}, {comparison.label(method)}" for task, method in pairs])
+    axes.set_ylim(len(pairs) - 0.4, -0.6)
+    axes.set_xlim(0, 1)
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.set_xlabel("Share of the final hypervolume by source")
+    axes.grid(axis="y", visible=False)
+    legend_below(figure, [Patch(label=look(source).label, **look(source).fill) for source in sources])
+    return figure
+
+
+def _columns(tasks: Sequence[str]) -> int:
+    return min(len(tasks), COLUMNS if len(tasks) <= 2 * COLUMNS else COLUMNS + 2)
+
+
+def _panels(tasks: Sequence[str], height: float) -> tuple[Figure, Sequence[Any]]:
+    columns = _columns(tasks)
+    rows = math.ceil(len(tasks) / columns)
+    figure = several_panels(max(5.2, min(3.5, 11.0 / columns) * columns), height * rows + 0.7)
+    panels: list[Any] = list(np.atleast_1d(figure.subplots(rows, columns)).flat)
+    for axes in panels[len(tasks) :]:
+        axes.set_visible(False)
+    for axes in panels:
+        axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
+    return figure, panels[: len(tasks)]

@@ -1,0 +1,114 @@
+"""A picture of a task before any search: targets, tool directions, bases, obstacles and lines of the cycle."""
+
+from itertools import combinations, product
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from armwright.arrays import Array
+from armwright.exceptions import TaskError
+from armwright.files import naming_write_errors
+from armwright.pictures.arm_figures import EDGE, MOVE, frame
+from armwright.pictures.drawing import legend_mark, save_figure
+from armwright.pictures.solids import draw_obstacles
+from armwright.pictures.style import FRONT, OBSTACLE, RC, TARGET
+from armwright.problem.checks.reach import base_box
+from armwright.problem.problem import Problem
+from armwright.tasks.obstacles import Ground
+
+ARROW = 0.12  # length of a tool direction, as a share of the picture's side
+MAX_NAMED = 40  # targets
+FORMATS = (".png", ".pdf", ".svg")
+BASES: Any = {"color": FRONT, "linewidth": 0.9, "linestyle": (0, (2, 2))}  # edges of the box of allowed bases
+PATH: Any = {
+    "color": TARGET,
+    "linewidth": 0.8,
+    "linestyle": (0, (1, 2)),
+}  # a joint motion, whose way depends on the arm
+
+
+def write_task_figure(problem: Problem, file: Path) -> None:
+    """Write the picture of a task and its space.
+
+    Raises:
+        TaskError: The file is not a PNG, PDF or SVG.
+    """
+    if file.suffix.lower() not in FORMATS:
+        raise TaskError(f"--out {file}: expected a name that ends in {', '.join(FORMATS)}")
+    with matplotlib.rc_context(RC), naming_write_errors(file):
+        save_figure(draw_task(problem), file)
+
+
+def draw_task(problem: Problem) -> Figure:
+    """Draw a task and the bases that its space allows."""
+    task = problem.task
+    figure = Figure(figsize=(6.4, 6.0))
+    figure.subplots_adjust(left=0.02, right=0.95, bottom=0.12, top=0.95)
+    axes: Any = figure.add_subplot(projection="3d")
+    extent = _extent(problem)
+    draw_obstacles(axes, task.obstacles, extent)
+    for region in task.workspace:
+        _draw_box(axes, np.array(region.low), np.array(region.high), EDGE)
+    low, high = base_box(problem.space)
+    _draw_box(axes, low, high, BASES)
+    axes.plot(*((low + high) / 2)[:, None], marker="s", markersize=6, color=FRONT)
+    plan = problem.scenes[0].plan
+    for motion in () if plan is None else plan.motions:
+        assert plan is not None
+        axes.plot(*plan.poses.position[[motion.start, motion.end]].T, **(MOVE if motion.by == "line" else PATH))
+    arrays = task.target_arrays
+    for i, point in enumerate(task.target_positions):
+        axes.plot(*point[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
+        if arrays.n_angular[i]:
+            axes.quiver(*point, *(2 * ARROW * extent[1] * arrays.rotation[i, :, 2]), color=TARGET, linewidth=1.2)
+        if i < MAX_NAMED:
+            axes.text(*point, f" {task.target_names[i]}", fontsize=8)
+    frame(axes, extent)
+    axes.set_title(f"{task.name} in space {problem.space.name}")
+    figure.legend(handles=_handles(problem), loc="lower center", ncols=3)
+    return figure
+
+
+def _draw_box(axes: Any, low: Array, high: Array, style: Any) -> None:
+    """Draw the edges of a box, which may be flat, a line or a point."""
+    corners = np.unique(np.array(list(product(*zip(low, high, strict=True)))), axis=0)
+    for one, other in combinations(corners, 2):
+        if (one != other).sum() == 1:
+            axes.plot(*np.array([one, other]).T, **style)
+
+
+def _extent(problem: Problem) -> tuple[Array, float]:
+    """Return the centre (3,) and half the side of the cube that contains targets, bases and workspaces [m]."""
+    task, plan = problem.task, problem.scenes[0].plan
+    corners = [corner for region in task.workspace for corner in region.corners]
+    poses = [] if plan is None else [plan.poses.position]
+    points = np.vstack([task.target_positions, *base_box(problem.space), *corners, *poses])
+    low, high = points.min(axis=0), points.max(axis=0)
+    for obstacle in task.obstacles:
+        if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor close below
+            low[2] = min(low[2], obstacle.z)
+    return (low + high) / 2, float(max(0.1, 0.55 * (high - low).max()))
+
+
+def _handles(problem: Problem) -> list[Line2D | Patch]:
+    """Return the entries of the legend."""
+    handles: list[Line2D | Patch] = [
+        legend_mark("target, tool direction", "*", TARGET, markersize=9, markeredgecolor=FRONT),
+        Line2D([], [], **BASES, marker="s", markersize=5, label="allowed bases, their centre"),
+    ]
+    if problem.task.obstacles:
+        handles.append(Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle"))
+    plan = problem.scenes[0].plan
+    ways = {motion.by for motion in plan.motions} if plan else set[str]()
+    if "line" in ways:
+        handles.append(Line2D([], [], **MOVE, label="line of the cycle"))
+    if ways - {"line"}:
+        handles.append(Line2D([], [], **PATH, label="joint motion between"))
+    if problem.task.workspace:
+        handles.append(Line2D([], [], **EDGE, label="workspace"))
+    return handles

@@ -1,0 +1,1 @@
+"""What is done to a front before a design of it is recommended."""

@@ -1,0 +1,180 @@
+"""The files of a design with a cycle: its model in its surroundings, and its trajectory."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.exceptions import SettingsError
+from armwright.kinematics.arms.arm_arrays import FIXED, carrying, stack_arms
+from armwright.kinematics.cycle.motion_path import MotionPath
+from armwright.kinematics.cycle.trajectory import Trajectory, sample_trajectory
+from armwright.problem.evaluation import Evaluation, evaluate
+from armwright.problem.problem import Problem
+from armwright.proof.simulation_model import Surroundings, to_simulation_mjcf
+from armwright.robot.arm import Arm
+from armwright.spaces.tool_mount import carrying_tool
+from armwright.tasks.task import Task
+
+MODEL, TRAJECTORY = "arm.xml", "trajectory.csv"
+QUANTITIES = ("q", "qd", "qdd", "tau")  # of joints, in a trajectory
+DIGITS = 9
+
+
+@dataclass(frozen=True)
+class CycleModel:
+    """An arm in its task.
+
+    Attributes:
+        mjcf: The model, as XML.
+        trajectory: Its motion through the cycle.
+    """
+
+    mjcf: str
+    trajectory: Trajectory
+
+
+def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, name: str) -> Mapping[str, str]:
+    """Return the content of the files by name; none for a task without a cycle or with a step of unknown duration.
+
+    Args:
+        problem: The problem.
+        arm: The arm of a design.
+        evaluation: Physics of some designs.
+        row: Which of them it is.
+        name: Name of the model.
+    """
+    if evaluation.plan is None:
+        return {}
+    try:
+        model = _modelled(arm, problem.task.target_names, evaluation, row, name)
+    except SettingsError:
+        return {}
+    return {MODEL: model.mjcf, TRAJECTORY: trajectory_csv(model.trajectory, problem.task.target_names)}
+
+
+def cycle_model(arm: Arm, task: Task) -> CycleModel:
+    """Return the model of an arm in its task for MuJoCo, and its trajectory through the cycle.
+
+    Steps without a duration take the least time that the actuators of the arm allow. In the model, moving joints are
+    joint_1, joint_2, …, each with the actuators servo_1, … (position) and ff_1, … (torque).
+
+    Args:
+        arm: The arm. The tool of the task is mounted on an arm that carries none.
+        task: A task with a cycle.
+
+    Raises:
+        SettingsError: The task has no cycle, or a step of unknown duration.
+
+    Examples:
+        >>> import armwright as aw
+        >>> task, space = aw.load_task("desk-sorting"), aw.load_space("desk-sorting")
+        >>> model = aw.cycle_model(space.arm(space.sample(1, 0)[0]), task)
+        >>> model.trajectory.q.shape[0] == len(model.trajectory.time)
+        True
+    """
+    if task.cycle is None:
+        raise SettingsError(f"task {task.name} has no cycle; try cycle: in_order")
+    equipped = carrying_tool(arm, task.tool)
+    return _modelled(equipped, task.target_names, evaluate(equipped, task), 0, task.name)
+
+
+def _modelled(arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, name: str) -> CycleModel:
+    """Return the model and the trajectory of an arm, which is row `row` of an evaluation; SettingsError without one."""
+    trajectory = trajectory_of(arm, evaluation, row)
+    peaks = np.abs(trajectory.tau).max(axis=0)
+    return CycleModel(task_model(arm, target_names, evaluation, row, peaks, name), trajectory)
+
+
+def task_model(
+    arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, peak_torques: Array, name: str
+) -> str:
+    """Return the MJCF of an arm in the surroundings in which it was evaluated.
+
+    Args:
+        arm: The arm.
+        target_names: Names of the targets.
+        evaluation: Physics of some arms.
+        row: Which of them it is.
+        peak_torques: (D,) largest torques of the moving joints [N m] or [N].
+        name: Name of the model.
+    """
+    surroundings = Surroundings(
+        positions=evaluation.targets,
+        target_arrays=evaluation.target_arrays,
+        target_names=target_names,
+        obstacles=evaluation.obstacles,
+        payload=float(evaluation.payload.max()),
+        load_shape=evaluation.load_shape,
+    )
+    return to_simulation_mjcf(arm, surroundings, evaluation.q[row][:, _moving(arm)], peak_torques, name)
+
+
+def peak_torques(arm: Arm, evaluation: Evaluation, row: int) -> Array:
+    """Return (D,) the largest torques of an arm's moving joints [N m] or [N]: along its cycle, else at its targets."""
+    at_targets = np.abs(evaluation.joint_torques[row][:, _moving(arm)]).max(axis=0)
+    if evaluation.plan is None:
+        return at_targets
+    try:
+        return np.abs(trajectory_of(arm, evaluation, row).tau).max(axis=0)
+    except SettingsError:  # a step of unknown duration
+        return at_targets
+
+
+def _moving(arm: Arm) -> list[int]:
+    return [joint for joint, one in enumerate(arm.joints) if one.kind != "fixed"]
+
+
+def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:
+    """Return the trajectory of an arm, which is row `row` of an evaluation.
+
+    Raises:
+        SettingsError: The task has no cycle, or a step of unknown duration.
+    """
+    arrays = carrying(stack_arms([arm], "float64"), evaluation.load_shape)
+    paths = tuple(
+        MotionPath(path.motion, np.where(arrays.motion == FIXED, 0.0, path.q[..., : arrays.dof]))
+        for path in evaluation.paths.of_arm(row)[1]
+    )
+    loads = evaluation.loads
+    payload = float(evaluation.payload.max())
+    return sample_trajectory(arrays, paths, evaluation.paths.plan, loads.durations[row], loads.dwells, payload)
+
+
+def trajectory_csv(trajectory: Trajectory, target_names: Sequence[str]) -> str:
+    """Return a trajectory as CSV, all joints' values after each other: q_1, …, qd_1, …, qdd_1, …, tau_1, ….
+
+    target is the name of a target where the arm has reached it and rested there, else empty.
+    """
+    n = trajectory.q.shape[1]
+    out = io.StringIO()
+    columns = [f"{quantity}_{k}" for quantity in QUANTITIES for k in range(1, n + 1)]
+    out.write(",".join(["time", "step", "target", "payload", *columns]) + "\n")
+    values = np.hstack([getattr(trajectory, quantity) for quantity in QUANTITIES]) + 0.0  # no -0.0
+    line = ",".join([f"%.{DIGITS}g"] * len(columns)) + "\n"
+    heads = zip(trajectory.time, trajectory.step, trajectory.target, trajectory.payload, strict=True)
+    for (time, step, target, payload), row in zip(heads, values.tolist(), strict=True):
+        name = target_names[target] if target >= 0 else ""
+        out.write(f"{time:.{DIGITS}g},{step},{name},{payload:.{DIGITS}g}," + line % tuple(row))
+    return out.getvalue()
+
+
+def read_trajectory(text: str, target_names: Sequence[str]) -> Trajectory:
+    """Return the trajectory of a CSV file."""
+    head, *lines = text.splitlines()
+    cells = [line.split(",") for line in lines]
+    n = (len(head.split(",")) - 4) // len(QUANTITIES)
+    number = {name: index for index, name in enumerate(target_names)} | {"": -1}
+    values = np.array([row[4:] for row in cells], dtype=np.float64).reshape(len(cells), len(QUANTITIES), n)
+    return Trajectory(
+        time=np.array([row[0] for row in cells], dtype=np.float64),
+        step=np.array([row[1] for row in cells], dtype=np.intp),
+        target=np.array([number[row[2]] for row in cells], dtype=np.intp),
+        payload=np.array([row[3] for row in cells], dtype=np.float64),
+        q=values[:, 0],
+        qd=values[:, 1],
+        qdd=values[:, 2],
+        tau=values[:, 3],
+    )

@@ -1,0 +1,37 @@
+"""A design of a run as a file for a simulator or a workshop."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from armwright.exceptions import SettingsError, did_you_mean
+from armwright.proof.selection import pick
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.ros2_control import to_ros2_control
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.folder import read_run
+from armwright.runs.history import FrontMember, History
+
+OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
+
+
+def export_design(run: Path, number: int | None, kind: str) -> str:
+    """Return a design of a run in a format; without a number, the knee of its front."""
+    if kind not in FORMATS:
+        kinds = (*FORMATS, OPTUNA)
+        raise SettingsError(f'unknown format "{kind}".{did_you_mean(kind, kinds)} Formats: {", ".join(kinds)}')
+    _, history = read_run(run)
+    if number is not None and not 0 <= number < len(history):
+        raise SettingsError(f"--design {number}: {run} has the designs 0 to {len(history) - 1}")
+    member = pick(history)[0] if number is None else history.member(number)
+    return FORMATS[kind](history, member)
+
+
+def _name(history: History, member: FrontMember) -> str:
+    return f"{history.problem.task.name}-{member.number}"
+
+
+FORMATS: dict[str, Callable[[History, FrontMember], str]] = {
+    "urdf": lambda history, member: to_urdf(member.arm, _name(history, member)),
+    "mjcf": lambda history, member: to_mjcf(member.arm, _name(history, member)),
+    "ros2_control": lambda history, member: to_ros2_control(member.arm, _name(history, member)),
+}

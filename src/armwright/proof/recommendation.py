@@ -1,0 +1,154 @@
+"""The recommended designs of a front: its knee, its ends, the cheapest and the stiffest, verified in the simulator.
+
+For each it is stated which perturbations it survives.
+"""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.exceptions import MissingExtraError, SettingsError
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import DEFLECTION, ORIENTATION_ERROR, POSITION_ERROR, PRICE, TORQUE
+from armwright.proof.perturbations import FACTORS, Survival, evaluate_survival
+from armwright.proof.ranking import knee_first
+from armwright.proof.simulated_run import Simulator
+from armwright.proof.simulation import PASS
+from armwright.runs.history import History
+
+MAX_TRIED = 10  # designs for each role
+BY_DEFAULT = (POSITION_ERROR.name, ORIENTATION_ERROR.name, TORQUE.name)  # objectives of tasks that state none
+VERIFIED, NOT_SIMULATED = "verified", "not simulated"
+BY_EVALUATOR = f"{NOT_SIMULATED}: a custom evaluator measured it"
+OUT_OF_TIME = f"{NOT_SIMULATED}: the time is up"
+
+
+class HasTime(Protocol):
+    """Return whether there is time for a number of simulations, and to evaluate the survival of some designs."""
+
+    def __call__(self, simulations: int, survivals: int, /) -> bool: ...
+
+
+def unlimited(simulations: int, survivals: int) -> bool:
+    """Return True: there is time for everything."""
+    return True
+
+
+@dataclass(frozen=True)
+class Demoted:
+    """A design that was chosen first and failed in the simulator."""
+
+    design: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """A recommended design.
+
+    Attributes:
+        role: Why it is recommended: knee, or least QUANTITY.
+        design: Its number.
+        status: `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the
+            reason if the time was up or a custom evaluator measured the design.
+        demoted: The designs tried before.
+        survival: Which perturbations it survives; None without constraints, or if the time was up.
+    """
+
+    role: str
+    design: int
+    status: str
+    demoted: tuple[Demoted, ...] = ()
+    survival: Survival | None = None
+
+
+def candidates(history: History) -> dict[str, list[int]]:
+    """Return the designs of the front by role, the best first.
+
+    The roles are the knee, the least first and last objective, and the least price and deflection if the built-in
+    physics knows them for all designs. If it knows both, and the task has a cycle, whose constraints see to errors and
+    torques, the least error or holding torque is no role.
+    """
+    if not history.front:
+        return {}
+    order = knee_first(history, history.front)  # equal ones follow it
+    objectives = [objective.name for objective in history.problem.objectives]
+    columns = dict(zip(objectives, np.array([member.values for member in order]).T, strict=True))
+    known = columns | _price_and_deflection(history, [member.number for member in order])
+    roles = [objectives[0], objectives[-1]]
+    if {PRICE.name, DEFLECTION.name} <= set(known) and history.problem.task.cycle is not None:
+        roles = [name for name in roles if name not in BY_DEFAULT]
+    roles += [quantity.name for quantity in (PRICE, DEFLECTION) if quantity.name in known]
+    return {
+        "knee": [member.number for member in order],
+        **{f"least {name}": [order[row].number for row in np.argsort(known[name], kind="stable")] for name in roles},
+    }
+
+
+def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str, Array]:
+    """Return by name the (N,) prices [USD] and deflections [m] that are no objectives and known of all designs."""
+    if history.problem.evaluator is not None:
+        return {}
+
+    def values(quantity: Objective, evaluation: Evaluation) -> Array | None:
+        with suppress(SettingsError):
+            found = quantity(evaluation)
+            return found if np.isfinite(found).all() else None
+        return None
+
+    first = history.evaluation(numbers[:1])
+    others = [quantity for quantity in (PRICE, DEFLECTION) if quantity not in history.problem.objectives]
+    asked = [quantity for quantity in others if values(quantity, first) is not None]
+    evaluation = history.evaluation(numbers) if asked else first
+    found = {quantity.name: values(quantity, evaluation) for quantity in asked}
+    return {name: column for name, column in found.items() if column is not None}
+
+
+def recommend(
+    history: History, simulator: Simulator | None = None, has_time: HasTime = unlimited
+) -> list[Recommendation]:
+    """Return the recommended designs: simulated, unless MuJoCo, a cycle or its durations are missing.
+
+    With a custom evaluator neither our simulation nor our perturbations say what it would measure.
+
+    Args:
+        history: The trials.
+        simulator: Keeps what it simulates; None for a new one.
+        has_time: Returns whether there is time.
+    """
+    roles = candidates(history)
+    if history.problem.evaluator is not None:
+        return [Recommendation(role, numbers[0], BY_EVALUATOR) for role, numbers in roles.items()]
+    try:
+        simulator = simulator or Simulator(history)
+        chosen = [_verified(role, numbers, simulator, has_time, len(roles)) for role, numbers in roles.items()]
+    except (MissingExtraError, SettingsError):
+        chosen = [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in roles.items()]
+    verified = {one.design: one.status == VERIFIED for one in chosen}
+    if not has_time(0, len(verified)):
+        return chosen
+    if not has_time(len(FACTORS) * sum(verified.values()), len(verified)):
+        verified = dict.fromkeys(verified, False)
+    survival = evaluate_survival(history, verified)
+    return [replace(one, survival=survival.get(one.design)) for one in chosen]
+
+
+def _verified(
+    role: str, numbers: Sequence[int], simulator: Simulator, has_time: HasTime, survivals: int
+) -> Recommendation:
+    """Return the first design that passes in the simulator; survivals: designs whose survival needs time as well."""
+    demoted: list[Demoted] = []
+    for number in numbers[:MAX_TRIED]:
+        if not has_time(1, survivals) and number not in simulator.members:
+            return Recommendation(role, number, OUT_OF_TIME, tuple(demoted))
+        result = simulator(number).result
+        if result.verdict == PASS:
+            return Recommendation(role, number, VERIFIED, tuple(demoted))
+        demoted.append(Demoted(number, result.reasons[0]))
+    first, *others = demoted
+    return Recommendation(role, first.design, f"not verified: {first.reason}", tuple(others))

@@ -1,0 +1,312 @@
+"""Write the results of a run folder: the summary, the tables, and the designs of the front.
+
+summary.json              the result of the run
+trials.csv, front.csv     all trials, and those of the front
+designs/NNNN/             each design of the front (design_folders.py)
+"""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from pydantic_core import to_jsonable_python
+
+from armwright.arrays import Array
+from armwright.exceptions import RunFolderError
+from armwright.files import MAX_DERIVED, naming_write_errors, read_text, replace_folder, to_csv
+from armwright.pareto import hypervolume
+from armwright.problem.assumptions import assumed_values
+from armwright.problem.failure import FAILURE_KINDS
+from armwright.proof.attribution import attribution_by_source
+from armwright.proof.design_folders import DESIGNS, design_name, objective_record, violation_record, write_designs
+from armwright.proof.front_gap import front_gap
+from armwright.proof.infeasibility import ViolationTally, feasibility_record
+from armwright.proof.proposer_bias import proposer_bias
+from armwright.proof.recommendation import HasTime, recommend, unlimited
+from armwright.proof.summary_file import ProposerSummary, parse_summary
+from armwright.proof.verification import Verification, verify_front
+from armwright.runs.config import FrontMethod, RunConfig
+from armwright.runs.folder import RunFolder, read_run
+from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial
+
+SUMMARY = "summary.json"
+FIGURES = "figures"  # drawn by pictures/figures.py
+REPORT = "report.html"  # made by page/page.py
+TABLES = ("trials.csv", "front.csv")
+MAX_FALLBACK_SHARE = 0.1  # of a proposer's trials; runs with more are flagged, and tables leave them out
+PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
+CASES = ("exact", "moved", "started")  # in which the objectives of a design are verified
+
+
+def write_results(
+    folder: RunFolder, history: History, summary: Mapping[str, Any], verification: Verification | None
+) -> None:
+    """Write all results, and the summary last: it marks them as complete.
+
+    Args:
+        folder: The run folder.
+        history: The trials.
+        summary: The content of summary.json.
+        verification: Verification of the front; None if it was not verified.
+    """
+    verdicts = _verdicts(history, verification)
+    rows = [_row(history, trial) for trial in history]
+    folder.write_text("trials.csv", to_csv(rows))
+    on_front = sorted(member.number for member in history.front)
+    folder.write_text("front.csv", to_csv(rows[number] | _flat_verdict(verdicts.get(number)) for number in on_front))
+    write_designs(folder, history, verdicts)
+    folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
+
+
+def rewrite_results(
+    folder: RunFolder, history: History, config: RunConfig, summary: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Verify the front and write the results again; return the summary, which keeps what only its sessions knew."""
+    verification = verify_front(history)
+    if isinstance(config.method, FrontMethod):
+        new = {**summary, "verification": _verification_record(history, verification)}
+    else:
+        known = {key: summary[key] for key in ("proposer", "proposer_bias", "surrogate") if key in summary}
+        new = summarize(history, config, None, verification) | known
+    write_results(folder, history, new, verification)
+    return new
+
+
+def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
+    """Verify the front of a finished run again, rewrite its results, and return history and summary."""
+    path = Path(path)
+    config, history = read_run(path)
+    summary = read_summary(path)
+    if summary is None:
+        raise RunFolderError(f"{path} is not finished; rerun the command that began it")
+    with RunFolder(path) as folder:
+        return history, rewrite_results(folder, history, config, summary)
+
+
+def complete_summary(path: Path, history: History) -> dict[str, Any] | None:
+    """Return the summary of a run folder that holds all results of these trials; None if one is missing."""
+    files = [path / name for name in TABLES]
+    files += [
+        path / DESIGNS / design_name(m.number) / name for m in history.front for name in ("arm.urdf", "design.json")
+    ]
+    summary = read_summary(path) if all(file.is_file() for file in files) else None
+    return summary if summary is not None and summary["n_trials"] == len(history) else None
+
+
+def discard_results(path: Path) -> None:
+    """Remove the summary, the page and the figures of a run, which is then no longer finished."""
+    with naming_write_errors(path):
+        (path / SUMMARY).unlink(missing_ok=True)
+        (path / REPORT).unlink(missing_ok=True)
+        replace_folder(path / FIGURES)
+
+
+def read_summary(path: Path) -> dict[str, Any] | None:
+    """Return the summary of a run folder; None if the run has not ended or the file is damaged."""
+    try:
+        return parse_summary(read_text(path / SUMMARY, MAX_DERIVED, ValueError))
+    except (ValueError, RecursionError):
+        return None
+
+
+def summarize(
+    history: History,
+    config: RunConfig,
+    proposer: ProposerSummary | None,
+    verification: Verification | None = None,
+    surrogate: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Return the content of summary.json for a study."""
+    curve = history.hypervolume
+    seconds: Counter[str] = Counter()
+    for trial in history:
+        seconds.update(trial.seconds)
+    volume = {
+        "final": float(curve[-1]) if len(curve) else None,
+        "mean": float(curve.mean()) if len(curve) else None,
+        "history": curve.tolist(),
+    }
+    return {
+        **_common_record(history, config, history.masked_objectives, volume, verification),
+        "duplicates": sum(trial.duplicate_of is not None for trial in history),
+        **_failure_record(history, config),
+        **({} if surrogate is None else {"surrogate": surrogate}),
+        **_screening_record(history, config),
+        "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
+        "proposer": None if proposer is None else _proposer_record(history, config, proposer),
+        "proposer_bias": None if proposer is None else asdict(proposer_bias(history, proposer.name)),
+        "seconds": {part: round(seconds[part], 6) for part in PARTS},
+        "versions": dict(config.versions),
+    }
+
+
+def summarize_front(
+    history: History,
+    config: RunConfig,
+    found: Array,
+    search: Mapping[str, Any],
+    verification: Verification | None,
+    tally: ViolationTally | None = None,
+    has_time: HasTime = unlimited,
+) -> dict[str, Any]:
+    """Return the content of summary.json for a direct search.
+
+    Args:
+        history: The designs of the front that became trials.
+        config: The settings of the run.
+        found: (N, M) objective values of the whole front.
+        search: Evaluations, seconds, why it ended, and the hypervolume over the evaluations.
+        verification: Verification of the front; None if it was not verified.
+        tally: All evaluated designs by the constraints that they satisfy.
+        has_time: Returns whether there is time for simulations and survival of recommended designs.
+    """
+    volume = {"final": hypervolume(found, history.reference_point or ())}
+    return {
+        **_common_record(history, config, found, volume, verification, tally, has_time),
+        "search": dict(search),
+        "versions": dict(config.versions),
+    }
+
+
+def _failure_record(history: History, config: RunConfig) -> dict[str, Any]:
+    """Return the number of failed evaluations by kind; empty without a custom evaluator."""
+    if config.evaluator is None:
+        return {}
+    counts = Counter(trial.failure.kind for trial in history if trial.failure is not None)
+    return {"failures": {kind: counts[kind] for kind in FAILURE_KINDS}}
+
+
+def _common_record(
+    history: History,
+    config: RunConfig,
+    found: Array,
+    volume: Mapping[str, Any],
+    verification: Verification | None,
+    tally: ViolationTally | None = None,
+    has_time: HasTime = unlimited,
+) -> dict[str, Any]:
+    """Return what the summaries of studies and direct searches have in common; found: (N, M) values of the front."""
+    reference = history.reference_point
+    gap = None if reference is None else front_gap(history.problem, found, reference)
+    return {
+        "task": history.problem.task.name,
+        "seed": config.seed,
+        "n_trials": len(history),
+        "by_source": dict(Counter(trial.source for trial in history)),
+        **feasibility_record(history, tally),
+        "hypervolume": {"reference_point": list(reference or ()), **volume},
+        "front_gap": None if gap is None else asdict(gap),
+        "front_size": len(history.front),
+        "verification": _verification_record(history, verification),
+        **_assumed_record(history),
+        **_recommended_record(history, has_time),
+    }
+
+
+def _assumed_record(history: History) -> dict[str, Any]:
+    """Return the assumed values of actuators in use in the front; empty without any."""
+    assumed = assumed_values(history.problem, [member.arm for member in history.front])
+    return {"assumed": assumed} if assumed else {}
+
+
+def _recommended_record(history: History, has_time: HasTime) -> dict[str, Any]:
+    """Return the recommended designs; empty without constraints, which a cycle implies."""
+    if not history.problem.constraints:
+        return {}
+    return {"recommended": to_jsonable_python(recommend(history, has_time=has_time))}
+
+
+def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
+    """Return the number of robust designs, their hypervolume, and the worst-case hypervolume of the front."""
+    if verification is None:
+        return None
+    robust = [member.number for member, holds in zip(history.front, verification.robust, strict=True) if holds]
+    reference = history.reference_point or ()
+    return {
+        "robust": len(robust),
+        "sensitive": len(history.front) - len(robust),
+        "robust_numbers": robust,
+        "hypervolume_of_robust": hypervolume(history.values[robust], reference),
+        "robust_from_any_start": int(verification.from_any_start.sum()),
+        "hypervolume_worst_case": hypervolume(verification.worst_case, reference),
+    }
+
+
+def _verdicts(history: History, verification: Verification | None) -> dict[int, dict[str, Any]]:
+    """Return for each design of the front whether it is robust, and its objectives in each case, by trial number."""
+    if verification is None:
+        return {}
+    return {
+        member.number: {
+            "robust": bool(verification.robust[i]),
+            "from_any_start": bool(verification.from_any_start[i]),
+            **{case: objective_record(history, getattr(verification, case)[i].tolist()) for case in CASES},
+        }
+        for i, member in enumerate(history.front)
+    }
+
+
+def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return a verdict as columns of front.csv."""
+    if verdict is None:
+        return {}
+    return {
+        "verdict": "robust" if verdict["robust"] else "sensitive",
+        "from_any_start": "yes" if verdict["from_any_start"] else "no",
+        **{f"{name}_{case}": value for case in CASES for name, value in verdict[case].items()},
+    }
+
+
+def _screening_record(history: History, config: RunConfig) -> dict[str, Any]:
+    """Return how many proposals were not evaluated, by proposer, if proposals were screened."""
+    if not config.study.screen:
+        return {}
+    return {"screened_out": dict(Counter(trial.screened.source for trial in history if trial.screened is not None))}
+
+
+def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:
+    reserved = [trial for trial in history if trial.request is not None]
+    fallbacks = sum(trial.fault is not None for trial in reserved)
+    record = asdict(proposer)
+    notes = record.pop("notes")
+    return {
+        **record,
+        "failures": dict(Counter(trial.fault for trial in reserved if trial.fault)),
+        "fallback_share": round(fallbacks / len(reserved), 4) if reserved else 0.0,
+        "flagged": fallbacks > MAX_FALLBACK_SHARE * len(reserved),
+        "tokens": proposer.input_tokens + proposer.output_tokens,
+        **notes,
+        "overlap": _overlap_record(history, config, reserved),
+    }
+
+
+def _overlap_record(history: History, config: RunConfig, reserved: Sequence[FinishedTrial]) -> dict[str, Any] | None:
+    """Return the share of proposals among the counted trials and the age of their feedback [trials].
+
+    ratio_with_failures: The share of the trials reserved for the proposer, failed requests included.
+    """
+    method = config.study
+    if method.in_flight is None:
+        return None
+    ages = [trial.number - trial.request[1] for trial in reserved if trial.request and trial.proposal]
+    counted = max(1, len(history) - history.n_init)
+    return {
+        "in_flight": method.in_flight,
+        "ratio_planned": round(method.n_proposals / method.n_total, 4),
+        "ratio": round(len(ages) / counted, 4),
+        "ratio_with_failures": round(len(reserved) / counted, 4),
+        "feedback_age": {"mean": round(sum(ages) / len(ages), 2), "max": max(ages)} if ages else None,
+    }
+
+
+def _row(history: History, trial: FinishedTrial) -> dict[str, Any]:
+    """Return a trial as a row of trials.csv."""
+    params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
+    values = trial.values if trial.failure is None else [None] * len(trial.values)
+    results = {**objective_record(history, values), **violation_record(history, trial)}
+    failure = {} if not history.failed.any() else {"failure": trial.failure.kind if trial.failure else None}
+    return {"number": trial.number, "source": trial.source, **params, **results, **failure}

@@ -1,0 +1,187 @@
+"""Selection of designs of a front: by conditions, by one quantity, by weights, or the knee."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic_core import to_jsonable_python
+
+from armwright.exceptions import FailureError, SettingsError, did_you_mean
+from armwright.problem.conditions import Condition
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import QUANTITIES
+from armwright.proof.infeasibility import describe_infeasibility
+from armwright.proof.perturbations import evaluate_survival
+from armwright.proof.ranking import knee_first
+from armwright.proof.results import read_summary
+from armwright.runs.folder import read_run
+from armwright.runs.history import FrontMember, History
+from armwright.spaces.parameters import FloatParameter
+
+# Names by which users look for quantities that are called otherwise
+_SYNONYMS = {"n_joints": "joints", "joint_count": "joints", "cost": "price", "weight": "mass", "reach": "length"}
+
+
+def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
+    """Return the quantities to select by: real parameters, length and mass, bounded quantities, objectives."""
+    space = history.problem.space
+    reals = {
+        p.name: float(member.design.params.get(p.name, 0.0)) for p in space.parameters if isinstance(p, FloatParameter)
+    }
+    arm = {"length": member.arm.length, "mass": member.arm.mass}
+    objectives = {o.name: value for o, value in zip(history.problem.objectives, member.values, strict=True)}
+    return {**reals, **arm, **bounded_numbers(history, member.number), **objectives}
+
+
+def bounded_numbers(history: History, number: int) -> dict[str, float]:
+    """Return the quantities of a design that the constraints bound, by name."""
+    pairs = zip(history.problem.constraints, history.trials[number].violations, strict=True)
+    return {constraint.quantity.name: constraint.measured(violation) for constraint, violation in pairs}
+
+
+def pick(
+    history: History,
+    where: Sequence[Condition] = (),
+    by: str | None = None,
+    weights: Mapping[str, float] | None = None,
+    numbers: Sequence[int] | None = None,
+) -> list[FrontMember]:
+    """Select the designs of the front that satisfy all conditions, the best first.
+
+    Without `by` and `weights`, the knee of the front comes first, then the designs nearest to its corner.
+
+    Args:
+        history: The trials.
+        where: Conditions. Quantities that the run did not evaluate are evaluated now, in the task's first case.
+        by: The quantity to sort by, smallest first.
+        weights: Weights of the objectives, which are divided by the reference point and summed.
+        numbers: The trials to select from, such as the robust ones; None for all.
+
+    Raises:
+        FailureError: No design satisfies the conditions.
+        SettingsError: A quantity does not exist, or both `by` and `weights` are given.
+
+    Examples:
+        >>> import armwright as aw
+        >>> run = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="rules", n_total=20)
+        >>> lightest = pick(run.history, [Condition("length", "<=", 1.2)], by="torque")[0]
+        >>> lightest.values[1] == min(member.values[1] for member in run.front if member.arm.length <= 1.2)
+        True
+    """
+    if by is not None and weights is not None:
+        raise SettingsError("expected one quantity or weights, got both")
+    if len(history) and not history.front:
+        raise FailureError(describe_infeasibility(history))
+    objectives = [objective.name for objective in history.problem.objectives]
+    asked = [*(condition.name for condition in where), *([] if by is None else [by])]
+    quantities = quantities_of_front(history, asked)
+    units = _units(history)
+    where = [condition.in_unit(units[condition.name]) for condition in where]
+    for name in weights or {}:
+        _check_name(name, objectives)
+    left = [
+        member
+        for member in history.front
+        if all(condition.holds(quantities[member.number]) for condition in where)
+        and (numbers is None or member.number in numbers)
+    ]
+    if not left:
+        raise FailureError(_describe_unmet(where, list(quantities.values())))
+    if by is not None:
+        return sorted(left, key=lambda member: quantities[member.number][by])
+    if weights is not None:
+        scale = np.array(history.reference_point or np.ones(len(objectives)))
+        scaled_weights = np.array([weights.get(name, 0.0) for name in objectives]) / scale
+        return sorted(left, key=lambda member: float(scaled_weights @ np.array(member.values)))
+    return knee_first(history, left)
+
+
+def pick_from(
+    run: Path,
+    where: Sequence[Condition] = (),
+    by: str | None = None,
+    weights: Mapping[str, float] | None = None,
+    robust: bool = False,
+) -> tuple[History, list[FrontMember]]:
+    """Select designs of a run folder; robust: only verified robust designs."""
+    _, history = read_run(run)
+    numbers = None
+    if robust and history.front:
+        verification = (read_summary(run) or {}).get("verification")
+        if verification is None:
+            raise FailureError(f'{run} is not verified; armwright.verify_run("{run}") in Python verifies it')
+        numbers = verification["robust_numbers"]
+    return history, pick(history, where, by, weights, numbers)
+
+
+def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:
+    """Return records of the survival of designs of a run by number, as in its summary; empty without constraints.
+
+    Those of recommended designs are read; the others are evaluated.
+    """
+    recommended = (read_summary(run) or {}).get("recommended", ())
+    stored = {one["design"]: one["survival"] for one in recommended if one["survival"] is not None}
+    missing = dict.fromkeys((number for number in numbers if number not in stored), False)
+    evaluated: dict[int, dict[str, Any]] = {
+        number: to_jsonable_python(one) for number, one in evaluate_survival(history, missing).items()
+    }
+    return {number: one for number, one in {**stored, **evaluated}.items() if number in numbers}
+
+
+def quantities_of_front(history: History, names: Sequence[str]) -> dict[int, dict[str, float]]:
+    """Return the quantities of the designs of the front by number: those of `numbers_of`, and these.
+
+    Raises:
+        SettingsError: A name is unknown.
+    """
+    quantities = {member.number: numbers_of(history, member) for member in history.front}
+    known = list(quantities[history.front[0].number]) if history.front else []
+    for name in dict.fromkeys(names):
+        _check_name(name, list(dict.fromkeys([*known, *QUANTITIES])))
+        if name not in known:
+            for number, value in _evaluated(history, QUANTITIES[name]).items():
+                quantities[number][name] = value
+    return quantities
+
+
+def _units(history: History) -> dict[str, str]:
+    """Return the unit of each quantity by name."""
+    problem = history.problem
+    return {
+        **{name: quantity.unit for name, quantity in QUANTITIES.items()},
+        **{
+            parameter.name: parameter.unit
+            for parameter in problem.space.parameters
+            if isinstance(parameter, FloatParameter)
+        },
+        "length": "m",
+        "mass": "kg",
+        **{constraint.quantity.name: constraint.quantity.unit for constraint in problem.constraints},
+        **{objective.name: objective.unit for objective in problem.objectives},
+    }
+
+
+def _evaluated(history: History, quantity: Objective) -> dict[int, float]:
+    """Return a quantity of the designs of the front by number, in the task's first case; SettingsError if unknown."""
+    numbers = [member.number for member in history.front]
+    return dict(zip(numbers, quantity(history.evaluation(numbers)).tolist(), strict=True)) if numbers else {}
+
+
+def _check_name(name: str, known: Sequence[str]) -> None:
+    """Raise SettingsError if a name is unknown; the message lists the known ones."""
+    if name not in known:
+        synonym = _SYNONYMS.get(name)
+        hint = f' Did you mean "{synonym}"?' if synonym in known else did_you_mean(name, known)
+        raise SettingsError(f'unknown quantity "{name}".{hint} Available: {", ".join(known)}')
+
+
+def _describe_unmet(where: Sequence[Condition], quantities: Sequence[Mapping[str, float]]) -> str:
+    """Describe the first condition that no design meets, and the nearest value."""
+    for condition in where:
+        if not any(condition.holds(numbers) for numbers in quantities):
+            values = [numbers[condition.name] for numbers in quantities]
+            nearest = min(values) if condition.relation in ("<", "<=") else max(values)
+            bound = f"{condition.name} {condition.relation} {condition.bound:g}"
+            return f"no design of the front has {bound}; the nearest has {nearest:.4g}"
+    return "no design of the front meets all of these conditions at once" if where else "no design is left to choose"

@@ -1,0 +1,80 @@
+"""Simulation of designs of a run."""
+
+from dataclasses import dataclass
+
+from armwright.exceptions import SettingsError
+from armwright.kinematics.cycle.trajectory import Trajectory
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.problem import Problem
+from armwright.proof.cycle_export import MODEL, TRAJECTORY, cycle_files, read_trajectory
+from armwright.proof.simulation import Drive, Limits, SimulatedDesign, mujoco_version, read_limits, simulate_design
+from armwright.robot.arm import Arm
+from armwright.runs.history import History
+
+
+@dataclass(frozen=True)
+class SimulatedMember:
+    """A simulated design of a history.
+
+    Attributes:
+        result: The verdict.
+        drive: How it moved.
+        trajectory: How it should move.
+        limits: What its model states.
+        files: Content of its model and trajectory, by name.
+    """
+
+    result: SimulatedDesign
+    drive: Drive
+    trajectory: Trajectory
+    limits: Limits
+    files: dict[str, str]
+
+
+class Simulator:
+    """Simulate designs of a history, each at most once.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+        SettingsError: The task has no cycle.
+    """
+
+    def __init__(self, history: History) -> None:
+        if history.problem.task.cycle is None:
+            raise SettingsError(f"task {history.problem.task.name} has no cycle to simulate; try cycle: in_order")
+        mujoco_version()
+        self.history = history
+        self.members: dict[int, SimulatedMember] = {}
+
+    def __call__(self, number: int) -> SimulatedMember:
+        """Return a simulated design; SettingsError if a duration of its steps is not known."""
+        if number not in self.members:
+            arm, evaluation = self.history.member(number).arm, self.history.evaluation([number])
+            self.members[number] = simulate_arm(self.history.problem, arm, evaluation, 0, number)
+        return self.members[number]
+
+
+def simulate_arm(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, number: int) -> SimulatedMember:
+    """Simulate an arm.
+
+    Args:
+        problem: The problem.
+        arm: The arm.
+        evaluation: Physics of some arms.
+        row: Which of them it is.
+        number: Number of its design.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+        SettingsError: A duration of its steps is not known.
+    """
+    files = dict(cycle_files(problem, arm, evaluation, row, f"{problem.task.name}-{number}"))
+    if not files:
+        raise SettingsError(
+            f"task {problem.task.name} leaves durations of steps open, and the arms have no actuators with known "
+            "speeds; try cycle: {time: 1.5, ...}"
+        )
+    names = problem.task.target_names
+    trajectory = read_trajectory(files[TRAJECTORY], names)
+    result, drive = simulate_design(number, files[MODEL], trajectory, names)
+    return SimulatedMember(result, drive, trajectory, read_limits(files[MODEL]), files)

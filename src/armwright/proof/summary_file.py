@@ -1,0 +1,203 @@
+"""Schema of summary.json: readers may rely on its fields, and ignore others."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BaseModel, Field
+
+from armwright.files import replace_surrogates
+from armwright.proof.attribution import Attribution
+from armwright.proof.front_gap import FrontGap
+from armwright.proof.proposer_bias import ProposerBias
+from armwright.runs.trial import Count
+
+
+class _Record(BaseModel, extra="allow", strict=True, allow_inf_nan=False):
+    """A part of a summary; its settings also hold for the dataclasses in its fields."""
+
+
+class _Volume(_Record):
+    reference_point: list[float]
+    final: float | None
+
+
+class _Curve(_Volume):
+    mean: float | None
+    history: list[float]
+
+
+class _Verification(_Record):
+    robust: Count
+    sensitive: Count
+    robust_numbers: list[int]
+    hypervolume_of_robust: float
+    robust_from_any_start: Count
+    hypervolume_worst_case: float
+
+
+class _Demoted(_Record):
+    design: Count
+    reason: str
+
+
+class _Broken(_Record):
+    change: str
+    constraint: str
+    measured: float | None
+    violation: float | None
+
+
+class _Perturbation(_Record):
+    name: str
+    changes: Count
+    broken: list[_Broken]
+
+
+class _Survival(_Record):
+    verdict: str
+    perturbations: list[_Perturbation]
+    simulated: list[str]
+
+
+class _Recommended(_Record):
+    role: str
+    design: Count
+    status: str
+    demoted: list[_Demoted]
+    survival: _Survival | None = None
+
+
+class _Age(_Record):
+    mean: float
+    max: int
+
+
+class _Overlap(_Record):
+    ratio: float
+    ratio_planned: float
+    feedback_age: _Age | None
+
+
+class _Proposer(_Record):
+    name: str
+    model: str | None
+    origin: str | None
+    calls: Count
+    failures: dict[str, Count]
+    fallback_share: float
+    flagged: bool
+    tokens: Count
+    input_tokens: Count
+    output_tokens: Count
+    cost_usd: float | None
+    call_seconds: float
+    differing_prompts: int = 0
+    overlap: _Overlap | None
+
+
+class _Surrogate(_Record):
+    designs: Count
+    errors: dict[str, float | None]
+
+
+class _Seconds(_Record):
+    total: float
+    sampling: float
+    evaluation: float
+    proposing: float
+
+
+_Point = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class _Reduced(_Record):
+    evaluations: Count
+    designs: Count
+
+
+class _Screening(_Record):
+    considered: Count
+    discarded_by_bounds: Count
+    evaluated_though_rejected: Count
+
+
+class _Search(_Record):
+    evaluations: Count
+    seconds: float
+    ended_by: Literal["budget", "stall"]
+    found: Count
+    hypervolume_history: Annotated[list[_Point], Field(min_length=1)]
+    infeasible: Count = 0
+    screening: _Screening | None = None
+    reference_point_from: list[str]
+    reduced: _Reduced
+
+
+class _Summary(_Record):
+    n_trials: Count
+    by_source: dict[str, Count]
+    front_gap: FrontGap | None
+    front_size: Count
+    verification: _Verification | None
+    assumed: dict[str, dict[str, float]] = {}
+    recommended: list[_Recommended] = []
+
+
+class StudySummary(_Summary):
+    """Summary of a study."""
+
+    hypervolume: _Curve
+    duplicates: Count
+    failures: dict[str, Count] = {}
+    surrogate: _Surrogate | None = None
+    screened_out: dict[str, Count] = {}
+    attribution: dict[str, Attribution]
+    proposer: _Proposer | None
+    proposer_bias: ProposerBias | None
+    seconds: _Seconds
+
+
+class SearchSummary(_Summary):
+    """Summary of a direct search."""
+
+    hypervolume: _Volume
+    search: _Search
+
+
+def parse_summary(text: str) -> dict[str, Any]:
+    """Validate and return the content of a summary.json; ValueError if it is damaged."""
+    content = json.loads(text)
+    schema = SearchSummary if isinstance(content, dict) and "search" in content else StudySummary
+    schema.model_validate_json(replace_surrogates(json.dumps(content, ensure_ascii=False)))
+    return cast("dict[str, Any]", content)
+
+
+@dataclass(frozen=True)
+class ProposerSummary:
+    """What a run's proposer did and cost, for summary.json.
+
+    Attributes:
+        name: The proposer.
+        model: The model that answered.
+        origin: What answered: `model`, `manual` (people) or `scripted` (a stand-in).
+        calls: Requests to the server; more than proposals if answers were refused.
+        call_failures: Failed calls by kind.
+        input_tokens: Tokens of all prompts.
+        output_tokens: Tokens of all answers.
+        cost_usd: Cost; None if a price is unknown.
+        call_seconds: Time of all calls together.
+        notes: Further entries of the record, such as where a replay differs from its source.
+    """
+
+    name: str
+    model: str | None = None
+    origin: str | None = None
+    calls: int = 0
+    call_failures: Mapping[str, int] = field(default_factory=dict[str, int])
+    input_tokens: int = 0
+    output_tokens: int = 0
+    cost_usd: float | None = None
+    call_seconds: float = 0.0
+    notes: Mapping[str, Any] = field(default_factory=dict[str, Any])

@@ -1,0 +1,51 @@
+"""`aw.to_mjcf`: arms as MJCF, alone or in a task."""
+
+from collections.abc import Sequence
+from typing import overload
+
+from armwright.problem.evaluation import evaluate
+from armwright.proof.cycle_export import peak_torques, task_model
+from armwright.robot import mjcf
+from armwright.robot.arm import Arm
+from armwright.spaces.tool_mount import carrying_tool
+from armwright.tasks.task import Task
+
+
+@overload
+def to_mjcf(arm: Arm, task: Task | None = None, *, name: str = "arm") -> str: ...
+
+
+@overload
+def to_mjcf(arm: Sequence[Arm], task: Task | None = None, *, name: str = "arm") -> list[str]: ...
+
+
+def to_mjcf(arm: Arm | Sequence[Arm], task: Task | None = None, *, name: str = "arm") -> str | list[str]:
+    """Return the MJCF of an arm, or of each arm of a list.
+
+    The arm alone has bodies base, link_1 on joint_1, …, a site `tip`, and motors motor_1 on joint_1, …, whose `ctrl` is
+    the torque [N m] or force [N] on that joint. Its geometry is for display only.
+
+    With a task, the model is that of `armwright simulate`: the task's tool on an arm that carries none, the payload as
+    a body `payload` at the tip, obstacles, links that touch, a site target_NAME and a keyframe NAME for each target,
+    and for each moving joint a position actuator servo_1, … and a torque actuator ff_1, …. If the task has a cycle, the
+    keyframes are its postures. The payload is held from the start.
+
+    Args:
+        arm: One arm or several.
+        task: What the arm works on; None for the arm alone.
+        name: Name of the model.
+
+    Examples:
+        >>> import armwright as aw
+        >>> space = aw.paper_space()
+        >>> arm = space.arm(space.sample(1, seed=0)[0])
+        >>> "motor_1" in aw.to_mjcf(arm), "target_1" in aw.to_mjcf(arm, aw.load_task("target-1"))
+        (True, True)
+    """
+    if not isinstance(arm, Arm):
+        return [to_mjcf(one, task, name=name) for one in arm]
+    if task is None:
+        return mjcf.to_mjcf(arm, name)
+    equipped = carrying_tool(arm, task.tool)
+    evaluation = evaluate(equipped, task)
+    return task_model(equipped, task.target_names, evaluation, 0, peak_torques(equipped, evaluation, 0), name)

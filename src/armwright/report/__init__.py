@@ -1,1 +1,0 @@
-"""Presentation of a run: figures, tables, the page and the live server."""

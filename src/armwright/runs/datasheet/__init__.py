@@ -1,1 +1,0 @@
-"""The data sheet of a design or of an existing arm."""

@@ -1,0 +1,1 @@
+"""The direct search for a front."""

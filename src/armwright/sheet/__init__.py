@@ -1,0 +1,1 @@
+"""One data sheet of one arm."""

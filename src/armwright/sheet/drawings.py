@@ -1,0 +1,162 @@
+"""The drawings of a data sheet: side view, top view, and what changes over the reach. They are readable in grey."""
+
+import math
+import textwrap
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.reach.reach_outline import Outline
+from armwright.pictures.style import FRONT, LINK, TARGET
+from armwright.sheet.record import DataSheet
+from armwright.tasks.moments import MAX_MASS
+
+REACHED = "#EDEDED"
+SPACING = 0.075  # of labels, as a share of the height of a view
+ROOM = 0.36  # for labels at the right, as a share of the width of a view
+LETTERS = 40  # of a line in a panel
+SHORT = 1e-6  # [m]; links without length are not drawn
+MARGIN = 0.06  # around a view, as a share of its size
+MOST_NUMBERS = 12  # of targets; more are not numbered
+MM = 1e3
+
+
+def draw_side(axes: Any, sheet: DataSheet) -> None:
+    """Draw the arm from the side, with its joints at 0 or the nearest limit, its dimensions, and what it reaches."""
+    drawing = sheet.drawing
+    outline = _points(drawing.side)
+    axes.fill(*(MM * outline.T), facecolor=REACHED, edgecolor=LINK, linewidth=0.8, zorder=1)
+    low, high = _limits(outline, _ends(sheet))
+    labels: list[tuple[float, float, str]] = []
+    x, _, z = drawing.base
+    if drawing.column is not None:
+        axes.plot([MM * x] * 2, [MM * (z - drawing.column), MM * z], color=LINK, linewidth=5.0, alpha=0.5, zorder=2)
+        labels.append((x, z - drawing.column / 2.0, f"column {MM * drawing.column:.1f}"))
+    for number, start, end in drawing.links:
+        length = math.dist(start, end)
+        if length < SHORT:
+            continue
+        ends = MM * np.array([start, end])[:, [0, 2]]
+        axes.plot(*ends.T, color=FRONT, linewidth=2.4 if number else 1.2, solid_capstyle="butt", zorder=3)
+        axes.plot(*ends[0], marker="o", markersize=3.5, color=FRONT, markerfacecolor="white", zorder=4)
+        name = f"link {number}" if number else "tool"
+        labels.append(((start[0] + end[0]) / 2.0, (start[2] + end[2]) / 2.0, f"{name} {MM * length:.1f}"))
+    axes.plot(MM * x, MM * z, marker="s", markersize=5, color=FRONT, zorder=4)
+    _label(axes, labels, high[0], (high - low)[1])
+    _frame(axes, low, high + ROOM * np.array([(high - low)[0], 0.0]), "x [mm]", "z [mm]")
+    top, bottom = MM * outline[:, 1].max(), MM * outline[:, 1].min()
+    posture = "joints at 0; " if drawing.is_at_zero else "joints at 0 or the limit next to it\n"
+    axes.set_title(f"Side view, {posture}tip from z = {bottom:.0f} to {top:.0f} mm")
+
+
+def draw_top(axes: Any, sheet: DataSheet) -> None:
+    """Draw the outline of the reach from above, with its radius and the targets."""
+    drawing = sheet.drawing
+    outline, base = _points(drawing.top), np.array(drawing.base[:2])
+    axes.fill(*(MM * outline.T), facecolor=REACHED, edgecolor=LINK, linewidth=0.8, zorder=1)
+    targets = np.array([target[:2] for target in drawing.targets]).reshape(-1, 2)
+    low, high = _limits(outline, targets)
+    distance = np.linalg.norm(outline - base, axis=1)
+    far = outline[int(distance.argmax())]
+    axes.annotate(
+        "", MM * far, MM * base, arrowprops={"arrowstyle": "-|>", "color": FRONT, "linewidth": 0.9, "shrinkA": 0}
+    )
+    numbers: dict[tuple[float, float], list[str]] = {}  # of targets above each other
+    for number, (x, y) in enumerate(targets.round(3).tolist(), start=1):
+        numbers.setdefault((x, y), []).append(str(number))
+    for target, names in numbers.items():
+        place = MM * np.array(target)
+        axes.plot(*place, marker="*", markersize=8, color=TARGET, markeredgecolor=FRONT, zorder=3)
+        if len(targets) <= MOST_NUMBERS:
+            text = ", ".join(names)
+            axes.annotate(text, place, (0, 5), textcoords="offset points", fontsize=7, ha="center", zorder=5)
+    axes.plot(*(MM * base), marker="s", markersize=5, color=FRONT, zorder=4)
+    _frame(axes, low, high, "x [mm]", "y [mm]")
+    starred = "; stars: targets" if len(targets) else ""
+    axes.set_title(f"Top view, tip within R = {MM * sheet.reach:.0f} mm{starred}")
+
+
+def draw_payload(axes: Any, sheet: DataSheet) -> None:
+    """Draw the payload over the reach, and that of the task."""
+    lines = [line for line in sheet.over_reach if line.payload is not None and line.payload < MAX_MASS]
+    axes.set_title("Payload held over the reach")
+    if not lines:
+        _state_missing(axes, "payload held: " + sheet.missing.get("payload_at_full_reach", "no motor feels it"))
+        return
+    axes.plot([MM * line.distance for line in lines], [line.payload for line in lines], "o-", color=FRONT, markersize=4)
+    if sheet.payload is not None:
+        axes.axhline(sheet.payload, color=LINK, linewidth=0.9, linestyle=(0, (4, 2)), label="payload of the task")
+        axes.legend(loc="upper right")
+    axes.set(xlabel="distance from the base axis [mm]", ylabel="payload [kg]", xlim=(0.0, 1.05e3 * sheet.reach))
+    axes.set_ylim(0.0, 1.25 * max([line.payload or 0.0 for line in lines] + [sheet.payload or 0.0]) or 1.0)
+
+
+def draw_errors(axes: Any, sheet: DataSheet) -> None:
+    """Draw deflection and backlash error over the reach."""
+    axes.set_title("Deflection and backlash over the reach")
+    styles = {"deflection": ("o-", FRONT), "backlash_error": ("s--", LINK)}
+    most = 0.0
+    for key, (style, colour) in styles.items():
+        points = [(MM * line.distance, value) for line in sheet.over_reach if (value := getattr(line, key)) is not None]
+        if points:
+            x, y = np.array(points).T
+            most = max(most, MM * float(y.max()))
+            axes.plot(x, MM * y, style, color=colour, markersize=4, label=key.replace("_", " "))
+    if not axes.lines:
+        _state_missing(axes, "deflection and backlash: " + sheet.missing.get("deflection", "not known"))
+        return
+    axes.set(xlabel="distance from the base axis [mm]", ylabel="tip moves by [mm]", xlim=(0.0, 1.05e3 * sheet.reach))
+    axes.set_ylim(0.0, 1.4 * most or 1.0)
+    axes.legend(loc="upper left")
+
+
+def _points(outline: Outline) -> Array:
+    return np.array(outline.points)
+
+
+def _ends(sheet: DataSheet) -> Array:
+    """Return the (K, 2) points of the drawn arm in x and z [m]."""
+    drawing = sheet.drawing
+    x, _, z = drawing.base
+    points = [(x, z - (drawing.column or 0.0))]
+    points += [(point[0], point[2]) for _, start, end in drawing.links for point in (start, end)]
+    return np.array(points)
+
+
+def _limits(*points: Array) -> tuple[Array, Array]:
+    """Return the corners (2,) of a view that shows all points (K, 2) [m], of a little more."""
+    every = np.vstack([array for array in points if len(array)])
+    low, high = every.min(axis=0), every.max(axis=0)
+    room = MARGIN * max(float((high - low).max()), 1e-3)
+    return low - room, high + room
+
+
+def _frame(axes: Any, low: Array, high: Array, x: str, y: str) -> None:
+    axes.set(xlabel=x, ylabel=y, xlim=MM * np.array([low[0], high[0]]), ylim=MM * np.array([low[1], high[1]]))
+    axes.set_aspect("equal")
+    axes.locator_params(nbins=5)
+
+
+def _label(axes: Any, labels: list[tuple[float, float, str]], x: float, height: float) -> None:
+    """Write labels at x [m] beside their points, far enough from each other, each with a line to its point."""
+    step = SPACING * height
+    ordered = sorted(labels, key=lambda label: (round(label[1], 6), -label[0]))
+    places = np.array([z for _, z, _ in ordered])
+    for _ in range(100):  # push neighbours apart until all have room
+        gaps = np.diff(places)
+        short = np.maximum(step - gaps, 0.0)
+        if not short.max(initial=0.0) > 1e-3 * step:
+            break
+        places[:-1] -= short / 2.0
+        places[1:] += short / 2.0
+    for (at, z, text), place in zip(ordered, places, strict=True):
+        axes.plot([MM * at, MM * x], [MM * z, MM * place], color=LINK, linewidth=0.6, zorder=2)
+        axes.text(MM * x, MM * place, f" {text}", fontsize=7, va="center", zorder=5)
+
+
+def _state_missing(axes: Any, text: str) -> None:
+    """Write why there is no curve."""
+    shown = "\n".join(textwrap.wrap(f"({text})", LETTERS))
+    axes.text(0.5, 0.5, f"not stated\n{shown}", ha="center", va="center", transform=axes.transAxes, fontsize=7)
+    axes.set(xticks=[], yticks=[])

@@ -1,0 +1,93 @@
+"""What a task needs of each joint of an arm and of its drive."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armwright.arrays import Array, finite_or_none
+from armwright.exceptions import SettingsError
+from armwright.kinematics.cycle.cycle_loads import CycleLoads, holding_torques
+from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
+from armwright.problem.evaluation import Evaluation
+from armwright.robot.arm import Arm
+from armwright.robot.motor_body import MotorBody
+from armwright.sheet.record import JointLine
+
+
+def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[str] = ()) -> tuple[JointLine, ...]:
+    """Return a line for each moving joint.
+
+    Args:
+        arm: The arm.
+        evaluation: Its physics in the task, of this arm alone; None without a task.
+        names: Names of the moving joints; by default joint_1, joint_2, …
+    """
+    lines: list[JointLine] = []
+    moving = [j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"]
+    need = {} if evaluation is None else _needs(evaluation)
+    for k, j in enumerate(moving):
+        joint = arm.joints[j]
+        used = None if evaluation is None else _used(evaluation, j)
+        line = JointLine(
+            number=j + 1,
+            name=names[k] if names else f"joint_{j + 1}",
+            kind=joint.kind,
+            axis=joint.axis,
+            actuator="" if joint.actuator is None else joint.actuator.name,
+            lower=joint.lower,
+            upper=joint.upper,
+            peak_torque=joint.effort,
+            used=used,
+            unused=None if used is None else (max(0.0, used[0] - joint.lower), max(0.0, joint.upper - used[1])),
+            body="" if joint.body is None else _describe_body(joint.body),
+            **{name: finite_or_none(values[j]) for name, values in need.items()},
+        )
+        lines.append(line)
+    return tuple(lines)
+
+
+def _describe_body(body: MotorBody) -> str:
+    """Return the edges of a body along x, y and z, and its middle from the joint, with all joints at 0."""
+    edges = " x ".join(f"{1e3 * edge:.4g}" for edge in body.size)
+    middle = ", ".join(f"{1e3 * value:.4g}" for value in body.centre)
+    return f"{body.shape} of {edges} mm along x, y and z, shaft along {body.axis}, middle at ({middle}) mm"
+
+
+def loads_of(evaluation: Evaluation) -> CycleLoads | None:
+    """Return the loads along the cycle; None without a cycle of known duration."""
+    try:
+        return evaluation.loads
+    except SettingsError:
+        return None
+
+
+def _used(evaluation: Evaluation, j: int) -> tuple[float, float]:
+    """Return the smallest and the largest value of a joint at the targets and along the cycle."""
+    values = [evaluation.q[0, :, j]]
+    if evaluation.cycle_paths is not None:
+        values += [path.q[0, :, j] for path in evaluation.cycle_paths.of_arm(0)[1]]
+    return float(min(each.min() for each in values)), float(max(each.max() for each in values))
+
+
+def _needs(evaluation: Evaluation) -> dict[str, Array]:
+    """Return (D,) torque and utilisations of the joints by name; NaN where a rating is unknown."""
+    at_rest = np.abs(evaluation.joint_torques[0]).max(axis=0)
+    if evaluation.cycle_paths is not None:
+        along = holding_torques(evaluation.cycle_paths, evaluation.torque_terms)[0]
+        at_rest = np.maximum(at_rest, np.abs(along).max(axis=(0, 1)))
+    drives, loads = evaluation.arms.actuation, loads_of(evaluation)
+    need = {"torque": at_rest}
+    if drives is not None:
+        need["peak_utilisation"] = drives.safety_factor[0] * at_rest / drives.peak[0]
+    if loads is None:
+        return need
+    dof = loads.torques.shape[-1]
+    torques, speeds = (values[:1].reshape(1, -1, dof) for values in (loads.torques, loads.speeds))
+    need["torque"] = np.maximum(at_rest, np.abs(torques).max(axis=(0, 1)))
+    if drives is not None:
+        share = drives.safety_factor[0] * need["torque"] / drives.peak[0]
+        moving = torque_speed_utilisation(torques, speeds, drives).max(axis=(0, 1))  # NaN without a corner speed
+        need["peak_utilisation"] = np.fmax(share, moving)
+        need["speed_utilisation"] = np.abs(speeds).max(axis=(0, 1)) / drives.no_load_speed[0]
+        need["thermal_utilisation"] = drives.safety_factor[0] * loads.rms_torques[0] / drives.continuous[0]
+    return need

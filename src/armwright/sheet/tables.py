@@ -1,0 +1,237 @@
+"""The title, sentences and tables of a data sheet as text."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armwright.sheet.record import NOT_STATED, DataSheet, JointLine, Sensitivity
+from armwright.tasks.moments import MAX_MASS
+
+AXIS_NAMES = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
+MOST_DECIMALS = 3
+ENOUGH = 3  # significant digits
+SHOWN_UNITS = {"m": (1e3, " mm"), "rad": (math.degrees(1.0), "°")}  # of objectives
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a data sheet.
+
+    Attributes:
+        title: Its title.
+        header: Names of the columns, with units; empty for pairs of a name and a value.
+        rows: The cells.
+        left: Indices of the columns that are aligned at the left; the others have numbers.
+        note: A line below; why there are no rows, if there are none.
+    """
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    left: tuple[int, ...] = (0,)
+    note: str = ""
+
+
+def number(value: float | None, factor: float = 1.0, signed: bool = False, missing: str = NOT_STATED) -> str:
+    """Return a value in other units, with three significant digits and no exponent; never more than 3 decimals."""
+    if value is None:
+        return missing
+    shown = factor * value
+    digits = 0 if shown == 0.0 else ENOUGH - 1 - math.floor(math.log10(abs(shown)))
+    text = f"{shown:{'+' if signed else ''},.{min(max(digits, 0), MOST_DECIMALS)}f}"
+    return text if any(letter in "123456789" for letter in text) else "0"
+
+
+def money(value: float | None, missing: str = NOT_STATED) -> str:
+    """Return a price with cents [USD]."""
+    return missing if value is None else f"{value:,.2f}"
+
+
+def title_of(sheet: DataSheet) -> str:
+    """Return the title of a sheet."""
+    return sheet.name if sheet.design is None else f"{sheet.name}, design {sheet.design} ({sheet.joint_letters})"
+
+
+def verdict_of(sheet: DataSheet) -> str:
+    """Return role, verdict and survival in one sentence; empty for an existing arm."""
+    role = f"recommended ({sheet.role.replace('_', ' ')})" if sheet.role else ""
+    broken = f"infeasible: {', '.join(sheet.violated)}" if sheet.violated else ""
+    parts = [part for part in (broken, role, sheet.status and f"simulation: {sheet.status}", sheet.survival) if part]
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def key_figures(sheet: DataSheet) -> Table:
+    """Return what an engineer asks first."""
+    voltage = "" if sheet.voltage is None else f" at {sheet.voltage:g} V"
+    supply = f"{number(sheet.peak_current)} A peak, {number(sheet.mean_current)} A mean{voltage}"
+    payload = "none" if sheet.missing.get("payload", "").startswith("the task") else _stated(sheet, "payload", "kg")
+    held = sheet.payload_at_full_reach
+    at_reach = "any" if held is not None and held >= MAX_MASS else _stated(sheet, "payload_at_full_reach", "kg")
+    if held == 0.0:
+        at_reach += " (the actuators do not hold the arm itself)"
+    rows = [
+        ("horizontal reach", f"{number(sheet.reach, 1e3)} mm"),
+        ("base", NOT_STATED if sheet.base_position is None else _base(sheet.base_position, sheet.base_yaw or 0.0)),
+        ("mass", _stated(sheet, "mass", "kg") if sheet.mass else f"{NOT_STATED} ({sheet.missing['mass']})"),
+        ("payload of the task", payload),
+        ("payload held at full reach", at_reach),
+        ("position error at the targets", _stated(sheet, "position_error", "mm", 1e3)),
+        ("deflection at the targets", _stated(sheet, "deflection", "mm", 1e3)),
+        ("backlash error at the targets", _stated(sheet, "backlash_error", "mm", 1e3)),
+        ("cycle time", _stated(sheet, "cycle_time", "s")),
+        ("current", f"{NOT_STATED} ({sheet.missing['supply']})" if sheet.peak_current is None else supply),
+        ("price", _stated(sheet, "price", "USD") if sheet.price is None else f"{money(sheet.price)} USD"),
+    ]
+    rows += [("objective " + name, _objective(value, unit)) for name, (value, unit) in sheet.objectives.items()]
+    return Table("Key figures", (), tuple(rows), (0, 1))
+
+
+def joint_table(sheet: DataSheet) -> Table:
+    """Return ranges and drives of the joints; angles in degrees, slides in millimetres."""
+    header = ("#", "joint", "drive", "range", "used", "unused", "torque", "peak", "peak use", "speed use", "thermal")
+    rows = tuple(_joint_row(sheet, joint) for joint in sheet.joints)
+    notes = ["Range in ° or mm, torque in N m or N (prismatic); unused: below and above."]
+    idle = [str(joint.number) for joint in sheet.joints if joint.used and joint.used[1] - joint.used[0] < 1e-3]
+    if idle:
+        notes.append(f"Joint {', '.join(idle)} does not move in this task.")
+    reasons = {
+        sheet.missing[key]: key for key in ("thermal_utilisation", "utilisation", "used") if key in sheet.missing
+    }
+    notes += [f"{key.replace('_', ' ').capitalize()}: {NOT_STATED}, {reason}." for reason, key in reasons.items()]
+    return Table("Joints and drives", header, rows, (1, 2), " ".join(notes))
+
+
+def body_lines(sheet: DataSheet) -> tuple[str, ...]:
+    """Return where the bodies of the actuators are, if they count."""
+    return tuple(f"actuator at joint {joint.number}: {joint.body}" for joint in sheet.joints if joint.body)
+
+
+def link_table(sheet: DataSheet) -> Table:
+    """Return what to cut."""
+    rows = tuple(
+        (
+            str(link.number),
+            f"{1e3 * link.length:.1f}",
+            NOT_STATED
+            if link.outer_diameter is None
+            else f"{1e3 * link.outer_diameter:g} x {1e3 * (link.wall or 0.0):g}",
+            number(link.mass, 1e3),
+        )
+        for link in sheet.links
+        if link.length > 0.0
+    )
+    return Table("Links", ("#", "length [mm]", "tube [mm]", "mass [g]"), rows, ())
+
+
+def mass_table(sheet: DataSheet) -> Table:
+    """Return the mass by parts, with the sum."""
+    rows = [(line.part, number(line.mass, 1e3), f"{line.mass / sheet.mass:.0%}") for line in sheet.masses]
+    rows += [("together", number(sheet.mass, 1e3), "100%")] if rows else []
+    return Table("Mass", ("part", "mass [g]", "share"), tuple(rows), (0,), sheet.missing.get("mass", ""))
+
+
+def parts_table(sheet: DataSheet) -> Table:
+    """Return the parts list."""
+    rows = tuple(
+        (str(part.count), part.part, money(part.unit_price, missing="–"), money(part.price), part.detail)
+        for part in sheet.parts
+    )
+    notes = [f"Neither mass nor price include {sheet.not_modelled}."] if sheet.not_modelled else []
+    if not rows:
+        notes.append("A URDF names no parts; try --actuators.")
+    return Table("Parts", ("n", "part", "each [USD]", "price [USD]", "detail"), rows, (1, 4), " ".join(notes))
+
+
+def source_lines(sheet: DataSheet) -> tuple[str, ...]:
+    """Return where data and prices of the parts were read."""
+    lines = [
+        f"{part.part}: {'; '.join(text for text in (part.source, part.price_source) if text)}"
+        for part in sheet.parts
+        if part.source or part.price_source
+    ]
+    return tuple(lines)
+
+
+def reach_table(sheet: DataSheet) -> Table:
+    """Return payload and errors over the reach."""
+    rows = tuple(
+        (
+            f"{line.fraction:.0%}",
+            number(line.distance, 1e3),
+            "any" if line.payload is not None and line.payload >= MAX_MASS else number(line.payload, missing="–"),
+            number(line.deflection, 1e3, missing="–"),
+            number(line.backlash_error, 1e3, missing="–"),
+        )
+        for line in sheet.over_reach
+    )
+    header = ("reach", "distance [mm]", "payload [kg]", "deflection [mm]", "backlash [mm]")
+    return Table("Over the reach", header, rows, (), "–: no posture was found there, or not stated.")
+
+
+def sensitivity_table(sheet: DataSheet) -> Table:
+    """Return what changes of the design change."""
+    header = ("part", "change", "error [mm]", "deflection [mm]", "backlash [mm]", "mass [g]", "price [USD]", "breaks")
+    rows = tuple(_sensitivity_row(line) for line in sheet.sensitivities if not line.impossible)
+    parts_by_reason: dict[str, list[str]] = {}
+    for line in sheet.sensitivities:
+        if line.impossible:
+            parts_by_reason.setdefault(f"({line.change}): {line.impossible}", []).append(line.part)
+    shown = [f"{', '.join(parts)} {reason}" for reason, parts in parts_by_reason.items()]
+    note = f"Impossible: {'; '.join(shown)}." if shown else sheet.missing.get("sensitivities", "")
+    return Table("Sensitivities", header, rows, (0, 1, 7), note)
+
+
+def _base(position: Sequence[float], yaw: float) -> str:
+    """Return where the base is: the first joint of a design, the base link of an existing arm."""
+    turned = f", turned by {math.degrees(yaw):.1f}°" if yaw else ""
+    return f"at ({', '.join(f'{1e3 * value + 0.0:.1f}' for value in position)}) mm{turned}"
+
+
+def _objective(value: float | None, unit: str) -> str:
+    """Return an objective, a length in millimetres and an angle in degrees."""
+    factor, shown = SHOWN_UNITS.get(unit, (1.0, f" {unit}"))
+    return number(value) if value is None else f"{number(value, factor)}{shown}".rstrip()
+
+
+def _stated(sheet: DataSheet, key: str, unit: str, factor: float = 1.0) -> str:
+    """Return a value of the sheet with its unit, or why it is not stated."""
+    value: float | None = getattr(sheet, key)
+    if value is not None:
+        return f"{number(value, factor)} {unit}"
+    return f"{NOT_STATED} ({sheet.missing[key]})" if key in sheet.missing else NOT_STATED
+
+
+def _joint_row(sheet: DataSheet, joint: JointLine) -> tuple[str, ...]:
+    factor, digits = (1e3, 1) if joint.kind == "prismatic" else (math.degrees(1.0), 0)
+
+    def pair(values: tuple[float, float] | None, between: str) -> str:
+        return (
+            "–"
+            if values is None
+            else between.join(f"{round(factor * value, digits) + 0.0:.{digits}f}" for value in values)
+        )
+
+    def share(value: float | None) -> str:
+        return "–" if value is None else f"{value:.0%}"
+
+    axis = f"slide ({joint.axis})" if joint.kind == "prismatic" else AXIS_NAMES[joint.axis]
+    return (
+        str(joint.number),
+        axis if joint.name == f"joint_{joint.number}" else f"{joint.name}, {axis}",
+        NOT_STATED if not joint.actuator else "URDF" if joint.actuator == joint.name else joint.actuator,
+        pair((joint.lower, joint.upper), " to "),
+        pair(joint.used, " to "),
+        pair(joint.unused, " | "),
+        number(joint.torque, missing="–"),
+        number(joint.peak_torque, missing="–"),
+        *map(share, (joint.peak_utilisation, joint.speed_utilisation, joint.thermal_utilisation)),
+    )
+
+
+def _sensitivity_row(line: Sensitivity) -> tuple[str, ...]:
+    errors = (line.position_error, line.deflection, line.backlash_error)
+    shown = [number(value, 1e3, signed=True, missing="–") for value in errors]
+    price = NOT_STATED if line.price is None else "0" if abs(line.price) < 0.005 else f"{line.price:+,.2f}"
+    shown += [number(line.mass, 1e3, signed=True, missing="–"), price]
+    return (line.part, line.change, *shown, ", ".join(line.broken))

@@ -1,0 +1,293 @@
+"""The data sheet of an arm that exists, from its URDF."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armwright.exceptions import SettingsError, did_you_mean
+from armwright.existing.existing_arm import ExistingArm
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.problem.assumptions import ALONG_CYCLE, describe_assumed
+from armwright.problem.objectives import BACKLASH_ERROR, CYCLE_TIME, DEFLECTION, WORST_ERROR
+from armwright.problem.over_reach import reach_lines
+from armwright.problem.problem import Problem
+from armwright.problem.supply import supply_of
+from armwright.robot.actuators import ActuatorRecord, named_actuator, value_of
+from armwright.robot.arm import Arm, Joint
+from armwright.robot.mounting import Mounting
+from armwright.robot.urdf_reader import UrdfArm
+from armwright.sheet.arm_drawing import drawing_of, link_line
+from armwright.sheet.joint_lines import joint_lines
+from armwright.sheet.parts import price_source
+from armwright.sheet.record import DataSheet, JointLine, MassLine, Part
+
+SAFETY_FACTOR = 1.5  # of torques, as that of designs by default
+NO_TASK = "an arm without a task"
+OF_TASK = (
+    "base_position", "base_yaw", "payload", "position_error", "backlash_error", "cycle_time", "supply", "used",
+    "utilisation", "thermal_utilisation",
+)  # fmt: skip
+NO_EFFORT = "not every joint states an effort"
+NO_DRIVES = "a URDF states no {} of its drives"
+ENTERING = ("stall_torque", "peak_torque", "backlash")  # values of actuators that a sheet without a task shows
+
+
+def read_actuators(text: str, joints: Sequence[str]) -> dict[str, ActuatorRecord]:
+    """Parse `shoulder=XM540-W270,elbow=XM430-W350` into actuators of the catalogue by joint.
+
+    Args:
+        text: Names of joints, or their numbers from 1, with names of actuators.
+        joints: The names of the moving joints.
+
+    Raises:
+        SettingsError: A part is no pair, or there is no such joint.
+        SpaceError: The catalogue has no such actuator.
+    """
+    found: dict[str, ActuatorRecord] = {}
+    for part in text.split(","):
+        joint, equals, name = (word.strip() for word in part.partition("="))
+        if not (joint and equals and name):
+            raise SettingsError(
+                f'--actuators "{part.strip()}": expected JOINT=NAME; try {joints[0]}=XM430-W350, several with commas'
+            )
+        if joint.isdecimal() and 1 <= int(joint) <= len(joints):
+            joint = joints[int(joint) - 1]
+        if joint not in joints:
+            raise SettingsError(
+                f'--actuators: unknown joint "{joint}".{did_you_mean(joint, joints)} Joints: {", ".join(joints)}'
+            )
+        if joint in found:
+            raise SettingsError(f'--actuators: expected one actuator for the joint "{joint}", got two')
+        found[joint] = named_actuator(name)
+    return found
+
+
+@dataclass(frozen=True)
+class Job:
+    """The task of an existing arm.
+
+    Attributes:
+        problem: The task, its objectives and constraints.
+        mounting: Where the base link stands.
+        place: The same in words, and why there.
+    """
+
+    problem: Problem
+    mounting: Mounting
+    place: str
+
+
+def urdf_sheet(
+    described: UrdfArm,
+    actuators: Mapping[str, ActuatorRecord] | None = None,
+    job: Job | None = None,
+    price: float | None = None,
+) -> DataSheet:
+    """Return the data sheet of an existing arm.
+
+    Args:
+        described: The arm; with a job, in its place and with the tool of the task.
+        actuators: Those of its joints by name that `driven` has put there.
+        job: What it is there for.
+        price: Its price as stated, in place of that of its parts [USD].
+
+    Raises:
+        SettingsError: If the price is not a finite number of at least 0.
+    """
+    if price is not None and not 0.0 <= price < np.inf:
+        raise SettingsError(f"price: expected a finite number of at least 0 USD, got {price:g}")
+    actuators, arm = actuators or {}, described.arm
+    if job is None:
+        arm = replace(arm, safety_factor=SAFETY_FACTOR)
+        existing, payload, targets = None, 0.0, np.zeros((0, 3))
+    else:
+        existing = ExistingArm(job.problem, job.problem.physics_of_arms(stack_arms([arm])), price)
+        payload, targets = float(job.problem.task.payloads.max()), existing.evaluation.targets
+    over_reach = reach_lines(arm, payload)
+    sheet = DataSheet(
+        name=described.name,
+        design=None,
+        joint_letters="",
+        reach=over_reach[-1].distance,
+        mass=arm.mass,
+        payload_at_full_reach=over_reach[-1].payload,
+        price=price,
+        joints=_joints(described, existing),
+        links=tuple(link_line(arm, n) for n in range(1, len(arm.links) + 1)),
+        masses=_masses(arm),
+        parts=_parts(actuators),
+        over_reach=over_reach,
+        drawing=drawing_of(arm, targets, described.values_in_arm(np.zeros(len(arm.joints))).tolist()),
+        assumptions=_assumptions(described, actuators, arm.safety_factor, job),
+        not_modelled="",
+    )
+    if existing is not None:
+        sheet = _on_task(sheet, existing)
+    if job is not None:
+        sheet = replace(sheet, base_position=job.mounting.position, base_yaw=job.mounting.yaw)
+    if price is not None:
+        sheet = replace(sheet, assumptions={**sheet.assumptions, "price": "as stated by the user"})
+    return replace(sheet, missing=_missing(sheet, existing))
+
+
+def _on_task(sheet: DataSheet, existing: ExistingArm) -> DataSheet:
+    """Return a data sheet with what an arm does on its task."""
+    objectives, supply = existing.problem.objectives, supply_of(existing.evaluation, 0)
+    assumptions = dict(sheet.assumptions)
+    if existing.undecided:
+        assumptions["constraints"] = f"unknown whether it meets {', '.join(existing.undecided)}"
+    return replace(
+        sheet,
+        assumptions=assumptions,
+        name=f"{sheet.name} on {existing.problem.task.name}",
+        violated=existing.violated,
+        objectives={o.name: (one, o.unit) for o, one in zip(objectives, existing.objectives, strict=True)},
+        payload=float(existing.problem.task.payloads.max()) or None,
+        position_error=existing.value(WORST_ERROR),
+        deflection=existing.value(DEFLECTION),
+        backlash_error=existing.value(BACKLASH_ERROR),
+        cycle_time=existing.value(CYCLE_TIME),
+        peak_current=None if supply is None else supply.peak_current,
+        mean_current=None if supply is None else supply.mean_current,
+        voltage=None if supply is None else supply.voltage,
+    )
+
+
+def _joints(described: UrdfArm, existing: ExistingArm | None) -> tuple[JointLine, ...]:
+    """Return the lines of the joints, with values as the URDF counts them."""
+    evaluation = None if existing is None else existing.evaluation
+    lines = joint_lines(described.arm, evaluation, described.joints)
+    return tuple(map(_in_urdf, lines, described.signs, described.zeros))
+
+
+def _in_urdf(line: JointLine, sign: float, zero: float) -> JointLine:
+    """Return the line of a joint whose value q is sign * q + zero in the URDF."""
+
+    def span(low: float, high: float) -> tuple[float, float]:
+        first, last = sign * low + zero, sign * high + zero
+        return min(first, last), max(first, last)
+
+    lower, upper = span(line.lower, line.upper)
+    if line.used is None or line.unused is None:
+        return replace(line, lower=lower, upper=upper)
+    below, above = line.unused if sign > 0.0 else line.unused[::-1]
+    return replace(line, lower=lower, upper=upper, used=span(*line.used), unused=(below, above))
+
+
+def driven(described: UrdfArm, actuators: Mapping[str, ActuatorRecord]) -> UrdfArm:
+    """Return an arm with actuators at joints by name, in place of the efforts that the URDF states.
+
+    Their masses are taken to be included in those of the links.
+
+    Raises:
+        SettingsError: If one is at a slide, whose gearing a URDF does not state.
+    """
+
+    def with_actuator(name: str, joint: Joint) -> Joint:
+        record = actuators.get(name)
+        if record is None:
+            return joint
+        if joint.kind == "prismatic":
+            raise SettingsError(
+                f'--actuators: expected a revolute joint, got the prismatic joint "{name}"; leave it out'
+            )
+        return replace(joint, actuator=record.actuator())
+
+    pairs = zip(described.joints, described.arm.joints, strict=True)
+    joints = tuple(with_actuator(name, joint) for name, joint in pairs)
+    return replace(described, arm=replace(described.arm, joints=joints))
+
+
+def _masses(arm: Arm) -> tuple[MassLine, ...]:
+    """Return the parts of the mass; empty if the URDF states none."""
+    lines = [MassLine("base", arm.base_mass)]
+    lines += [MassLine(f"link {n}", link.mass) for n, link in enumerate(arm.links, start=1)]
+    lines.append(MassLine("tool", arm.tool.mass))
+    return tuple(line for line in lines if line.mass > 0.0)
+
+
+def _parts(actuators: Mapping[str, ActuatorRecord]) -> tuple[Part, ...]:
+    records = list(actuators.values())
+    return tuple(
+        Part(
+            part=record.name,
+            count=records.count(record),
+            unit_price=record.price,
+            price=None if record.price is None else records.count(record) * record.price,
+            detail=f"{record.maker} {record.kind}".strip(),
+            source=record.source,
+            price_source=price_source(record),
+        )
+        for record in dict.fromkeys(records)
+    )
+
+
+def _missing(sheet: DataSheet, existing: ExistingArm | None) -> dict[str, str]:
+    """Return why values are not stated."""
+    found = {"sensitivities": "an existing arm has no design space"}
+    if existing is None:
+        found |= dict.fromkeys(OF_TASK, NO_TASK)
+    else:
+        found |= _missing_on_task(sheet, existing)
+    if sheet.price is None:
+        found["price"] = "a URDF states no price; try --price"
+    if sheet.deflection is None:
+        found["deflection"] = "a URDF states no stiffness of links"
+    if not sheet.mass:
+        found["mass"] = "no link of the URDF states a mass"
+    if sheet.over_reach[-1].payload is None:
+        has_efforts = all(joint.peak_torque is not None for joint in sheet.joints)
+        found["payload_at_full_reach"] = "no posture was found there" if has_efforts else NO_EFFORT
+    return found
+
+
+def _missing_on_task(sheet: DataSheet, existing: ExistingArm) -> dict[str, str]:
+    found: dict[str, str] = {}
+    if sheet.payload is None:
+        found["payload"] = "the task carries none"
+    if sheet.backlash_error is None:
+        found["backlash_error"] = NO_DRIVES.format("backlash")
+    if existing.problem.task.cycle is None:
+        found |= dict.fromkeys(("cycle_time", "supply", "thermal_utilisation"), "the task has no cycle")
+    else:
+        if sheet.cycle_time is None:
+            found["cycle_time"] = f"the task leaves durations open, and {NO_DRIVES.format('corner speed')}"
+        if sheet.peak_current is None:
+            found["supply"] = NO_DRIVES.format("currents")
+        if not any(joint.thermal_utilisation for joint in sheet.joints):
+            found["thermal_utilisation"] = NO_DRIVES.format("continuous torque")
+    if any(joint.peak_torque is None for joint in sheet.joints):
+        found["utilisation"] = NO_EFFORT
+    return found
+
+
+def _assumptions(
+    described: UrdfArm, actuators: Mapping[str, ActuatorRecord], safety_factor: float, job: Job | None
+) -> dict[str, str]:
+    """Return what the values assume, by what they are about."""
+    found: dict[str, str] = {}
+    if job is not None:
+        found["place"] = job.place
+    found |= {
+        "reach": "horizontal distance of the tip from the first joint; the outlines show the farthest point found in "
+        "each of 72 directions around the base, without obstacles",
+        "over the reach": "the least favourable of all postures found, in directions in which the arm reaches nearly "
+        "as far as in any; the payload is a point at the tip",
+        "torques": f"with a safety factor of {safety_factor:g}; peaks are the efforts of the URDF"
+        + (", or those of the named actuators, whose masses are included in those of the links" if actuators else ""),
+    }
+    if described.notes:
+        found["URDF"] = "; ".join(described.notes)
+    entering = ENTERING if job is None or job.problem.task.cycle is None else (*ENTERING, *ALONG_CYCLE)
+    assumed = {record.name: _assumed(record, entering) for record in actuators.values()}
+    if any(assumed.values()):
+        shown = {name: values for name, values in assumed.items() if values}
+        found["actuators"] = f"defaults of their kind or estimates: {describe_assumed(shown)}"
+    return found
+
+
+def _assumed(record: ActuatorRecord, entering: Sequence[str]) -> dict[str, float]:
+    completed = record.completed()
+    values = {name: value_of(completed, name) for name in record.assumed if name in entering}
+    return {name: value for name, value in values.items() if value is not None}

@@ -1,0 +1,83 @@
+"""The designs that a direct search reports: distinct ones, without joints that never move."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.pareto import front_mask
+from armwright.problem.problem import Problem
+from armwright.problem.reduction import reduced
+from armwright.search.front.resolution import distinct, resolution_of
+from armwright.search.front.selection import Indices, nearest, thinned
+
+
+@dataclass(frozen=True)
+class ReportedFront:
+    """K designs of a front, sorted by the first objective.
+
+    Attributes:
+        matrix: (K, P) designs.
+        values: (K, M) objectives.
+        evaluations: Reduced designs that were evaluated.
+        reduced: Reduced designs among the K.
+        found: Designs that a user can tell apart, of which K were affordable.
+    """
+
+    matrix: Array
+    values: Array
+    evaluations: int
+    reduced: int
+    found: int
+
+
+def reported_front(
+    problem: Problem, matrix: Array, values: Array, reference_point: Sequence[float], n: int
+) -> ReportedFront:
+    """Select the designs of a front to report, and remove the joints that they never move until none is left.
+
+    A reduced design replaces its parent if it is not worse in any objective. Otherwise both compete.
+
+    Args:
+        problem: The problem.
+        matrix: (N, P) designs of the front.
+        values: (N, M) their objectives, with penalties for infeasible ones.
+        reference_point: (M,).
+        n: Largest number of designs to report.
+    """
+    kept, n_distinct = _selected(problem, matrix, values, reference_point, n)
+    matrix, values = matrix[kept], values[kept]
+    known, found = {row.tobytes() for row in matrix}, set[bytes]()
+    parents = matrix
+    while len(candidates := np.array([row for row in reduced(problem, parents) if row.tobytes() not in known])):
+        found |= {row.tobytes() for row in candidates}
+        known |= found
+        # The new designs come first: of designs with equal values, the first one stays on the front.
+        values = np.vstack([problem.evaluate_matrix(candidates).penalised, values])
+        matrix = np.vstack([candidates, matrix])
+        on_front = front_mask(values)
+        parents = candidates[on_front[: len(candidates)]]
+        matrix, values = matrix[on_front], values[on_front]
+    if found:
+        kept, n_distinct = _selected(problem, matrix, values, reference_point, n)
+        matrix, values = matrix[kept], values[kept]
+    order = np.argsort(values[:, 0], kind="stable")
+    matrix, values = matrix[order], values[order]
+    return ReportedFront(matrix, values, len(found), sum(row.tobytes() in found for row in matrix), n_distinct)
+
+
+def _selected(
+    problem: Problem, matrix: Array, values: Array, reference_point: Sequence[float], n: int
+) -> tuple[Indices, int]:
+    """Return the indices of at most n designs of a front that a user can tell apart, and how many there are."""
+    point = np.asarray(reference_point)
+    within = np.flatnonzero(np.all(values < point, axis=1))
+    if not len(within):
+        return nearest(values, point, n), len(values)
+    matrix, values = matrix[within], values[within]
+    names = [objective.name for objective in problem.objectives]
+    designs = problem.space.designs(matrix)
+    joints = np.array([sum(module.is_actuated for module in design.modules) for design in designs])
+    kept = distinct(values, resolution_of(dict(problem.task.resolution), names, values, reference_point), joints)
+    return within[kept[thinned(values[kept], point, n)]], len(kept)

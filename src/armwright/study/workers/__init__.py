@@ -1,0 +1,1 @@
+"""Where evaluations run, and what happens when they fail."""

@@ -1,0 +1,314 @@
+"""The keys of the local servers: pages of other users, other tabs and later servers do not get at data."""
+
+import base64
+import http.server
+import shutil
+import signal
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Request, expect
+from starlette.routing import Mount, Route
+
+from armwright.editor.app import SHELLS, Editor
+from armwright.editor.edited_files import EditedFiles
+from armwright.page.live_app import LivePage, OpenPages, live_app
+from tests.support.browser import Tab
+from tests.support.command_line import PATIENCE, start
+from tests.support.editor import served_editor
+from tests.support.live_server import ask, port_and_key, served, served_run
+
+__all__ = ["served"]  # a fixture
+
+TASK = "name: secret-cell\ntargets:\n  - [0.3, 0.2, 0.1]\n"
+MARK = "secret"  # in the names of the task and of the run folder
+
+
+@dataclass(frozen=True)
+class Server:
+    """A server of a page.
+
+    Attributes:
+        kind: Which: "live" or "editor".
+        address: What the terminal shows.
+        routes: The routes, with their whole paths.
+        shells: Those that need no key.
+    """
+
+    kind: str
+    address: str
+    routes: tuple[Route, ...]
+    shells: tuple[str, ...]
+
+    @property
+    def port(self) -> int:
+        return port_and_key(self.address)[0]
+
+    @property
+    def key(self) -> str:
+        return port_and_key(self.address)[1]
+
+
+@contextmanager
+def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Server]:
+    pages = OpenPages()
+    if kind == "live":
+        with served_run(run, port) as address:
+            routes = tuple(one for one in live_app(run, pages).routes if isinstance(one, Route))
+            yield Server(kind, address, routes, ("/",))
+    else:
+        task = folder / "secret-cell.yaml"
+        task.write_text(TASK, encoding="utf-8")
+        with served_editor(task, port) as editor:
+            mine = Editor(EditedFiles(task), pages).routes()
+            assert [one.path for one in mine if isinstance(one, Mount)] == ["/run"]
+            live = [
+                Route(f"/run{one.path}", one.endpoint, methods=one.methods) for one in LivePage(run, pages).routes()
+            ]
+            yield Server(kind, editor.address, (*(one for one in mine if isinstance(one, Route)), *live), SHELLS)
+
+
+@pytest.fixture(params=["live", "editor"])
+def server(
+    request: pytest.FixtureRequest, served: tuple[Path, int, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Server]:
+    monkeypatch.chdir(tmp_path)
+    run = tmp_path / "secret-run"
+    shutil.copytree(served[0], run)
+    with a_server(request.param, tmp_path, run) as begun:
+        yield begun
+
+
+def test_every_address_but_the_shell_needs_the_key(server: Server) -> None:
+    paths = {route.path for route in server.routes}
+    assert paths > set(server.shells)
+    origin = {"Origin": f"http://127.0.0.1:{server.port}", "Content_Type": "application/json"}
+    for route in server.routes:
+        for method in route.methods or ():
+            wrong = (
+                {},
+                {"X_Armwright_Key": server.key[:-1]},
+                {"X_Armwright_Key": "é"},
+                {"Cookie": f"armwright-key={server.key}; armwright-{server.port}={server.key}"},
+                {"Authorization": f"Bearer {server.key}"},
+                {"Referer": server.address},
+            )
+            for query in ("", f"?key={server.key}"):
+                for headers in wrong:
+                    status, body = ask(server.port, method, route.path + query, None, **origin, **headers)
+                    if route.path in server.shells:
+                        assert status == 200
+                        assert MARK.encode() not in body
+                        assert server.key.encode() not in body
+                    else:
+                        assert status == 403, f"{method} {route.path}"
+    for path in ("/nothing", "/../config.yaml", "//", "/run", "/openapi.json"):
+        assert ask(server.port, "GET", path)[0] == 403
+
+
+def test_no_websocket_is_opened(server: Server) -> None:
+    own = (f"127.0.0.1:{server.port}", f"http://127.0.0.1:{server.port}")
+    for host, origin in (own, ("evil.example", own[1]), (own[0], "http://evil.example"), (own[0], "null")):
+        for path in {route.path for route in server.routes}:
+            for key in ("", f"X-Armwright-Key: {server.key}\r\n"):
+                handshake = (
+                    f"GET {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: {origin}\r\nConnection: Upgrade\r\n{key}"
+                    "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+                    f"Sec-WebSocket-Key: {base64.b64encode(bytes(16)).decode()}\r\n\r\n"
+                )
+                with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as connection:
+                    connection.sendall(handshake.encode())
+                    status = int(connection.recv(64).split()[1])
+                assert status == 421 if host != own[0] else status in (200, 403, 404, 405)
+                if host == own[0] and not key:
+                    assert status == (200 if path in server.shells else 403)
+
+
+def test_headers_of_proxies_change_nothing(server: Server) -> None:
+    path = "/control" if server.kind == "live" else "/stop"
+    right = {"Content_Type": "application/json", "X_Armwright_Key": server.key}
+    body = b'{"action": "resume"}' if server.kind == "live" else b"{}"
+    forged = {"X_Forwarded_Proto": "https", "X_Forwarded_For": "192.0.2.1", "Forwarded": "proto=https"}
+    own = f"127.0.0.1:{server.port}"
+    assert ask(server.port, "POST", path, body, Origin=f"http://{own}", **right, **forged)[0] == 204
+    assert ask(server.port, "POST", path, body, Origin=f"https://{own}", **right, **forged)[0] == 403
+
+
+def history(tab: Tab) -> list[str]:
+    """The addresses that this tab can go back and forward to."""
+    session = tab.context.new_cdp_session(tab.page)
+    return [entry["url"] for entry in session.send("Page.getNavigationHistory")["entries"]]
+
+
+def wait(tab: Tab, server: Server) -> None:
+    tab.page.locator("#loading").wait_for(state="hidden")
+    expect(tab.page).to_have_title(
+        "secret-run: armwright, live" if server.kind == "live" else "secret-cell.yaml: armwright"
+    )
+
+
+def test_the_key_leaves_the_address_and_stays_in_the_tab(server: Server, browser: Browser) -> None:
+    tab = Tab(browser)
+    requests: list[Request] = []
+    tab.page.on("request", lambda request: requests.append(request))
+    tab.page.goto(server.address)
+    wait(tab, server)
+    home = f"http://127.0.0.1:{server.port}/"
+    assert tab.page.url.partition("#")[0] == home
+    tab.page.reload()
+    wait(tab, server)
+    assert history(tab)[-1].partition("#")[0] == home
+    sent = [request.all_headers() for request in requests if request.url.startswith(home)]
+    assert all(server.key not in url for url in (*history(tab), *tab.requests, tab.ask("document.URL")))
+    assert all(server.key not in headers.get("referer", "") for headers in sent)
+    assert tab.ask("document.cookie") == ""
+    assert tab.context.cookies() == []
+    assert all("cookie" not in headers for headers in sent)
+    assert tab.faults == []
+
+    other = tab.context.new_page()
+    other.goto(home)
+    expect(other.locator("#loading")).to_have_text(
+        "This page cannot be shown: this tab has no key; open the address that the terminal shows, with all that "
+        "follows the #"
+    )
+    assert MARK not in other.content()
+    other.goto(server.address)  # the same document, with a fragment
+    expect(other.locator("#loading")).to_be_hidden()
+    tab.close()
+
+
+@pytest.mark.parametrize("kind", ["live", "editor"])
+def test_a_page_of_an_earlier_server_says_so(
+    served: tuple[Path, int, str], tmp_path: Path, browser: Browser, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    tab = Tab(browser)
+    with a_server(kind, tmp_path, served[0]) as first:
+        tab.page.goto(first.address)
+        tab.page.locator("#loading").wait_for(state="hidden")
+        port = first.port
+    with a_server(kind, tmp_path, served[0], port) as second:
+        sentence = (
+            "this tab has the key of another server, such as an earlier one; open the address that the terminal shows"
+        )
+        if kind == "live":  # it looks for its server by itself
+            expect(tab.page.locator("#refusal")).to_contain_text(sentence)
+        else:
+            tab.page.get_by_role("button", name="Add ground", exact=True).click()
+            expect(tab.page.locator("#fault")).to_contain_text(sentence)
+        tab.page.reload()
+        expect(tab.page.locator("#loading")).to_contain_text(f"This page cannot be shown: {sentence}")
+        tab.page.goto(second.address)
+        tab.page.locator("#loading").wait_for(state="hidden")
+    tab.close()
+
+
+@pytest.fixture
+def neighbour() -> Iterator[tuple[str, list[dict[str, str]]]]:
+    """Another user's server on another port of this address, and the headers of the requests that it got."""
+    got: list[dict[str, str]] = []
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            got.append({name.lower(): value for name, value in self.headers.items()})
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<!doctype html><title>neighbour</title>")
+
+        def log_message(self, format: str, *args: object) -> None: ...
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as there:
+        threading.Thread(target=there.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{there.server_address[1]}/", got
+        there.shutdown()
+
+
+STEAL = """async ([home, paths]) => {
+    const got = [];
+    const attempt = async (what) => {
+        try { got.push(String(await what())); } catch (fault) { got.push(fault.name); } };
+    const loads = (element) => new Promise((done) => {
+        element.onload = () => done('loaded'); element.onerror = () => done('refused');
+        document.body.append(element); });
+    for (const path of paths) {
+        await attempt(async () => (await fetch(home + path, { credentials: 'include' })).text());
+        await attempt(async () => (await fetch(home + path, { headers: { 'x-armwright-key': 'x' } })).text());
+        await attempt(async () => (await fetch(home + path, { mode: 'no-cors', credentials: 'include' })).type);
+        await attempt(() => loads(Object.assign(document.createElement('script'), { src: home + path })));
+    }
+    await attempt(() => JSON.stringify([sessionStorage, localStorage, document.cookie]));
+    await attempt(() => document.referrer);
+    const frame = document.createElement('iframe'); frame.src = home;
+    await attempt(() => loads(frame));
+    await attempt(() => frame.contentWindow.sessionStorage.getItem('armwright-key'));
+    const opened = window.open(home);
+    await attempt(() => opened.sessionStorage.getItem('armwright-key'));
+    await attempt(() => opened.location.href);
+    return got;
+}"""
+
+
+def test_a_page_on_another_port_gets_neither_key_nor_data(
+    server: Server, browser: Browser, neighbour: tuple[str, list[dict[str, str]]]
+) -> None:
+    """Ports share cookies, so only what belongs to an origin can be kept from the servers of other users."""
+    address, got = neighbour
+    tab = Tab(browser)
+    tab.page.goto(server.address)
+    wait(tab, server)
+    other = tab.context.new_page()
+    other.goto(address)
+    paths = [route.path[1:] for route in server.routes if "GET" in (route.methods or ())]
+    stolen: list[Any] = other.evaluate(STEAL, [f"http://127.0.0.1:{server.port}/", paths])
+    # The user leaves our page for the other one, in the same tab and from a link.
+    tab.page.on("dialog", lambda dialog: dialog.accept())
+    tab.page.evaluate(
+        "(address) => { const link = document.createElement('a'); link.href = address; document.body.append(link);"
+        " link.click(); }",
+        address,
+    )
+    expect(tab.page).to_have_title("neighbour")
+    stolen += tab.page.evaluate(STEAL, [f"http://127.0.0.1:{server.port}/", paths])
+    for text in (*stolen, *(str(headers) for headers in got)):
+        assert server.key not in text
+        assert MARK not in text
+    assert len(got) >= 2
+    assert all("cookie" not in headers and headers.get("referer", address) == address for headers in got)
+    tab.close()
+
+
+def test_files_are_downloaded_with_the_key(served: tuple[Path, int, str], browser: Browser) -> None:
+    """Those of the editor's search are downloaded in tests/editor/test_engineers_path.py."""
+    _, port, key = served
+    tab = Tab(browser)
+    tab.open(f"http://127.0.0.1:{port}/#key={key}")
+    with tab.page.expect_download() as download:
+        tab.page.get_by_role("button", name="URDF", exact=True).first.click()
+    assert Path(download.value.path()).read_text(encoding="utf-8").startswith("<?xml")
+    assert all(key not in url for url in tab.requests)
+    tab.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["live", "edit"])
+def test_no_log_holds_the_key(served: tuple[Path, int, str], in_folder: Path, command: str) -> None:
+    target = served[0] if command == "live" else "secret-cell.yaml"
+    with start(command, target) as process:
+        assert process.stdout is not None
+        port, key = port_and_key(process.stdout.readline().strip())
+        for headers in ({}, {"X_Armwright_Key": key}, {"Upgrade": "websocket", "Connection": "Upgrade"}):
+            for path in ("/", "/run", f"/?key={key}", "/nothing"):
+                ask(port, "GET", path, **headers)
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection:
+            connection.sendall(f"not HTTP {key}\r\n\r\n".encode())
+            connection.recv(64)
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=PATIENCE) == ("", "")

@@ -1,0 +1,330 @@
+"""The live page, with a study in another process and a real browser."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Self
+
+import psutil
+import pytest
+from playwright.sync_api import Browser, expect
+from typer.testing import CliRunner
+
+import armwright as aw
+from armwright.cli.app import app
+from armwright.llm.transcript import Transcript
+from armwright.page.live_run import LiveRun
+from armwright.proof.results import discard_results
+from armwright.runs.control import read_control
+from armwright.runs.folder import RunFolder, read_run
+from tests.support.browser import Tab
+from tests.support.chat_server import Answer, ChatServer, Request, designer, wants_design
+from tests.support.command_line import PATIENCE, refused, start
+from tests.support.live_server import ask, post_control, served
+from tests.support.wire_formats import model_options
+
+__all__ = ["served"]  # a fixture
+
+HINT = "a SCARA arm, please; <b>its base</b> behind the targets"
+
+
+class Gate:
+    """Answers as `designer`, but lets a question wait until it is opened."""
+
+    def __init__(self) -> None:
+        self.closed_after = 10**9  # questions that are answered at once
+        self.asked = 0
+        self.open = threading.Event()
+
+    def __call__(self, request: Request) -> Answer:
+        self.asked += 1
+        if self.asked > self.closed_after:
+            self.open.wait(PATIENCE)
+        return designer(request)
+
+
+class LiveStudy:
+    """`armwright optimize … --live` in a process of its own; a context manager, at whose end it is gone."""
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        command = [
+            sys.executable,
+            "-m",
+            "armwright",
+            "optimize",
+            "target-1",
+            "--live",
+            "--no-figures",
+            "--out",
+            str(folder),
+        ]
+        self.folder = folder
+        self.process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True, encoding="utf-8")
+        self.said: list[str] = []
+        while not (
+            found := re.search(r"^live: (http://127\.0\.0\.1:\d+/#key=[\w-]{32})$", self.said[-1] if self.said else "")
+        ):
+            line = self.process.stdout.readline()
+            assert line, "".join(self.said)
+            self.said.append(line)
+        self.address = found[1]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+    def end(self) -> int:
+        """Waits for its end."""
+        rest, _ = self.process.communicate(timeout=PATIENCE)
+        self.said.append(rest)
+        return self.process.returncode
+
+
+@pytest.fixture
+def tab(browser: Browser) -> Iterator[Tab]:
+    opened = Tab(browser)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def live() -> Iterator[ExitStack]:
+    """Ends the studies that a test began, whatever became of it."""
+    with ExitStack() as begun:
+        yield begun
+
+
+def model(server: ChatServer) -> list[str]:
+    return [
+        "--model",
+        "test-model",
+        *model_options(base_url=server.url, origin="scripted"),
+        "--n-init",
+        "4",
+        "--n-step",
+        "4",
+    ]
+
+
+def test_live_page_receives_designs_sends_hints_and_stops(
+    tmp_path: Path, tab: Tab, live: ExitStack, chat_server: ChatServer
+) -> None:
+    gate = Gate()
+    gate.closed_after = 3  # a check, and two steps of the first proposal
+    chat_server.answer = gate
+    study = live.enter_context(LiveStudy(tmp_path / "run", *model(chat_server), "--n-total", "4000"))
+    tab.open(study.address)
+    page = tab.page
+    expect(page.locator("#doing")).to_have_text(re.compile(r"^asking the model, \d"))
+    # The second proposal's question is under way with 8 designs finished; the hint goes into the third.
+    expect(page.locator("#facts")).to_contain_text("black box 3")
+    assert tab.ask("armwright.content.n") == 8
+    page.locator("#hint-text").fill(HINT)
+    page.get_by_role("button", name="Send").click()
+    expect(page.locator("#hints")).to_contain_text(f"waiting for the next prompt: {HINT}")
+    assert [hint.text for hint in read_control(study.folder).hints] == [HINT]
+
+    # A reload shows the whole state; a second tab, too.
+    page.reload()
+    page.locator("#loading").wait_for(state="hidden")
+    assert tab.ask("armwright.content.n") == 8
+    expect(page.locator("#hints")).to_contain_text("waiting for the next prompt")
+    other = Tab(page.context.browser)
+    other.open(study.address)
+    expect(other.page.locator("#hints")).to_contain_text(HINT)
+
+    gate.open.set()
+    expect(page.locator("#hints")).to_contain_text("used at iteration 9")
+    expect(other.page.locator("#hints")).to_contain_text("used at iteration 9")
+    prompts = chat_server.prompts()
+    with_hint = [
+        i
+        for i, prompt in enumerate(prompts)
+        if "SCARA arm, please" in prompt and not wants_design(chat_server.requests[i])
+    ]
+    assert len(with_hint) == 1
+
+    # Pause lets no trial begin; two tabs agree about it.
+    page.get_by_role("button", name="Pause").click()
+    expect(other.page.locator("#doing")).to_have_text(re.compile(r"^paused for "))
+    n = len(read_run(study.folder)[1])
+    other.page.get_by_role("button", name="Resume").click()
+    expect(page.locator("#doing")).to_have_text(re.compile("^(evaluating|asking)"))
+    expect(page.locator("#progress")).not_to_have_js_property("value", n)
+
+    page.get_by_role("button", name="Stop after this design").click()
+    assert study.end() == 130
+    assert "stopped" in "".join(study.said)
+    expect(page.locator("#doing")).to_have_text(re.compile(r"^stopped at \d+ of 4004; repeat the command to resume"))
+    expect(page.locator("#pause")).to_be_hidden()
+    finished = len(read_run(study.folder)[1])
+    assert f"stopped at {finished} of" in page.locator("#doing").inner_text()
+    page.reload()  # the server lives on as long as a page looks on
+    page.locator("#loading").wait_for(state="hidden")
+    assert tab.ask("armwright.content.n") == finished
+    other.close()
+    calls = Transcript(study.folder / "transcripts.jsonl", read_only=True).calls
+    assert [[hint.text for hint in call.hints] for call in calls if call.hints] == [[HINT]]
+    assert tab.faults == []
+
+
+def test_live_page_shows_the_end_and_outlives_the_study(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
+    study = live.enter_context(LiveStudy(tmp_path / "run", "--proposer", "rules", "--n-total", "30", "--seed", "3"))
+    tab.open(study.address)
+    expect(tab.page.locator("#doing")).to_have_text("finished: 40 designs")
+    assert study.end() == 0
+    expect(tab.page.locator("#facts")).to_contain_text("robust")
+    expect(tab.page.locator("#hint")).to_be_hidden()  # nobody would read it
+    history = read_run(study.folder)[1]
+    assert tab.ask("armwright.content.n") == 40
+    assert tab.ask("armwright.content.curve.at(-1)") == pytest.approx(history.hypervolume[-1])
+    assert sorted(tab.ask("armwright.content.head.front")) == sorted(m.number for m in history.front)
+    with tab.page.expect_download() as download:
+        tab.page.get_by_role("button", name="URDF").click()
+    assert Path(download.value.path()).read_text(encoding="utf-8").startswith("<?xml")
+    assert tab.faults == []
+
+
+def test_study_survives_a_killed_server(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
+    plain = aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_total=300, out=tmp_path / "plain")
+    study = live.enter_context(LiveStudy(tmp_path / "run", "--proposer", "none", "--n-total", "300"))
+    tab.open(study.address)
+    children = [int(pid) for pid in _children(study.process.pid)]
+    assert len(children) == 1
+    os.kill(children[0], signal.SIGKILL)
+    expect(tab.page.locator("#doing")).to_have_text(re.compile("Connection lost"))
+    assert study.end() == 0
+    assert [t.values for t in read_run(study.folder)[1]] == [t.values for t in plain.trials]
+
+
+def _children(pid: int) -> list[int]:
+    return [child.pid for child in psutil.Process(pid).children()]
+
+
+def test_killed_study_is_shown_as_not_running(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
+    study = live.enter_context(
+        LiveStudy(tmp_path / "run", "--proposer", "none", "--n-total", "20000", "--sampler", "random")
+    )
+    tab.open(study.address)
+    study.process.kill()
+    study.process.wait()
+    expect(tab.page.locator("#doing")).to_have_text(re.compile(r"^not running, at \d+ of 20010"))
+    study.end()
+
+
+def test_open_page_shows_a_new_reach_map(served: tuple[Path, int, str], tab: Tab) -> None:
+    folder, port, key = served
+    tab.open(f"http://127.0.0.1:{port}/#key={key}")
+    tab.page.wait_for_function("armwright.content.n === 10")
+    tab.ask("armwright.set({ design: 4 })")
+    box = tab.page.locator("#reach-box")
+    expect(box).to_be_hidden()
+    options = ("--design", "4", "--spacing", "0.3", "--directions", "4")
+    assert CliRunner().invoke(app, ["reach-map", str(folder), *options]).exit_code == 0
+    expect(box).to_be_visible()
+    assert tab.ask("armwright.state.design") == 4
+    assert tab.faults == []
+
+
+def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    aw.find_front(aw.Problem(aw.load_task("target-1")), evaluations=400, out=folder)
+    run = LiveRun(folder)
+    run.look()
+    assert run.status["doing"] == "finished"
+    discard_results(folder)
+    with RunFolder(folder):
+        run.look()
+        assert run.status["doing"] == "searching"
+    run.look()
+    assert run.status["doing"] == "unknown"
+
+
+def test_control_needs_key_origin_and_json(served: tuple[Path, int, str]) -> None:
+    folder, port, key = served
+    assert post_control(port, "") == 403
+    assert post_control(port, key[:-1] + ("A" if key[-1] != "A" else "B")) == 403
+    for origin in ("", "null", "http://evil.example", f"http://localhost:{port}", f"https://127.0.0.1:{port}"):
+        assert post_control(port, key, Origin=origin) == 403
+    assert post_control(port, key, Content_Type="text/plain") == 415
+    assert not read_control(folder).paused
+    assert post_control(port, key) == 204
+    assert read_control(folder).paused
+    assert post_control(port, key, {"action": "resume"}) == 204
+
+
+def test_foreign_host_header_is_refused(served: tuple[Path, int, str]) -> None:
+    """With DNS rebinding, the browser considers page and server one site."""
+    _, port, key = served
+    for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", ""):
+        assert ask(port, "GET", "/run", Host=host, X_Armwright_Key=key)[0] in (400, 421)
+        assert not host or post_control(port, key, Host=host, Origin=f"http://{host}") == 421
+    assert ask(port, "GET", "/run", Host=f"localhost:{port}", X_Armwright_Key=key)[0] == 200
+
+
+@pytest.mark.parametrize(
+    ("content", "status"),
+    [
+        (b"", 422),
+        (b"[]", 422),
+        (b"\xff\xfe", 422),
+        ({"action": "explode"}, 422),
+        ({"action": "pause", "more": 1}, 422),
+        ({"action": "hint"}, 409),
+        ({"action": "hint", "text": ""}, 409),
+        ({"action": "hint", "text": "x" * 2001}, 409),
+        (b'{"action":' * 9000, 413),
+        (b"[" * 60000, 422),
+        ({"action": "hint", "text": " \n "}, 409),
+    ],
+)
+def test_invalid_control_requests_are_refused(served: tuple[Path, int, str], content: object, status: int) -> None:
+    folder, port, key = served
+    before = read_control(folder)
+    assert post_control(port, key, content) == status
+    assert read_control(folder) == before
+
+
+def test_unknown_paths_and_files_are_not_found(served: tuple[Path, int, str]) -> None:
+    _, port, key = served
+
+    def get(path: str) -> tuple[int, bytes]:
+        return ask(port, "GET", path, X_Armwright_Key=key)
+
+    for path in ("/../config.yaml", "/config.yaml", "/%2e%2e/etc/passwd", "/file?design=0&format=../../config.yaml",
+                 "/file?design=99&format=urdf", "/file", "/control"):  # fmt: skip
+        assert get(path)[0] in (400, 404, 405)
+    assert get("/file?design=9&format=mjcf")[0] == 200
+    whole = get("/run")[1]
+    assert get("/run?designs=-1&calls=x")[1] == whole
+    assert len(get("/run?designs=10")[1]) < len(whole)
+
+
+def test_server_listens_on_loopback_only(served: tuple[Path, int, str]) -> None:
+    _, port, _ = served
+    listening = [c.laddr.ip for c in psutil.net_connections("inet") if c.status == "LISTEN" and c.laddr.port == port]
+    assert listening == ["127.0.0.1"]
+
+
+def test_live_refuses_a_folder_without_a_run(tmp_path: Path) -> None:
+    assert "is not a run folder" in refused(1, "live", tmp_path)
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_the_server_cleanly(tmp_path: Path) -> None:
+    aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
+    with start("live", tmp_path / "run") as server:
+        assert server.stdout is not None
+        assert server.stdout.readline().startswith("http://127.0.0.1:")
+        server.send_signal(signal.SIGINT)
+        _, errors = server.communicate(timeout=PATIENCE)
+    assert (server.returncode, errors) == (0, "")

@@ -1,0 +1,292 @@
+"""The live server under attack from other pages and hand-made requests."""
+
+import http.client
+import http.server
+import json
+import re
+import shutil
+import socket
+import threading
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import psutil
+import pytest
+import yaml
+from playwright.sync_api import Browser
+
+import armwright as aw
+from armwright.page.page import write_report
+from armwright.page.request_guard import HEADERS
+from armwright.runs.control import read_control
+from tests.fuzz.request_targets import a_server
+from tests.support.browser import FLAGS, Tab, program
+from tests.support.command_line import PATIENCE
+from tests.support.live_server import ask, post_control, served
+
+__all__ = ["served"]  # a fixture
+
+LINK = (
+    '<a href="https://evil.example/">click</a><img src=x onerror="window.hacked = 1"><script>window.hacked = 2</script>'
+)
+
+
+def said(port: int, request: bytes) -> tuple[int, dict[str, str], bytes]:
+    """The answer to these very bytes, which are no more than a part of a request perhaps."""
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection:
+        connection.sendall(request)
+        answer = http.client.HTTPResponse(connection, method=request.split(b" ")[0].decode())
+        answer.begin()
+        return answer.status, {name.lower(): value for name, value in answer.getheaders()}, answer.read()
+
+
+def refused(port: int, request: bytes) -> bool:
+    """Whether the server says so, or hangs up while it is still spoken to."""
+    try:
+        return said(port, request)[0] in (400, 413, 431)
+    except ConnectionError:
+        return True
+
+
+def lines(*words: str) -> bytes:
+    return "\r\n".join([*words, "", ""]).encode("latin-1")
+
+
+def right(port: int, key: str) -> list[str]:
+    """The headers of the page's own POST, but for its length."""
+    host = f"127.0.0.1:{port}"
+    return [f"Host: {host}", f"Origin: http://{host}", "Content-Type: application/json", f"X-Armwright-Key: {key}"]
+
+
+def test_responses_have_security_headers(served: tuple[Path, int, str]) -> None:
+    _, port, key = served
+    host, with_key = f"Host: 127.0.0.1:{port}", f"X-Armwright-Key: {key}"
+    for status, request in (
+        (200, lines("GET / HTTP/1.1", host)),
+        (200, lines("GET /run HTTP/1.1", host, with_key)),
+        (200, lines("HEAD /events HTTP/1.1", host, with_key)),
+        (404, lines("GET /config.yaml HTTP/1.1", host, with_key)),
+        (405, lines("GET /control HTTP/1.1", host, with_key)),
+        (403, lines("POST /control HTTP/1.1", host, "Content-Length: 0")),
+        (415, lines("POST /control HTTP/1.1", *right(port, key)[:2], right(port, key)[3], "Content-Length: 0")),
+        (421, lines("GET / HTTP/1.1", "Host: evil.example")),
+    ):
+        got, headers, _ = said(port, request)
+        assert got == status
+        assert {name.lower(): headers.get(name.lower()) for name in HEADERS} == {
+            n.lower(): v for n, v in HEADERS.items()
+        }
+        assert not [name for name in headers if name.startswith("access-control") or name == "server"]
+    assert HEADERS["Content-Security-Policy"] == "frame-ancestors 'none'"
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "BREW"])
+def test_control_accepts_post_only(served: tuple[Path, int, str], method: str) -> None:
+    folder, port, key = served
+    before = read_control(folder)
+    more = ["Access-Control-Request-Method: POST", "X-HTTP-Method-Override: POST", "Content-Length: 0"]
+    assert said(port, lines(f"{method} /control HTTP/1.1", *right(port, key), *more))[0] in (400, 405)
+    for path in ("/", "/run", "/file?design=0&format=urdf", "/events"):
+        status = said(
+            port, lines(f"{'POST' if method == 'GET' else method} {path} HTTP/1.1", *right(port, key), *more)
+        )[0]
+        assert status in ((200,) if method == "HEAD" else (400, 405))
+    assert read_control(folder) == before
+
+
+def test_key_counts_only_in_its_header(served: tuple[Path, int, str]) -> None:
+    folder, port, key = served
+    host, origin, kind, _ = right(port, key)
+    length = "Content-Length: 18"
+    body = b'{"action":"pause"}'
+    for path, more in (
+        (f"/control?x-armwright-key={key}", []),
+        ("/control", [f"Cookie: x-armwright-key={key}"]),
+        ("/control", [f"Authorization: Bearer {key}"]),
+        ("/control", [f"X-Armwright-Key: {key[:-1]}"]),
+        ("/control", [f"X-Armwright-Key: {key} x"]),
+        ("/control", ["X-Armwright-Key: é"]),
+    ):
+        assert said(port, lines(f"POST {path} HTTP/1.1", host, origin, kind, length, *more) + body)[0] == 403
+    assert not read_control(folder).paused
+
+
+def test_keys_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With hmac's comparison patched to accept everything, any key is accepted."""
+    server = a_server()
+    wrong = {"host": "127.0.0.1:9", "origin": "http://127.0.0.1:9", "content-type": "application/json",
+             "x-armwright-key": "no"}  # fmt: skip
+    assert server.ask("POST", b"/control", wrong, b'{"action":"resume"}')[0] == 403
+    monkeypatch.setattr("armwright.page.request_guard.secrets.compare_digest", lambda ours, theirs: True)
+    assert server.ask("POST", b"/control", wrong, b'{"action":"resume"}')[0] == 204
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_two_host_headers_are_refused(served: tuple[Path, int, str], first: bool) -> None:
+    folder, port, key = served
+    hosts = [f"Host: 127.0.0.1:{port}", "Host: evil.example"][:: 1 if first else -1]
+    origin = f"Origin: http://{hosts[0].partition(': ')[2]}"
+    request = lines("POST /control HTTP/1.1", *hosts, origin, *right(port, key)[2:], "Content-Length: 18")
+    assert said(port, request + b'{"action":"pause"}')[0] in (400, 421)
+    assert not read_control(folder).paused
+
+
+PATHS = (
+    "/../config.yaml", "/..%2fconfig.yaml", "/%2e%2e/config.yaml", "/%2e%2e%2fconfig.yaml", "/%252e%252e/config.yaml",
+    "/..%5cconfig.yaml", "/..\\config.yaml", "//etc/passwd", "/./config.yaml", "/run/../config.yaml",
+    "/%c0%ae%c0%ae/x",
+    "/config.yaml%00.html", "/trials.jsonl", "/designs/0000/arm.urdf", "/static/../../etc/passwd",
+    "/file/../config.yaml",
+    "/file?design=..%2f..%2fconfig.yaml&format=urdf", "/file?design=0&format=..%2fconfig.yaml",
+    "/file?design=0&format=",
+    "/file?design=-1&format=urdf", "/file?design=1e3&format=mjcf", "/file?design=%D9%A1&format=__class__", "/.lock",
+    "/file?design=99999999999999999999&format=json",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_paths_do_not_reach_files(served: tuple[Path, int, str], path: str) -> None:
+    _, port, key = served
+    status, _, body = said(port, lines(f"GET {path} HTTP/1.1", *right(port, key)))
+    assert status in (400, 404)
+    assert b"targets" not in body
+    assert b"root:" not in body
+
+
+def test_endless_body_is_refused_early(served: tuple[Path, int, str]) -> None:
+    folder, port, key = served
+    server = next(c.pid for c in psutil.net_connections("inet") if c.laddr.port == port and c.status == "LISTEN")
+    before = psutil.Process(server).memory_info().rss
+    huge, chunked = "Content-Length: 1000000000000", "Transfer-Encoding: chunked"
+    part = b"%x\r\n%s\r\n" % (70_000, b" " * 70_000)
+    for extra, body in ((huge, b" " * 70_000), (chunked, part)):
+        assert refused(port, lines("POST /control HTTP/1.1", *right(port, key), extra) + body)
+        # Whoever has no key is not even listened to.
+        assert said(port, lines("POST /control HTTP/1.1", *right(port, "no"), extra))[0] == 403
+    assert refused(port, lines("GET / HTTP/1.1", f"Host: 127.0.0.1:{port}", "X: " + "x" * 200_000))
+    assert psutil.Process(server).memory_info().rss - before < 50e6
+    assert not read_control(folder).paused
+
+
+@pytest.mark.slow
+def test_slow_clients_do_not_block_others(served: tuple[Path, int, str]) -> None:
+    folder, port, key = served
+    begun = lines("POST /control HTTP/1.1", *right(port, key), "Content-Length: 18") + b'{"action":'
+    slow = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) for _ in range(50)]
+    for number, connection in enumerate(slow):
+        connection.sendall(begun if number % 2 else begun[:30])
+    assert ask(port, "GET", "/run", X_Armwright_Key=key)[0] == 200
+    assert post_control(port, key, {"action": "resume"}) == 204
+    for connection in slow:
+        connection.close()
+    assert ask(port, "GET", "/run", X_Armwright_Key=key)[0] == 200
+    assert not read_control(folder).paused
+
+
+@pytest.fixture
+def evil(tmp_path: Path) -> Iterator[str]:
+    """Another site, in the same browser."""
+    (tmp_path / "index.html").write_text("<!doctype html><title>evil</title>", encoding="utf-8")
+    handler = partial(_Quiet, directory=str(tmp_path))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://localhost:{server.server_address[1]}/"
+        server.shutdown()
+
+
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: object) -> None: ...
+
+
+ATTACK = """async (home) => {
+    const tried = {};
+    const attempt = async (name, what) => {
+        try { tried[name] = String(await what()); } catch (e) { tried[name] = 'refused'; } };
+    await attempt('read', async () => (await fetch(home + 'run')).status);
+    await attempt('shell', async () => (await (await fetch(home)).text()).length);
+    await attempt('json', async () => (await fetch(home + 'control', { method: 'POST', body: '{"action":"pause"}',
+        headers: { 'Content-Type': 'application/json', 'X-Armwright-Key': 'x' } })).status);
+    await attempt('simple', async () => (await fetch(home + 'control', { method: 'POST', mode: 'no-cors',
+        body: '{"action":"pause"}' })).type);
+    const loads = (element) => new Promise((done) => {
+        element.onload = () => done('loaded'); element.onerror = () => done('refused');
+        document.body.append(element); });
+    const image = document.createElement('img'); image.src = home + 'file?design=0&format=urdf';
+    await attempt('image', () => loads(image));
+    const script = document.createElement('script'); script.src = home + 'run';
+    await attempt('script', () => loads(script));
+    await attempt('events', () => new Promise((done) => { const source = new EventSource(home + 'events');
+        source.onopen = () => done('open'); source.onerror = () => { source.close(); done('refused'); }; }));
+    const frame = document.createElement('iframe'); frame.src = home; frame.name = 'framed';
+    await attempt('frame', () => loads(frame));
+    const form = document.createElement('form'); form.method = 'POST'; form.action = home + 'control';
+    form.enctype = 'text/plain'; form.target = 'framed';
+    form.innerHTML = `<input name='{"action":"pause","x":"' value='"}'>`;
+    document.body.append(form);
+    await attempt('form', () => new Promise((done) => { frame.onload = () => done('sent'); form.submit(); }));
+    return tried;
+}"""
+
+
+def test_cross_origin_page_gets_nothing(served: tuple[Path, int, str], browser: Browser, evil: str) -> None:
+    folder, port, _ = served
+    before = read_control(folder)
+    tab = Tab(browser)
+    tab.page.goto(evil)
+    tried = tab.page.evaluate(ATTACK, f"http://127.0.0.1:{port}/")
+    names = ("read", "shell", "json", "image", "script", "events")
+    assert {name: tried[name] for name in names} == dict.fromkeys(names, "refused")
+    assert tried["simple"] in ("opaque", "refused")
+    others = [frame for frame in tab.page.frames if frame is not tab.page.main_frame]
+    assert all("armwright" not in frame.content() for frame in others)
+    assert len(others) <= 1
+    assert read_control(folder) == before
+    tab.close()
+
+
+def test_dns_rebinding_shows_nothing(served: tuple[Path, int, str], browser: Browser) -> None:
+    """DNS rebinding in a real browser: to it, evil.example is this server."""
+    _, port, _ = served
+    rebound = browser.browser_type.launch(
+        executable_path=program(), args=[*FLAGS, "--host-resolver-rules=MAP evil.example 127.0.0.1"]
+    )
+    page = rebound.new_page()
+    response = page.goto(f"http://evil.example:{port}/")
+    assert response is not None
+    assert response.status == 421
+    assert page.evaluate("async () => (await fetch('/run')).status") == 421
+    assert "armwright" not in page.content()
+    rebound.close()
+
+
+def test_names_in_a_run_folder_are_escaped(tmp_path: Path, browser: Browser) -> None:
+    """Names of objectives, sources, faults, arms and the folder may come from a stranger."""
+    folder = tmp_path / re.sub("[/]", "", LINK)[:60]
+    aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="rules", n_init=3, n_step=2, n_total=4, out=folder)
+    config = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
+    for objective in config["objectives"]:
+        objective |= {"label": LINK, "unit": LINK, "symbol": LINK}
+    config["method"]["proposer"]["name"] = LINK
+    config["space"]["name"] = LINK[:100]
+    config["versions"]["armwright"] = LINK
+    (folder / "config.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
+    trials = [json.loads(line) for line in (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
+    for trial in trials[3:]:
+        trial |= {"source": LINK, "reason": LINK, "proposal": LINK, "fault": LINK}
+    (folder / "trials.jsonl").write_text("".join(f"{json.dumps(trial)}\n" for trial in trials), encoding="utf-8")
+    arm = {"joints": 6, "reach": 0.5, "mass": 1.0, "base": [0, 0, 0], "values": trials[-1]["values"], "measures": {},
+           "dominates": 1, "dominated_by": 0, "violated": [], "notes": [LINK]}  # fmt: skip
+    (folder / "existing_arms.json").write_text(json.dumps([{"name": LINK, **arm}]), encoding="utf-8")
+    shutil.rmtree(folder / "designs")
+    tab = Tab(browser, offline=True)
+    page = write_report(folder)
+    tab.open(page, "#design=5")
+    tab.page.locator("#pareto").hover()
+    tab.page.locator("#configuration-box summary").click()
+    assert tab.ask("window.hacked") is None
+    made = tab.ask("[...document.querySelectorAll('a, img, image')].map((one) => one.outerHTML)")
+    assert [html for html in made if re.search("evil|src=.?x", html)] == []
+    assert "evil.example" in tab.ask("document.body.textContent")
+    assert [address for address in tab.requests if not address.startswith(("file:", "data:", "blob:"))] == []
+    tab.close()

@@ -1,0 +1,517 @@
+"""report.html in a real browser, offline."""
+
+import csv
+import io
+import json
+import re
+from base64 import b64encode
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+import yourdfpy
+from playwright.sync_api import Browser
+
+import armwright as aw
+from armwright.exceptions import RunFolderError
+from armwright.kinematics.arms.forward import joint_positions
+from armwright.page.assembly import program
+from armwright.page.content import RunContent
+from armwright.page.page import PAGE, write_report
+from armwright.pareto import front_indices
+from armwright.problem.conditions import read_condition
+from armwright.proof.front_gap import known_front
+from armwright.proof.selection import pick_from
+from armwright.runs.folder import read_run
+from armwright.runs.history import History
+from tests.support.browser import Tab
+from tests.support.chat_server import ChatServer, is_check, wants_design
+from tests.support.wire_formats import llm_proposer
+
+HOSTILE = (
+    '</script><script>window.hacked = 1</script><img src=x onerror="window.hacked = 2"> &lt;b&gt; ${window.hacked=3}'
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Black box and rules on target-2, 40 counted trials."""
+    folder = tmp_path_factory.mktemp("page") / "run"
+    aw.optimize(aw.Problem(task=aw.load_task("target-2")), proposer="rules", n_total=40, seed=1, out=folder)
+    write_report(folder)
+    return folder
+
+
+@pytest.fixture
+def history(run: Path) -> History:
+    return read_run(run)[1]
+
+
+@pytest.fixture
+def tab(browser: Browser) -> Iterator[Tab]:
+    opened = Tab(browser, offline=True, accept_downloads=True)
+    yield opened
+    opened.close()
+
+
+def place_of(tab: Tab, number: int) -> tuple[float, float]:
+    """Where a design is drawn in the Pareto plot [px]."""
+    return tab.ask(
+        f"""(() => {{
+            const plot = document.getElementById("pareto"), {{ xaxis, yaxis }} = plot._fullLayout;
+            const [x, y] = armwright.content.values({number}), box = plot.getBoundingClientRect();
+            return [box.left + xaxis._offset + xaxis.d2p(x), box.top + yaxis._offset + yaxis.d2p(y)];
+        }})()"""
+    )
+
+
+def isolated(tab: Tab, history: History) -> int:
+    """A design of the front within the box that no other is drawn near to."""
+    inside = [n for n in front_indices(history.values) if np.all(history.values[n] < 4.9)]
+    places = np.array([place_of(tab, n) for n in range(len(history))])
+    apart = [np.sort(np.linalg.norm(places - places[n], axis=1))[1] for n in inside]
+    return inside[int(np.argmax(apart))]
+
+
+def test_page_opens_offline_without_requests(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    assert tab.requests == [(run / "report.html").resolve().as_uri()]
+    assert tab.faults == []
+    assert (run / "report.html").stat().st_size < 2.5e6
+    facts = tab.text("#facts")
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+    assert f"{summary['hypervolume']['final']:.4g}" in facts
+    assert f"{100 * summary['front_gap']['share']:.1f} % of the best known" in facts
+    assert tab.text("#repeat code") == "armwright optimize target-2 --proposer rules --n-total 40 --seed 1"
+
+
+def test_page_sends_nothing(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    names = tab.page.locator("[data-title], [aria-label], button").evaluate_all(
+        "all => all.map((one) => "
+        "`${one.dataset.title ?? ''} ${one.getAttribute('aria-label') ?? ''} ${one.textContent}`)"
+    )
+    assert len(names) > 20
+    assert not [name for name in names if re.search("share|cloud|upload|edit in", name, re.IGNORECASE)]
+
+
+def test_playback_continues_after_a_selection(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html", "#design=12&target=1")
+    tab.page.locator("#play").click()
+    tab.ask("armwright.set({ design: 20 })")
+    for target in (3, 4):
+        tab.page.get_by_text(f"Target {target} of 9").wait_for()
+    tab.page.locator("#play").click()
+
+
+def test_front_outside_the_reference_box_is_shown(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-1").model_copy(update={"name": "far", "reference_point": (0.01, 0.01)})
+    aw.optimize(aw.Problem(task=task), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    high = tab.ask("[pareto.layout.xaxis.range[1], pareto.layout.yaxis.range[1]]")
+    front = tab.ask("armwright.content.head.front.map((i) => Array.from(armwright.content.values(i)))")
+    assert all(x < high[0] and y < high[1] for x, y in front)
+    assert tab.text("#repeat code").startswith("armwright optimize run ")
+
+
+def test_axes_fit_the_designs_if_the_reference_point_is_far(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-1").model_copy(update={"name": "far", "reference_point": (900.0, 9000.0)})
+    run = aw.optimize(aw.Problem(task=task), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    high = tab.ask("[pareto.layout.xaxis.range[1], pareto.layout.yaxis.range[1]]")
+    assert high == pytest.approx((1.1 * run.history.values.max(axis=0)).tolist(), rel=1e-3)
+
+
+def test_content_security_policy_allows_own_scripts_only(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    text = (run / "report.html").read_text(encoding="utf-8")
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
+    assert "default-src 'none'" in policy
+    assert "connect-src 'none'" in policy
+    scripts = next(part for part in policy.split(";") if "script-src" in part).split()[1:]
+    assert len(scripts) == 3
+    assert all(re.fullmatch(r"'sha256-[A-Za-z0-9+/]{43}='", one) for one in scripts)
+    tab.ask("(() => { const s = document.createElement('script'); s.textContent = 'window.hacked = 1'; "
+            "document.body.append(s); })()")  # fmt: skip
+    assert tab.ask("window.hacked") is None
+
+
+def test_clicking_a_point_shows_its_arm(run: Path, tab: Tab, history: History) -> None:
+    tab.open(run / "report.html")
+    number = isolated(tab, history)
+    tab.page.mouse.click(*place_of(tab, number))
+    assert tab.ask("armwright.state.design") == number
+    assert tab.text("#arm-title").startswith(f"#{number} ")
+    arm, evaluation = history.member(number).arm, history.evaluation([number])
+    for target in (0, 4):
+        tab.ask(f"armwright.set({{ target: {target} }}); armwright.drawArm()")
+        drawn = np.array(tab.ask("armwright.drawnJoints()"))
+        assert drawn == pytest.approx(joint_positions(arm, evaluation.q[0, target]), abs=1e-5)
+    assert f"#design={number}&target=5" in tab.page.url
+
+
+def test_page_kinematics_match_the_kernels(run: Path, tab: Tab, history: History) -> None:
+    tab.open(run / "report.html")
+    for number in (0, 17, 40):
+        told, evaluation = tab.ask(f"armwright.postures({number})"), history.evaluation([number])
+        assert [one["error"] for one in told] == pytest.approx(evaluation.position_error[0], abs=1e-5)
+        torques = np.array([one["torques"] for one in told])
+        assert torques == pytest.approx(evaluation.joint_torques[0], abs=1e-5 * np.abs(torques).max())
+
+
+def test_page_kinematics_count_tool_and_payload(tmp_path: Path, tab: Tab) -> None:
+    tool = {"tip": [0.02, -0.03, 0.1], "rpy": [0.4, -0.3, 2.0], "mass": 0.7, "center": [0.03, 0.0, 0.1]}
+    content = {"name": "handling", "targets": [[0.3, 0.1, 0.2], {"position": [0.1, 0.3, 0.3], "axis": [0, 0, -1]}]}
+    content |= {"tool": tool, "payload": {"mass": 0.5, "center": [0.05, 0.0, 0.03], "size": [0.06, 0.04, 0.06]}}
+    problem = aw.Problem(aw.Task.model_validate(content), aw.DesignSpace(mount=("floor", "ceiling", "wall+y")))
+    aw.optimize(problem, proposer="none", n_init=4, n_total=4, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    _, history = aw.read_run(tmp_path / "run")
+    assert tab.faults == []
+    for number in range(len(history)):
+        told, evaluation = tab.ask(f"armwright.postures({number})"), history.evaluation([number])
+        assert [one["error"] for one in told] == pytest.approx(evaluation.position_error[0], abs=1e-5)
+        assert told[1]["angle"] == pytest.approx(evaluation.angle_error[0, 1], abs=1e-4)
+        torques = np.array([one["torques"] for one in told])
+        assert torques == pytest.approx(evaluation.joint_torques[0], abs=1e-5 * np.abs(torques).max())
+
+
+def test_stepper_visits_all_targets(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html", "#design=12&target=9")
+    assert tab.text("#target-note").startswith("Target 9 of 9")
+    tab.page.locator("#next").click()
+    assert tab.text("#target-note").startswith("Target 1 of 9")
+    tab.page.keyboard.press("ArrowRight")
+    tab.page.keyboard.press("ArrowRight")
+    tab.page.keyboard.press("ArrowLeft")
+    assert tab.text("#target-note").startswith("Target 2 of 9")
+    assert tab.page.locator("#postures tr.chosen td").first.inner_text() == "2"
+
+
+def test_valid_and_invalid_deep_links(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html", "#design=23&target=4")
+    assert tab.ask("[armwright.state.design, armwright.state.target]") == [23, 3]
+    tab.page.evaluate("location.hash = '#design=7&target=2'")
+    tab.page.get_by_text("Target 2 of 9").wait_for()
+    assert tab.ask("armwright.state.design") == 7
+    tab.page.goto("about:blank")
+    tab.open(run / "report.html", "#design=99999&target=<script>")
+    assert tab.ask("armwright.content.head.front.includes(armwright.state.design)")
+    assert tab.faults == []
+
+
+def test_slider_shows_earlier_iterations(run: Path, tab: Tab, history: History) -> None:
+    tab.open(run / "report.html")
+    tab.page.locator("#iteration").fill("14")
+    assert tab.text("#iteration-value") == "14"
+    shown = tab.ask("document.getElementById('pareto').data.flatMap((trace) => trace.customdata ?? [])")
+    assert sorted(shown) == list(range(10 + 14))
+    line = tab.ask(
+        "(({x, y}) => [x, y])(document.getElementById('pareto').data.find((t) => t.name === 'Pareto front'))"
+    )
+    values = history.values[:24]
+    front = [n for n in front_indices(values) if np.all(values[n] < 5.0)]
+    assert sorted({*line[0]} - {5.0}) == pytest.approx(sorted(values[front, 0]))
+    tab.page.locator("#marks button").last.click()
+    assert tab.text("#iteration-value") == "40"
+
+
+def test_downloaded_files_load(run: Path, tab: Tab, history: History) -> None:
+    number = history.front[0].number
+    tab.open(run / "report.html", f"#design={number}")
+    files = {}
+    for name in ("URDF", "MJCF", "CSV"):
+        with tab.page.expect_download() as download:
+            tab.page.get_by_role("button", name=name).click()
+        files[name] = (download.value.suggested_filename, Path(download.value.path()).read_text(encoding="utf-8"))
+    assert files["URDF"][0] == f"target-2-{number}.urdf"
+    assert files["URDF"][1] == (run / "designs" / f"{number:04d}" / "arm.urdf").read_text(encoding="utf-8")
+    robot = yourdfpy.URDF.load(io.StringIO(files["URDF"][1]))
+    assert len(robot.actuated_joints) == 4
+    assert mujoco.MjModel.from_xml_string(files["MJCF"][1]).njnt == 4
+    rows = list(csv.DictReader(files["CSV"][1].splitlines()))
+    evaluation = history.evaluation([number])
+    assert [float(row["q_2"]) for row in rows] == pytest.approx(evaluation.q[0, :, 1].tolist(), abs=1e-6)
+    assert [float(row["position_error"]) for row in rows] == pytest.approx(evaluation.position_error[0], abs=1e-5)
+
+
+def test_design_off_the_front_has_values_but_no_files(run: Path, tab: Tab, history: History) -> None:
+    front = {member.number for member in history.front}
+    tab.open(run / "report.html", f"#design={next(n for n in range(50) if n not in front)}")
+    assert tab.page.get_by_role("button", name="URDF").is_disabled()
+    assert tab.page.get_by_role("button", name="CSV").is_enabled()
+    assert "Not on the Pareto front" in tab.text("#design-summary")
+
+
+def test_infeasible_designs_are_hollow_and_list_violations(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-2").model_copy(update={"constraints": ("worst_error <= 0.4", "length >= 0.5")})
+    history = aw.optimize(aw.Problem(task=task), proposer="none", n_total=30, seed=1, out=tmp_path / "run").history
+    tab.open(write_report(tmp_path / "run"))
+    infeasible = np.flatnonzero(~history.feasible).tolist()
+    assert infeasible
+    assert history.front
+    drawn = (
+        "pareto.data.filter((t) => t.marker?.symbol === 'circle-open').map((t) => [t.name, Array.from(t.customdata)])"
+    )
+    assert tab.ask(drawn) == [["infeasible", infeasible]]
+    assert f"infeasible {len(infeasible)}" in tab.text("#facts")
+    numbers = [int(text) for text in tab.page.locator("#table tbody tr td:first-child").all_inner_texts()]
+    assert numbers == [member.number for member in history.front]
+    worst = max(infeasible, key=lambda number: history.violations[number, 0])
+    tab.ask(f"armwright.set({{ design: {worst} }})")
+    error = history.evaluation([worst]).position_error.max()
+    assert f"Infeasible; worst_error <= 0.4: {error:.4g} m (violated); length >= 0.5: " in tab.text("#design-summary")
+    tab.ask(f"armwright.set({{ design: {numbers[0]} }})")
+    assert "Feasible; worst_error <= 0.4: " in tab.text("#design-summary")
+    assert asked(tab, "worst_error<=0.35") == [
+        member.number for member in pick_from(tmp_path / "run", [read_condition("worst_error<=0.35")])[1]
+    ]
+    assert tab.faults == []
+
+
+def test_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: History) -> None:
+    tab.open(run / "report.html")
+    numbers = [int(text) for text in tab.page.locator("#table tbody tr td:first-child").all_inner_texts()]
+    assert numbers == [member.number for member in history.front]  # by rising position error
+    tab.page.locator("#table th button", has_text="Torque").click()
+    torques = [float(text) for text in tab.page.locator("#table tbody tr td:nth-child(4)").all_inner_texts()]
+    assert torques == sorted(torques)
+    tab.page.locator("#table th button", has_text="Torque").click()
+    first, second = tab.page.locator("#table tbody tr").all()[:2]
+    first.focus()
+    tab.page.keyboard.press("ArrowDown")
+    assert tab.ask("armwright.state.design") == int(second.get_attribute("data-design"))
+    assert second.get_attribute("aria-current") == "true"
+    robust = set(json.loads((run / "summary.json").read_text(encoding="utf-8"))["verification"]["robust_numbers"])
+    for row in tab.page.locator("#table tbody tr").all():
+        verdict = "robust" if int(row.get_attribute("data-design")) in robust else "sensitive"
+        assert verdict in row.inner_text()
+
+
+def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", robust: bool = False) -> list[int]:
+    """The designs of the table, in its order, after a query was typed in."""
+    page = tab.page
+    page.locator("#pick-where").fill(where)
+    page.locator("#pick-by").select_option(label=by)
+    if by == "weights":
+        page.locator("#pick-weights").fill(weights)
+    page.locator("#pick-robust").set_checked(robust)
+    page.get_by_role("button", name="Pick", exact=True).click()
+    return [int(text) for text in page.locator("#table tbody tr td:first-child").all_inner_texts()]
+
+
+def picked(run: Path, *conditions: str, **wishes: Any) -> list[int]:
+    """The same of `armwright pick`."""
+    _, members = pick_from(run, [read_condition(condition) for condition in conditions], **wishes)
+    return [member.number for member in members]
+
+
+def test_page_pick_matches_the_pick_command(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    assert tab.ask("armwright.state.design") == picked(run)[0]  # it begins with the knee
+    assert asked(tab) == picked(run)
+    assert asked(tab, by="least torque") == picked(run, by="torque")
+    where = ("position_error<=2", " length < .6")
+    assert asked(tab, ",".join(where), by="least mass") == picked(run, *where, by="mass")
+    assert asked(tab, robust=True) == picked(run, robust=True)
+    assert asked(tab, "origin_z >= 1e-2") == picked(run, "origin_z>=0.01")
+    last = asked(tab, "torque < 4.5", by="weights", weights="position_error=2, torque=1")
+    assert last == picked(run, "torque<4.5", weights={"position_error": 2.0, "torque": 1.0})
+    assert tab.ask("armwright.state.design") == last[0]
+    assert tab.text("#pick-message").endswith(
+        'armwright pick RUN --where "torque<4.5" --weights position_error=2,torque=1'
+    )
+    tab.page.get_by_role("button", name="Show all").click()
+    assert tab.page.locator("#table tbody tr").count() == len(picked(run))
+
+
+def test_page_pick_explains_empty_results(run: Path, tab: Tab, history: History) -> None:
+    tab.open(run / "report.html")
+    before = tab.page.locator("#table tbody tr").count()
+    asked(tab, "torque<100, position_error<=1e-6")
+    least = float(re.findall(r"the nearest has ([\d.]+)\.", tab.text("#pick-message"))[0])
+    assert least == pytest.approx(min(member.values[0] for member in history.front), rel=1e-3)
+    asked(tab, "mas<2")
+    assert 'Unknown quantity "mas"' in tab.text("#pick-message")
+    asked(tab, "torque")
+    assert "such as mass<=2.5" in tab.text("#pick-message")
+    asked(tab, by="weights", weights="torque=0")
+    assert "above 0" in tab.text("#pick-message")
+    assert tab.page.locator("#table tbody tr").count() == before
+    assert tab.faults == []
+
+
+def test_comparing_two_designs(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html", "#design=12")
+    tab.page.get_by_role("button", name="Compare").click()
+    tab.ask("armwright.set({ design: 20 })")
+    assert tab.text("#compare") == "Beside #12 ✕"
+    assert tab.page.locator("#ring-compared").get_attribute("style").count("translate") == 1
+    tab.page.locator("#compare").click()
+    assert tab.ask("armwright.state.compared") is None
+
+
+def test_page_works_without_webgl(run: Path, browser: Browser, history: History) -> None:
+    tab = Tab(browser, offline=True)
+    tab.context.add_init_script(
+        "HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, "
+        "{ apply: (f, canvas, said) => (String(said[0]).includes('webgl') ? null : Reflect.apply(f, canvas, said)) })"
+    )
+    tab.open(run / "report.html")
+    assert "shows no 3D graphics" in tab.text("#arm")
+    number = isolated(tab, history)
+    tab.page.mouse.click(*place_of(tab, number))
+    assert tab.text("#design-title").startswith(f"#{number} ")
+    tab.page.locator("#next").click()
+    assert tab.text("#target-note").startswith("Target 2 of 9")
+    tab.close()
+
+
+def test_markup_in_answers_is_escaped(tmp_path: Path, tab: Tab, chat_server: ChatServer) -> None:
+    task = aw.Task(name="evil", targets=aw.load_task("target-1").targets, description=HOSTILE, provenance=HOSTILE)
+    best = dict(known_front(aw.Problem(task=task)).designs[0].params)
+    answer = json.dumps({**best, "reason": HOSTILE})
+    checked = json.dumps({"answer": HOSTILE})
+    chat_server.answer = lambda request: answer if wants_design(request) else checked if is_check(request) else HOSTILE
+    proposer = llm_proposer(chat_server.url, model=HOSTILE, origin="scripted")
+    problem = aw.Problem(task=task, space=aw.paper_space().model_copy(update={"name": HOSTILE[:100]}))
+    run = aw.optimize(problem, proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
+    number = next(trial.number for trial in run.trials if trial.proposal)
+    tab.open(write_report(tmp_path / "run"), f"#design={number}")
+    assert HOSTILE in tab.text("#description")
+    assert "</script><script>" in tab.text("#transcript")
+    tab.page.locator("#all-calls").check()
+    tab.page.locator("#configuration-box summary").click()
+    assert HOSTILE in tab.text("#configuration")
+    assert tab.page.locator("#transcript .call").count() == len(chat_server.requests) >= 5  # a check, 2 x 2 calls
+    tab.page.locator("#pareto").hover()
+    assert tab.ask("window.hacked") is None
+    assert tab.page.locator("img[src=x]").count() == 0
+    assert tab.requests == [(tmp_path / "run" / "report.html").resolve().as_uri()]
+
+
+def test_failures_of_a_replaced_run_are_forgotten(run: Path, tab: Tab) -> None:
+    """A run that begins anew discards its trials, and a live page receives all designs again."""
+    tab.open(run / "report.html")
+    packed = b64encode(RunContent(run).packed()).decode()
+    tab.ask("armwright.content.failures[3] = 'exception: no licence'")
+    tab.ask(f"armwright.content.add(Uint8Array.from(atob('{packed}'), (c) => c.charCodeAt(0)).buffer)")
+    assert tab.ask("armwright.content.hasFailed(3)") is False
+
+
+def test_transcript_states_what_was_predicted_of_a_screened_proposal(
+    tmp_path: Path, tab: Tab, chat_server: ChatServer
+) -> None:
+    best = dict(known_front(aw.Problem(aw.load_task("target-1"))).designs[0].params)
+    answer = json.dumps({**best, "reason": "short"})
+    chat_server.answer = lambda request: answer if wants_design(request) else "because"
+    proposer = llm_proposer(chat_server.url, origin="scripted")
+    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer=proposer, n_init=4, n_step=2, n_total=3, out=tmp_path)
+    trials = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
+    screened = trials[4]  # as if the screen had left it out
+    number, id_ = screened["number"], screened["proposal"]
+    screened |= {"screened": {"source": "llm", "proposal": id_, "gain": 0.02, "predicted": [0.5, 12.0]}}
+    screened |= {"source": "bbo", "proposal": None}
+    del screened["reason"]
+    (tmp_path / "trials.jsonl").write_text("".join(json.dumps(trial) + "\n" for trial in trials), encoding="utf-8")
+    tab.open(write_report(tmp_path), f"#design={number}")
+    line = (
+        f"{id_} was not evaluated: predicted position error 0.5 m, torque 12 N m x 40; expected gain 2 % of the best "
+        "candidate's"
+    )
+    assert f"{line}. #{number} is the black box's design instead." in tab.text("#transcript")
+    assert tab.page.locator("#transcript .call").count() >= 1
+    tab.page.locator("#all-calls").check()
+    stated = tab.page.locator("#transcript .call", has_text=line)
+    assert stated.count() == tab.page.locator("#transcript .call", has_text=id_).count() >= 1
+    assert tab.faults == []
+
+
+def test_page_of_a_front_search(tmp_path: Path, tab: Tab) -> None:
+    run = aw.find_front(aw.Problem(task=aw.load_task("target-3")), evaluations=3000, out=tmp_path / "front")
+    tab.open(write_report(tmp_path / "front"))
+    assert f"{run.summary['hypervolume']['final']:.4g}" in tab.text("#facts")
+    assert "3,000" in tab.text("#facts")
+    assert tab.page.locator("#iterations").is_hidden()
+    assert tab.page.locator("#table tbody tr").count() == len(run.front)
+    assert tab.text("#repeat code") == "armwright design target-3 --evaluations 3000 --seed 0"
+    assert tab.faults == []
+
+
+def test_any_two_of_three_objectives_are_shown(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-1").model_copy(
+        update={
+            "name": "three",
+            "objectives": ("position_error", "torque", "length"),
+            "reference_point": (5.0, 5.0, 1.0),
+        }
+    )
+    run = aw.optimize(aw.Problem(task=task), proposer="none", n_init=6, n_total=20, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    assert tab.page.locator("#table tbody tr").count() == len(run.front)
+    tab.page.locator("#y-axis").select_option(label="Length")
+    drawn = tab.ask(
+        "pareto.data.flatMap((trace) => (trace.customdata ?? []).map((n, k) => [n, trace.x[k], trace.y[k]]))"
+    )
+    for number, x, y in drawn:
+        assert (x, y) == pytest.approx(run.history.values[int(number), [0, 2]])
+    assert len(drawn) == 26
+    assert tab.ask("pareto.layout.yaxis.title.text") == "Length [m]"
+    assert tab.faults == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 900])
+def test_page_fits_small_screens(run: Path, browser: Browser, width: int, scheme: str) -> None:
+    tab = Tab(browser, viewport={"width": width, "height": 800}, color_scheme=scheme, offline=True)
+    tab.open(run / "report.html")
+    assert tab.ask("document.documentElement.scrollWidth") <= width
+    backgrounds = tab.ask("getComputedStyle(document.body).backgroundColor")
+    assert (sum(map(int, re.findall(r"\d+", backgrounds)[:3])) < 200) == (scheme == "dark")
+    assert tab.faults == []
+    tab.close()
+
+
+@pytest.mark.slow
+def test_page_with_ten_thousand_designs(tmp_path: Path, tab: Tab) -> None:
+    rng = np.random.default_rng(1)
+    points = np.round(rng.uniform([-0.6, -0.6, 0.0], [0.6, 0.6, 0.8], (20, 3)), 3)
+    task = aw.Task(name="twenty", targets=tuple(map(tuple, points.tolist())), reference_point=(12.5, 12.5))
+    run = aw.optimize(
+        aw.Problem(task=task), proposer="none", sampler="random", n_total=9_990, out=tmp_path / "run", verify=False
+    )
+    path = write_report(tmp_path / "run")
+    assert path.stat().st_size < 10e6
+    tab.open(path, "#design=9999&target=20")
+    assert tab.ask("armwright.content.n") == 10_000
+    evaluation = run.history.evaluation([9999])
+    drawn = np.array(tab.ask("armwright.drawnJoints()"))
+    assert drawn == pytest.approx(joint_positions(run.history.member(9999).arm, evaluation.q[0, 19]), abs=1e-5)
+    assert tab.page.locator("#table tbody tr").count() == len(run.front)
+    assert tab.faults == []
+
+
+@pytest.mark.slow
+def test_report_without_trials_is_refused(run: Path, tmp_path: Path) -> None:
+    (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(RunFolderError, match="nothing to report"):
+        write_report(tmp_path)
+    with pytest.raises(RunFolderError, match="not a run folder"):
+        write_report(tmp_path / "nowhere")
+
+
+def test_unfinished_run_is_shown(run: Path, tmp_path: Path, tab: Tab) -> None:
+    lines = (run / "trials.jsonl").read_bytes().splitlines(keepends=True)
+    (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "trials.jsonl").write_bytes(b"".join(lines[:20]) + lines[20][:30])
+    tab.open(write_report(tmp_path))
+    assert "unfinished" in tab.text("#facts")
+    assert tab.ask("armwright.content.n") == 20
+
+
+def test_page_modules_are_wrapped_in_functions() -> None:
+    """No import or export statement is left in the page's modules."""
+    assert not re.search(r"^\s*(import|export) ", program(PAGE), re.MULTILINE)

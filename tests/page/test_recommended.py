@@ -1,0 +1,188 @@
+"""report.html begins with the recommended designs of a task with constraints, or with why there is none."""
+
+import csv
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+
+import armwright as aw
+from armwright.page.page import write_report
+from armwright.problem.objectives import QUANTITIES
+from armwright.proof.results import read_summary
+from armwright.runs.folder import read_run
+from armwright.runs.history import History
+from armwright.sheet.design_sheet import design_sheet
+from tests.support.browser import Tab
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def problem(**changes: Any) -> aw.Problem:
+    task = aw.load_task(EXAMPLES / "6-price-task.yaml").model_copy(update=changes)
+    return aw.Problem(task, aw.load_space(EXAMPLES / "6-price-space.yaml"))
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("page-recommended") / "run"
+    aw.find_front(problem(), evaluations=500, out=folder)
+    write_report(folder)
+    return folder
+
+
+@pytest.fixture
+def history(run: Path) -> History:
+    return read_run(run)[1]
+
+
+@pytest.fixture
+def recommended(run: Path) -> list[Mapping[str, Any]]:
+    summary = read_summary(run)
+    assert summary is not None
+    return summary["recommended"]
+
+
+@pytest.fixture
+def tab(browser: Browser) -> Iterator[Tab]:
+    opened = Tab(browser, offline=True)
+    yield opened
+    opened.close()
+
+
+def sections(tab: Tab) -> list[str]:
+    """The visible sections of the page, from top to bottom."""
+    return list(tab.ask("[...document.querySelectorAll('main > section:not([hidden])')].map((s) => s.id)"))
+
+
+def asked(tab: Tab, number: int) -> dict[str, str]:
+    """What the card of a design states, by label."""
+    rows = tab.page.locator(f'.card[data-design="{number}"] .asked')
+    labels = rows.locator("dt").evaluate_all("all => all.map((one) => one.firstChild.textContent)")
+    return dict(zip(labels, rows.locator("dd").all_inner_texts(), strict=True))
+
+
+def test_designs_to_build_come_first_and_the_search_last(
+    run: Path, tab: Tab, recommended: list[Mapping[str, Any]]
+) -> None:
+    tab.open(run / "report.html")
+    shown = sections(tab)
+    assert shown[:3] == ["recommended-box", "front-box", "arm-box"]
+    assert shown.index("table-box") < shown.index("curve-box") < shown.index("configuration-box")
+    assert "hypervolume" not in tab.text("#facts")
+    assert "hypervolume" in tab.text("#research")
+    cards = tab.page.locator(".card").evaluate_all("all => all.map((one) => Number(one.dataset.design))")
+    assert cards == list(dict.fromkeys(one["design"] for one in recommended))
+    for one in recommended:
+        text = tab.text(f'.card[data-design="{one["design"]}"]')
+        assert ("Drives its cycle in MuJoCo" in text) == (one["status"] == "verified")
+        for perturbation in one["survival"]["perturbations"]:
+            name = perturbation["name"]
+            assert (
+                f"Breaks with {name}: {perturbation['broken'][0]['change']}" if perturbation["broken"] else name
+            ) in text
+    assert tab.faults == []
+
+
+def test_cards_state_what_the_kernels_compute(
+    run: Path, tab: Tab, history: History, recommended: list[Mapping[str, Any]]
+) -> None:
+    tab.open(run / "report.html")
+    number = recommended[0]["design"]
+    arm, evaluation = history.member(number).arm, history.evaluation([number])
+    stated = asked(tab, number)
+
+    def value(name: str) -> float:
+        return float(QUANTITIES[name](evaluation)[0])
+
+    assert stated["Reach"] == f"{1e3 * design_sheet(run, number).reach:.3g} mm"
+    assert stated["Price"] == f"{value('price'):,.0f} USD"
+    assert stated["Mass"] == f"{arm.mass:.3g} kg"
+    assert stated["Cycle time"] == f"{value('cycle_time'):.3g} s"
+    assert stated["Payload capacity"] == f"{value('payload_capacity'):.3g} kg"
+    assert stated["Deflection"] == f"{1e3 * value('deflection'):.3g} mm"
+    assert stated["Thermal utilisation"] == f"{100 * value('thermal_utilisation'):.0f} % of allowed"
+
+
+def test_every_quantity_of_a_card_is_explained(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    card = tab.page.locator(".card").first
+    assert card.locator("dt details.why").count() == card.locator("dt").count()
+    sentences = card.locator("dt details.why p").all_text_contents()
+    assert all(text[0].isupper() and text.endswith(".") and len(text) > 20 for text in sentences)
+    explanation = card.locator("dt details.why").first
+    assert explanation.locator("p").is_hidden()
+    explanation.locator("summary").click()
+    assert explanation.locator("p").is_visible()
+
+
+def test_objectives_and_constraints_are_explained_below_the_table(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    tab.page.locator("#meanings summary").click()
+    stated = tab.page.locator("#meanings dt").all_inner_texts()
+    of_constraints = [constraint.quantity for constraint in problem().constraints]
+    quantities = {q.name: q for q in (*problem().objectives, *of_constraints)}
+    assert stated == [f"{q.label} [{q.unit}]" for q in quantities.values()]
+
+
+def test_cards_show_different_pictures_and_select_their_designs(
+    run: Path, tab: Tab, recommended: list[Mapping[str, Any]]
+) -> None:
+    tab.open(run / "report.html")
+    pictures = tab.page.locator(".card img").evaluate_all("all => all.map((one) => one.src)")
+    assert all(picture.startswith("data:image/png") for picture in pictures)
+    assert len(set(pictures)) == len(pictures)
+    last = recommended[-1]["design"]
+    tab.page.locator(f'.card[data-design="{last}"] .picture').click()
+    assert tab.ask("armwright.state.design") == last
+    assert tab.page.locator(".card.chosen").get_attribute("data-design") == str(last)
+    assert tab.text("#design-note").endswith(f"Data sheet: armwright datasheet {run.name} --design {last}")
+
+
+def test_loads_are_those_of_the_exported_trajectory(
+    run: Path, tab: Tab, history: History, recommended: list[Mapping[str, Any]]
+) -> None:
+    number = recommended[0]["design"]
+    arm = history.member(number).arm
+    with (run / "designs" / f"{number:04d}" / "trajectory.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    tab.open(run / "report.html", f"#design={number}")
+    for button, column, factor, limits in (
+        ("Torque", "tau", arm.safety_factor, [joint.effort for joint in arm.joints]),
+        ("Speed", "qd", 1.0, [joint.speed for joint in arm.joints]),
+    ):
+        tab.page.locator("#load-kinds button", has_text=button).click()
+        drawn = tab.ask("loads.data.map((trace) => Math.max(...trace.y.map(Math.abs)))")
+        assert len(drawn) == len(arm.joints)
+        for j, limit in enumerate(limits):
+            assert limit is not None
+            largest = max(abs(float(row[f"{column}_{j + 1}"])) for row in rows)
+            assert drawn[j] == pytest.approx(100 * factor * largest / limit, rel=1e-3)
+    assert "held forever" not in tab.text("#loads-note")
+
+
+def test_page_says_first_why_no_design_is_feasible(tmp_path: Path, tab: Tab) -> None:
+    aw.find_front(problem(constraints=("deflection <= 1e-6",)), evaluations=200, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    assert sections(tab)[0] == "recommended-box"
+    assert tab.text("#recommended-box h2") == "No design meets all constraints"
+    text = tab.text("#nothing")
+    assert "violates unreached_targets <= 0" in text
+    assert "bounds that would admit one" in text
+    nearest = tab.ask("armwright.content.head.nothing.nearest")
+    assert tab.ask("armwright.state.design") == nearest
+    violated = read_run(tmp_path / "run")[1].violations
+    assert nearest == int(np.argmin(np.maximum(violated, 0.0).sum(axis=1)))
+    assert tab.faults == []
+
+
+def test_search_comes_first_for_tasks_of_the_paper(tmp_path: Path, tab: Tab) -> None:
+    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=5, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    shown = sections(tab)
+    assert shown[0] == "front-box"
+    assert shown.index("curve-box") < shown.index("table-box")
+    assert "hypervolume" in tab.text("#facts")

@@ -1,0 +1,75 @@
+"""Assumed values of actuators in the results of a run."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import armwright as aw
+from armwright.problem.assumptions import assumed_values
+from armwright.robot.actuators import named_actuator, value_of
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
+from tests.proof.test_simulation import DESK, SPACE, Desk
+from tests.support.command_line import armwright
+
+SERVO = ["rated_torque", "corner_speed", "rotor_inertia", "coulomb_friction", "viscous_friction", "shaft_offset"]
+SIZE = {"width": 0.03, "height": 0.04, "depth": 0.03}
+
+
+def assumed_of(actuators: list[Any], with_cycle: bool = True) -> dict[str, list[str]]:
+    task = Task.model_validate(DESK if with_cycle else {**DESK, "cycle": None})
+    problem = aw.Problem(task, DesignSpace.model_validate({**SPACE, "actuators": actuators}))
+    return {name: list(values) for name, values in assumed_values(problem).items()}
+
+
+def test_values_along_a_cycle_are_those_that_move_and_heat_the_motors() -> None:
+    assert assumed_of(["XM540-W270"]) == {"XM540-W270": SERVO}
+
+
+def test_without_a_cycle_only_torques_at_rest_count() -> None:
+    assert named_actuator("XM540-W270").assumed
+    assert assumed_of(["XM540-W270"], with_cycle=False) == {"XM540-W270": ["shaft_offset"]}
+    assert assumed_of(["PH42-020-S300-R"], with_cycle=False) == {"PH42-020-S300-R": ["peak_torque", "shaft_offset"]}
+
+
+def test_estimates_are_assumed_and_stated_values_are_not() -> None:
+    stated = dict.fromkeys((*SERVO, "position_gain", "current"), 1.0)
+    full = {"name": "full", "mass": 0.1, "stall_torque": 9.0, "speed": 4.0, "voltage": 12.0, **SIZE, **stated}
+    estimate = {**full, "name": "estimate", "estimates": ["rotor_inertia", "price"], "price": 9.0}
+    assert assumed_of([full, estimate]) == {"estimate": ["rotor_inertia"]}
+
+
+def test_only_actuators_in_use_count() -> None:
+    desk = Desk(space={**SPACE, "actuators": ["XM540-W270", "XM430-W350"], "restrict": SPACE["restrict"] | {
+        f"motor_{k}": "XM540-W270" for k in range(1, 6)
+    }})  # fmt: skip
+    assert set(assumed_values(desk.problem)) == {"XM540-W270", "XM430-W350"}
+    assert set(assumed_values(desk.problem, [desk.arm])) == {"XM540-W270"}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run whose only trial is the desk arm."""
+    desk = Desk(objectives=["peak_torque", "length"])
+    folder = tmp_path_factory.mktemp("runs") / "desk"
+    aw.optimize(
+        desk.problem, proposer="none", n_init=1, n_total=1, initial_designs=[desk.design], verify=False, out=folder
+    )
+    return folder
+
+
+def test_files_state_assumed_values(run: Path) -> None:
+    record = named_actuator("XM540-W270").completed()
+    expected = {"XM540-W270": {name: value_of(record, name) for name in SERVO}}
+    for file in (run / "summary.json", run / "designs" / "0000" / "design.json"):
+        assert json.loads(file.read_text(encoding="utf-8"))["assumed"] == expected
+
+
+def test_commands_state_assumed_values(run: Path) -> None:
+    assert "assumed values of actuators: 6 of XM540-W270" in armwright("pick", run).stdout
+    sheet = json.loads(armwright("datasheet", run, "--design", 0, "--json").stdout)
+    assert sheet["assumptions"]["actuators"].startswith(
+        "defaults of their kind or estimates: XM540-W270: rated torque 2.65 N m"
+    )

@@ -1,0 +1,188 @@
+"""Recommended designs, verified in the simulator, in summaries and by the command."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+import armwright as aw
+from armwright.proof.perturbations import HEAVIER, MOVED, PERTURBATIONS, SHIFTED, SUPPLY
+from armwright.proof.recommendation import candidates, recommend
+from armwright.proof.results import read_summary
+from armwright.proof.selection import pick, survival_of
+from armwright.proof.simulated_run import Simulator
+from armwright.runs.folder import read_run
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
+from tests.proof.test_simulation import SPACE, Desk
+from tests.support.command_line import armwright, refused
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run whose first trial is the desk arm."""
+    desk = Desk(objectives=["peak_torque", "length"])
+    folder = tmp_path_factory.mktemp("runs") / "desk"
+    aw.optimize(
+        desk.problem, proposer="none", n_init=1, n_total=1, initial_designs=[desk.design], verify=False, out=folder
+    )
+    return folder
+
+
+def test_a_finished_run_states_what_is_verified(run: Path) -> None:
+    summary = read_summary(run)
+    assert summary is not None
+    found = [one.pop("survival") for one in summary["recommended"]]
+    assert summary["recommended"] == [
+        {"role": role, "design": 0, "status": "verified", "demoted": []}
+        for role in ("knee", "least peak_torque", "least length", "least price")
+    ]
+    assert [list(survival) for survival in found] == [["verdict", "perturbations", "simulated"]] * 4
+    names = [one["name"] for one in found[0]["perturbations"]]
+    assert names == list(PERTURBATIONS)
+    assert {file.name for file in (run / "designs" / "0000").iterdir()} >= {"arm.xml", "trajectory.csv"}
+
+
+def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
+    content = json.loads(armwright("simulate", run, "--json").stdout)
+    assert list(content) == ["mujoco", "timestep", "feed_forward", "simulated", "passed", "designs"]
+    assert (content["simulated"], content["passed"]) == (1, 1)
+    (design,) = content["designs"]
+    assert list(design) == [
+        *("design", "verdict", "reasons", "cycle_time", "energy"),
+        *("targets", "joints", "contacts"),
+    ]
+    assert list(design["targets"][0])[:4] == ["step", "target", "tip_error", "angle_error"]
+    assert list(design["joints"][0]) == [
+        *("joint", "peak_torque", "rms_torque", "claimed_peak_torque"),
+        *("claimed_rms_torque", "peak_speed", "saturated_fraction"),
+    ]
+    assert json.loads((run / "simulation.json").read_text(encoding="utf-8")) == content
+    assert "#0, verified; holds all but: " in " ".join(armwright("simulate", run).stdout.split())
+    place = run / "designs" / "0000"
+    assert (place / "figures" / "simulation.png").is_file()
+    rows = (place / "simulation.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0].startswith("time,step,tip_x,tip_y,tip_z,q_1")
+    assert len(rows) == len((place / "trajectory.csv").read_text(encoding="utf-8").splitlines())
+    shown = armwright("simulate", run, "--design", "0").stdout
+    assert "1 of 1 pass" in shown
+
+
+def test_simulate_refuses_what_it_cannot_drive(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "has the designs 0 to" in refused(2, "simulate", run, "--design", "7")
+    assert "use one of them" in refused(2, "simulate", run, "--design", "0", "--all")
+    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_init=1, n_total=1, verify=False, out=tmp_path)
+    assert "has no cycle" in refused(2, "simulate", tmp_path)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert 'pip install "armwright[sim]"' in refused(2, "simulate", run)
+
+
+def test_without_mujoco_designs_are_not_simulated(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, history = read_run(run)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert {one.status for one in recommend(history)} == {"not simulated"}
+
+
+def test_pick_states_which_perturbations_a_design_survives(run: Path) -> None:
+    summary = read_summary(run)
+    assert summary is not None
+    survival = summary["recommended"][0]["survival"]
+    assert f"perturbed: {survival['verdict']}" in " ".join(armwright("pick", run).stdout.split())
+    (picked,) = json.loads(armwright("pick", run, "--json").stdout)
+    assert picked["survival"] == survival
+    _, history = read_run(run)
+    assert survival_of(run, history, [0])[0] == survival
+    evaluated = survival_of(run.parent, history, [0])[0]  # without a summary
+    names = [
+        [one[key] for one in found["perturbations"]] for found in (survival, evaluated) for key in ("name", "changes")
+    ]
+    assert names[:2] == names[2:]
+
+
+def test_designs_without_a_cycle_are_perturbed_if_they_have_constraints() -> None:
+    for constraints, n in (([], 0), (["torque_utilisation <= 0.5"], 4)):
+        content = {"name": "hold", "targets": [[0.3, 0.0, 0.2]], "payload": 0.5, "constraints": constraints}
+        space = DesignSpace.model_validate(SPACE | {"motor_bodies": False})
+        problem = aw.Problem(Task.model_validate(content), space)
+        run = aw.optimize(problem, proposer="none", n_init=20, n_total=20, seed=0, verify=False)
+        recommended = run.summary.get("recommended", [])
+        assert len(recommended) == n
+        for one in recommended:
+            assert one["status"] == "not simulated"
+            names = [found["name"] for found in one["survival"]["perturbations"]]
+            assert names == [MOVED, SUPPLY, HEAVIER, SHIFTED]  # mass and torques of the motors are stated
+
+
+def test_designs_that_an_evaluator_measured_are_neither_simulated_nor_perturbed() -> None:
+    @aw.evaluator("span [m]")
+    def measure(arm: aw.Arm, task: aw.Task) -> float:
+        return arm.length
+
+    desk = Desk()
+    problem = replace(desk.problem, evaluator=measure, objectives=measure.objectives)
+    run = aw.optimize(problem, proposer="none", sampler="random", n_init=1, n_total=1, initial_designs=[desk.design])
+    assert len(run.summary["recommended"]) == 2
+    for one in run.summary["recommended"]:
+        assert one["status"] == "not simulated: a custom evaluator measured it"
+        assert one["survival"] is None
+
+
+class Verdicts:
+    """A simulator in which some designs fail."""
+
+    def __init__(self, failing: set[int]) -> None:
+        self.failing = failing
+
+    def __call__(self, number: int) -> Any:
+        fails = number in self.failing
+        reasons = ("joint_2 is at its torque limit",) if fails else ()
+        return SimpleNamespace(result=SimpleNamespace(verdict="fail" if fails else "pass", reasons=reasons))
+
+
+def test_failing_designs_are_demoted_with_their_reason() -> None:
+    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+    order = candidates(history)
+    knee, second = order["knee"][:2]
+    chosen = {one.role: one for one in recommend(history, cast("Simulator", Verdicts({knee})))}
+    assert (chosen["knee"].design, chosen["knee"].status) == (second, "verified")
+    assert [(one.design, one.reason) for one in chosen["knee"].demoted] == [(knee, "joint_2 is at its torque limit")]
+    for one in recommend(history, cast("Simulator", Verdicts({member.number for member in history.front}))):
+        assert one.design == order[one.role][0]
+        assert one.status == "not verified: joint_2 is at its torque limit"
+
+
+def test_recommended_designs_are_not_simulated_without_time() -> None:
+    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+    simulator = SimpleNamespace(members={})
+    chosen = recommend(history, cast("Simulator", simulator), has_time=lambda *_: False)
+    assert [one.design for one in chosen] == [numbers[0] for numbers in candidates(history).values()]
+    assert {one.status for one in chosen} == {"not simulated: the time is up"}
+    assert {one.survival for one in chosen} == {None}
+
+
+def test_ends_of_the_front_have_the_least_objectives() -> None:
+    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+    for index, role in enumerate(("least position_error", "least torque")):
+        first = candidates(history)[role][0]
+        assert history.values[first, index] == min(member.values[index] for member in history.front)
+
+
+def test_cheapest_and_stiffest_designs_are_roles_where_they_are_known() -> None:
+    """Errors and holding torque are none then: constraints see to them."""
+    examples = Path(__file__).parents[2] / "examples"
+    task = aw.load_task(examples / "6-price-task.yaml")
+    space = aw.load_space(examples / "6-price-space.yaml")
+    for objectives, ends in ((("mass", "cycle_time"), ["mass", "cycle_time"]), (("position_error", "torque"), [])):
+        changes = {"objectives": objectives, "reference_point": None}
+        problem = aw.Problem(task.model_copy(update=changes), space)
+        history = aw.find_front(problem, evaluations=300).history
+        roles = candidates(history)
+        assert list(roles) == ["knee", *(f"least {name}" for name in (*ends, "price", "deflection"))]
+        for name in ("price", "deflection"):
+            assert roles[f"least {name}"][0] == pick(history, by=name)[0].number
+    toy = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=10, verify=False).history
+    assert list(candidates(toy)) == ["knee", "least position_error", "least torque"]

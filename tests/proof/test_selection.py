@@ -1,0 +1,166 @@
+"""Picking and exporting designs."""
+
+import csv
+import io
+import json
+from contextlib import suppress
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import yourdfpy
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import FailureError, SettingsError
+from armwright.pareto import knee_index
+from armwright.problem.conditions import Condition, read_condition, read_weights
+from armwright.problem.problem import Problem
+from armwright.proof.selection import numbers_of, pick, pick_from
+from armwright.runs.folder import read_run
+from armwright.runs.history import History
+from armwright.study.study import optimize
+from armwright.tasks.catalogue import load_task
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("decision") / "run"
+    optimize(Problem(load_task("target-2")), proposer="rules", n_total=40, seed=1, out=folder)
+    return folder
+
+
+@pytest.fixture
+def history(run: Path) -> History:
+    return read_run(run)[1]
+
+
+def test_picked_designs_meet_the_conditions_and_are_sorted(history: History) -> None:
+    conditions = [Condition("position_error", "<=", 2.0), Condition("length", "<", 0.6)]
+    picked = pick(history, conditions, by="torque")
+    told = [numbers_of(history, member) for member in history.front]
+    meeting = [numbers for numbers in told if numbers["position_error"] <= 2.0 and numbers["length"] < 0.6]
+    assert 0 < len(meeting) < len(history.front)
+    assert [member.values[1] for member in picked] == sorted(numbers["torque"] for numbers in meeting)
+
+
+def test_default_pick_is_the_knee(history: History) -> None:
+    assert pick(history)[0].number == knee_index(history.values, (5.0, 5.0))
+    assert len(pick(history)) == len(history.front)
+
+
+def test_weights_are_relative_to_the_reference_point(history: History) -> None:
+    values = np.array([member.values for member in history.front])
+    for weights in ((1.0, 0.0), (0.0, 2.0), (3.0, 1.0)):
+        best = history.front[int(np.argmin(values @ (np.array(weights) / 5.0)))]
+        named = dict(zip(("position_error", "torque"), weights, strict=True))
+        assert pick(history, weights=named)[0].number == best.number
+
+
+def test_pick_can_be_restricted_to_robust_designs(run: Path) -> None:
+    robust = json.loads((run / "summary.json").read_text(encoding="utf-8"))["verification"]["robust_numbers"]
+    assert robust
+    _, picked = pick_from(run, robust=True)
+    assert sorted(member.number for member in picked) == sorted(robust)
+
+
+def test_empty_selection_names_the_reason(history: History) -> None:
+    least = min(member.values[0] for member in history.front)
+    with pytest.raises(FailureError, match=f"position_error <= 1e-06; the nearest has {least:.4g}"):
+        pick(history, [Condition("torque", "<", 100.0), Condition("position_error", "<=", 1e-6)])
+    both = [Condition("position_error", "<=", least), Condition("torque", "<", 0.2)]
+    with pytest.raises(FailureError, match="all of these conditions at once"):
+        pick(history, both)
+    with pytest.raises(SettingsError, match=r'unknown quantity "torqe".*Did you mean "torque"'):
+        pick(history, [Condition("torqe", "<", 1.0)])
+    with pytest.raises(SettingsError, match='unknown quantity "mass"'):
+        pick(history, weights={"mass": 1.0})  # not an objective here
+    with pytest.raises(SettingsError, match="one quantity or weights, got both"):
+        pick(history, by="torque", weights={"torque": 1.0})
+
+
+@given(
+    st.from_regex(r"[a-z_]{1,12}", fullmatch=True),
+    st.sampled_from(["<=", ">=", "<", ">", "=="]),
+    st.floats(allow_nan=False, allow_infinity=False),
+)
+def test_written_conditions_are_read_back(name: str, relation: str, bound: float) -> None:
+    assert read_condition(f"{name} {relation}{bound!r}") == Condition(name, relation, bound)
+
+
+@given(st.text(max_size=40))
+def test_arbitrary_conditions_are_read_or_refused(words: str) -> None:
+    for read in (read_condition, read_weights):
+        with suppress(SettingsError):
+            read(words)
+
+
+@pytest.mark.parametrize(
+    "words", ["", "torque", "torque<", "torque<=x", "__import__('os')<1", "a<1<2", "torque=1", "torque==1==2"]
+)
+def test_invalid_conditions_are_refused(words: str) -> None:
+    with pytest.raises(SettingsError, match="expected a name, one of"):
+        read_condition(words)
+
+
+def test_conditions_know_the_number_of_joints_and_units(history: History) -> None:
+    assert len(pick(history, [read_condition("joints == 4")])) == len(history.front)
+    with pytest.raises(FailureError, match="joints < 4; the nearest has 4"):
+        pick(history, [read_condition("joints<4")])
+    by_unit = [pick(history, [read_condition(f"length<={text}")]) for text in ("0.6", "0.6 m", "600 mm", "60 cm")]
+    assert all([m.number for m in picked] == [m.number for m in by_unit[0]] for picked in by_unit)
+    with pytest.raises(SettingsError, match=r"length: expected a bound in m or mm or cm, got 0\.6 kg"):
+        pick(history, [read_condition("length<=0.6 kg")])
+
+
+def test_unknown_quantities_are_answered_with_all_that_exist(history: History) -> None:
+    for name, known in (("n_joints", "joints"), ("weight", "mass"), ("manipulabilty", "manipulability")):
+        with pytest.raises(SettingsError, match=f'"{name}". Did you mean "{known}".*Available: .*payload_capacity'):
+            pick(history, [Condition(name, "<", 1.0)])
+
+
+def invoke(*arguments: str | Path) -> str:
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_pick_and_export_commands_agree(run: Path, history: History, tmp_path: Path) -> None:
+    told = json.loads(invoke("pick", run, "--where", "position_error<=1.5", "--by", "torque", "-n", "2", "--json"))
+    assert len(told) == 2
+    number = told[0]["number"]
+    assert f"#{number} " in invoke("pick", run, "--where", "position_error<=1.5", "--by", "torque")
+    urdf = invoke("export", run, "--design", number)
+    assert urdf == (run / "designs" / f"{number:04d}" / "arm.urdf").read_text(encoding="utf-8")
+    robot = yourdfpy.URDF.load(io.StringIO(urdf))
+    assert len(robot.actuated_joints) == 4
+    invoke("export", run, "--format", "mjcf", "--out", tmp_path / "deep" / "arm.xml")
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "deep" / "arm.xml")).njnt == 4
+
+
+def test_all_picked_designs_are_a_table_and_csv(run: Path, history: History) -> None:
+    asked = ("pick", run, "--where", "joints==4", "--by", "torque", "--all")
+    rows = list(csv.DictReader(io.StringIO(invoke(*asked, "--csv"))))
+    records = json.loads(invoke(*asked, "--json"))
+    assert [int(row["number"]) for row in rows] == [record["number"] for record in records]
+    assert len(rows) == len(history.front)
+    for row, record in zip(rows, records, strict=True):
+        assert float(row["torque"]) == record["torque"]
+        assert row["joint_1"] == record["joints"][0]
+        assert float(row["joints"]) == len(record["joints"])
+    table = invoke(*asked).splitlines()
+    assert [line.split()[0] for line in table[2:]] == [row["number"] for row in rows]
+
+
+def test_mistakes_are_reported(run: Path) -> None:
+    for arguments, words in (
+        (["export", str(run), "--design", "999"], "has the designs 0 to 49"),
+        (["export", str(run), "--format", "urfd"], 'Did you mean "urdf"'),
+        (["pick", str(run), "-n", "0"], "-n 0"),
+        (["pick", str(run), "--weights", "torque"], "names with numbers"),
+    ):
+        result = CliRunner().invoke(app, arguments)
+        assert words in str(result.exception)

@@ -1,0 +1,128 @@
+"""Verification of designs, against the plain float64 reference."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.problem.problem import Problem
+from armwright.proof.results import read_summary, verify_run
+from armwright.proof.verification import START_SPREAD, STARTS, verify
+from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial
+from armwright.spaces.parameters import Design
+from armwright.spaces.tolerance import perturbed
+from armwright.study.study import optimize
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
+from tests.support import reference_kinematics as reference
+
+PROBLEM = Problem(load_task("target-1"))
+BOX = (5.0, 5.0)
+
+
+def values_of(problem: Problem, designs: list[Design], start: np.ndarray | None = None) -> np.ndarray:
+    """(N, 2) by the reference, in float64."""
+    chains = reference.chains([problem.arm(design) for design in designs])
+    solution = reference.solve(chains, problem.task.target_positions, start=start)
+    return np.column_stack(
+        [
+            np.linalg.norm(solution.reached - problem.task.target_positions, axis=-1).sum(axis=1),
+            40.0 * np.linalg.norm(solution.torque, axis=-1).sum(axis=1),
+        ]
+    )
+
+
+def agree(found: np.ndarray, expected: np.ndarray) -> None:
+    """Values (N, 2) of whole solves, 8 or more a design: the chaotic among them show, by little, to either side."""
+    assert found.mean(axis=0) == pytest.approx(expected.mean(axis=0), rel=5e-3)
+    assert np.mean(np.all(np.abs(found - expected) < 0.02 * expected + 1e-3, axis=1)) > 0.8
+
+
+@pytest.fixture(scope="module")
+def designs() -> list[Design]:
+    return PROBLEM.space.sample(60, seed=4)
+
+
+def test_exact_values_agree_with_the_reference(designs: list[Design]) -> None:
+    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
+    agree(found.exact, values_of(PROBLEM, designs))
+
+
+@pytest.mark.slow
+def test_perturbed_values_are_the_worst_over_copies(designs: list[Design]) -> None:
+    rows = PROBLEM.space.matrix(designs)
+    copies = list(perturbed(PROBLEM.space, rows))
+    assert len(copies) == 2 * 7
+    for copy in copies:
+        off = np.abs(copy - rows)
+        assert np.all(np.count_nonzero(off > 1e-12, axis=1) == 1)
+        assert off.max(axis=1) == pytest.approx(1e-3)
+    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
+    worst = np.max([values_of(PROBLEM, PROBLEM.space.designs(copy)) for copy in copies], axis=0)
+    agree(found.moved, worst)
+
+
+@pytest.mark.slow
+def test_restarted_values_are_the_worst_of_twenty(designs: list[Design]) -> None:
+    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
+    shape = STARTS, len(PROBLEM.task.targets), PROBLEM.space.joints
+    starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
+    worst = np.max([values_of(PROBLEM, designs, start) for start in starts], axis=0)
+    agree(found.started, worst)
+
+
+def test_robustness_follows_from_the_worst_cases(designs: list[Design]) -> None:
+    values = PROBLEM.evaluate(designs).values
+    found = verify(PROBLEM, designs, values, BOX)
+    allowed = values + np.maximum(0.05 * values, 0.005 * np.array(BOX))
+    for i in range(len(designs)):
+        robust = np.all(found.exact[i] <= allowed[i]) and np.all(found.moved[i] <= allowed[i])
+        assert found.robust[i] == robust
+        assert found.from_any_start[i] == (robust and np.all(found.started[i] <= allowed[i]))
+    assert 0 < found.robust.sum() < len(designs)
+
+
+def test_design_near_a_flip_of_the_solver_is_sensitive() -> None:
+    """A target at the arm's full reach: with any shorter link it is a millimetre away; half a millimetre is allowed."""
+    at_reach = Task(name="reach", targets=((0.0, 0.0, 0.4),), reference_point=(0.1, 20.0))
+    lucky = Problem(at_reach).space.clipped((0.0, 0.0, 0.0), "RPRP", (0.1, 0.1, 0.1, 0.1))
+    easy = Problem(at_reach).space.clipped((0.2, 0.0, 0.2), "YPPP", (0.15, 0.15, 0.15, 0.15))
+    problem = Problem(at_reach)
+    found = verify(problem, [lucky, easy], problem.evaluate([lucky, easy]).values, (0.1, 20.0))
+    assert found.moved[0, 0] == pytest.approx(1e-3, abs=1e-6)
+    assert found.robust.tolist() == [False, True]
+
+
+def test_robust_values_are_the_worst_case(designs: list[Design]) -> None:
+    robust = Problem(PROBLEM.task, tolerance=1e-3)
+    rows = PROBLEM.space.matrix(designs)
+    worst = np.max([PROBLEM.evaluate_matrix(r).values for r in (rows, *perturbed(PROBLEM.space, rows))], axis=0)
+    assert np.array_equal(robust.evaluate_matrix(rows).values, worst)
+    assert np.array_equal(robust.evaluate(designs).values, worst)
+
+
+def test_verify_run_marks_the_front(tmp_path: Path) -> None:
+    settings = {"proposer": "rules", "n_init": 5, "n_step": 5, "n_total": 20, "seed": 0, "out": tmp_path / "run"}
+    run = optimize(PROBLEM, verify=False, **settings)
+    assert run.summary["verification"] is None
+    assert "verdict" not in (tmp_path / "run" / "front.csv").read_text(encoding="utf-8")
+    history, summary = verify_run(tmp_path / "run")
+    assert summary == read_summary(tmp_path / "run")
+    record = summary["verification"]
+    assert record["robust"] + record["sensitive"] == len(history.front)
+    assert {**summary, "verification": None} == run.summary
+    table = (tmp_path / "run" / "front.csv").read_text(encoding="utf-8")
+    assert table.count(",robust,") == record["robust"]
+    assert table.count(",sensitive,") == record["sensitive"]
+    other = optimize(PROBLEM, **{**settings, "out": tmp_path / "other"})
+    assert other.summary["verification"] == record
+
+
+def test_history_without_a_reference_point_is_not_verified() -> None:
+    from armwright.proof.verification import verify_front
+
+    problem = Problem(Task(name="open", targets=((0.3, 0.0, 0.3),)))
+    (design,) = problem.space.sample(1, seed=0)
+    trial = FinishedTrial(0, "random", design, tuple(problem.evaluate([design]).values[0].tolist()))
+    assert verify_front(History(problem, [trial], 10)) is None

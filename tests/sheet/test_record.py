@@ -1,0 +1,372 @@
+"""Data sheets of designs and of existing arms, against Pinocchio, MuJoCo and designs edited by hand."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+
+import armwright as aw
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.problem.failure import Failure
+from armwright.problem.objectives import (
+    BACKLASH_ERROR,
+    DEFLECTION,
+    DYNAMIC_UTILISATION,
+    MASS,
+    SPEED_UTILISATION,
+    THERMAL_UTILISATION,
+    TORQUE_UTILISATION,
+    WORST_ERROR,
+)
+from armwright.robot.actuators import named_actuator
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.mounting import Mounting, mounted
+from armwright.robot.urdf_reader import read_urdf
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.folder import read_run
+from armwright.runs.history import History
+from armwright.sheet.design_sheet import Verdict, design_sheet, sheet_of
+from armwright.sheet.parts import price_source
+from armwright.sheet.record import DataSheet
+from armwright.sheet.sensitivities import variations, varied
+from armwright.sheet.tables import verdict_of
+from armwright.sheet.urdf_sheet import Job, driven, read_actuators, urdf_sheet
+from armwright.sheet.writer import sheet_record
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
+from tests.proof.test_simulation import DESK
+from tests.support.command_line import armwright, refused
+from tests.support.robots import robot
+
+SPACE: dict[str, Any] = {
+    "joints": 4,
+    "joint_types": ["Y", "P"],
+    "restrict": {"joint_1": "Y", "joint_2": "P", "joint_3": "P", "joint_4": "P", "link_4": [0.05, 0.055]},
+    "tie": {"link_3": "link_2"},
+    "origin_z": [0.05, 0.2],
+    "column": {"price_per_metre": 30.0},
+    "link": [0.05, 0.2],
+    "link_section": {
+        "tubes": [[0.02, 0.001], [0.03, 0.002]],
+        "material": {"density": 2700, "youngs": 70.0e9, "shear": 27.0e9, "price_per_kg": 12.0},
+    },
+    "actuators": ["XM540-W270", "XM430-W350"],
+    "bracket_mass": 0.02,
+}
+NUMBER = 3
+
+
+def made(folder: Path, task: Mapping[str, Any], space: Mapping[str, Any]) -> Path:
+    problem = aw.Problem(Task.model_validate(task), DesignSpace.model_validate(space))
+    aw.optimize(problem, proposer="none", n_init=6, n_total=1, seed=2, verify=False, out=folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    task = {**DESK, "objectives": ["worst_error", "mass"], "constraints": ["mass <= 3"]}
+    return made(tmp_path_factory.mktemp("sheets") / "run", task, SPACE)
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of a task without a cycle, in a space without actuators."""
+    return made(tmp_path_factory.mktemp("sheets") / "plain", {"name": "one", "targets": [[0.3, 0.0, 0.2]]}, {})
+
+
+@pytest.fixture(scope="module")
+def history(run: Path) -> History:
+    return read_run(run)[1]
+
+
+@pytest.fixture(scope="module")
+def sheet(run: Path) -> DataSheet:
+    return design_sheet(run, NUMBER)
+
+
+def test_masses_are_those_of_the_exported_models(sheet: DataSheet, history: History) -> None:
+    arm = history.member(NUMBER).arm
+    assert sum(line.mass for line in sheet.masses) == pytest.approx(sheet.mass)
+    moving = sheet.mass - arm.standing_mass  # what stands has no mass in any format
+    pin = pinocchio.buildModelFromXML(to_urdf(arm))
+    assert sum(inertia.mass for inertia in pin.inertias[1:]) == pytest.approx(moving)
+    assert mujoco.MjModel.from_xml_string(to_mjcf(arm)).body_mass.sum() == pytest.approx(moving)
+
+
+def test_reach_is_the_farthest_that_pinocchio_finds(sheet: DataSheet, history: History) -> None:
+    arm = history.member(NUMBER).arm
+    model = pinocchio.buildModelFromXML(to_urdf(arm))
+    data, frame, rng = model.createData(), model.getFrameId("tip"), np.random.default_rng(0)
+    farthest = 0.0
+    for q in rng.uniform(model.lowerPositionLimit, model.upperPositionLimit, (20_000, model.nq)):
+        pinocchio.framesForwardKinematics(model, data, q)
+        x, y, _ = data.oMf[frame].translation - arm.base
+        farthest = max(farthest, float(np.hypot(x, y)))
+    assert farthest <= 1.001 * sheet.reach
+    assert farthest >= 0.97 * sheet.reach
+    outline = np.array(sheet.drawing.top.points) - arm.base[:2]
+    assert np.linalg.norm(outline, axis=1).max() == pytest.approx(sheet.reach, rel=1e-3)
+
+
+def test_utilisation_of_joints_is_that_of_the_quantities(sheet: DataSheet, history: History) -> None:
+    evaluation = history.evaluation([NUMBER])
+    peaks = [joint.peak_utilisation or 0.0 for joint in sheet.joints]
+    both = max(float(TORQUE_UTILISATION(evaluation)[0]), float(DYNAMIC_UTILISATION(evaluation)[0]))
+    assert max(peaks) == pytest.approx(both)
+    for key, quantity in (("thermal_utilisation", THERMAL_UTILISATION), ("speed_utilisation", SPEED_UTILISATION)):
+        values = [getattr(joint, key) for joint in sheet.joints]
+        assert max(values) == pytest.approx(float(quantity(evaluation)[0])), key
+
+
+def test_used_and_unused_ranges_add_up(sheet: DataSheet) -> None:
+    for joint in sheet.joints:
+        assert joint.used is not None
+        assert joint.unused is not None
+        assert joint.lower - 1e-6 <= joint.used[0] <= joint.used[1] <= joint.upper + 1e-6
+        whole = joint.used[1] - joint.used[0] + sum(joint.unused)
+        assert whole == pytest.approx(joint.upper - joint.lower, abs=1e-6)
+
+
+def test_sensitivities_are_those_of_designs_edited_by_hand(sheet: DataSheet, history: History) -> None:
+    problem, design = history.problem, history.trials[NUMBER].design
+    space, before = problem.space, dict(design.params)
+    possible = {(line.part, line.change): line for line in sheet.sensitivities if not line.impossible}
+    edits: dict[tuple[str, str], dict[str, Any]] = {
+        ("link 1", "+10 mm"): {"link_1": before["link_1"] + 0.01},  # type: ignore[operator]
+        ("link 2, 3", "+10 mm"): {k: before[k] + 0.01 for k in ("link_2", "link_3")},  # type: ignore[operator]
+        **{(f"tube {j}", "20x1 → 30x2"): {f"tube_{j}": "30x2"} for j in range(1, 5) if before[f"tube_{j}"] == "20x1"},
+        **{
+            (f"actuator {j}", "XM430-W350 → XM540-W270"): {f"motor_{j}": "XM540-W270"}
+            for j in range(1, 5)
+            if before[f"motor_{j}"] == "XM430-W350"
+        },
+    }
+    assert set(possible) == set(edits)
+    assert len(edits) > 4
+    start = aw.evaluate(space.arm(design), problem.task)
+    for key, edit in edits.items():
+        changed = aw.evaluate(space.arm(aw.Design({**before, **edit})), problem.task)
+        for name, quantity in (
+            ("position_error", WORST_ERROR),
+            ("deflection", DEFLECTION),
+            ("backlash_error", BACKLASH_ERROR),
+            ("mass", MASS),
+        ):
+            expected = float(quantity(changed)[0] - quantity(start)[0])
+            assert getattr(possible[key], name) == pytest.approx(expected, rel=1e-3, abs=1e-6), (key, name)
+    prices = {key: line.price for key, line in possible.items()}
+    assert prices["link 1", "+10 mm"] == pytest.approx(
+        12.0 * 0.01 * space.link_section.options[space.tube_of(design, 0)].mass_per_metre
+    )
+
+
+def test_impossible_changes_say_so(sheet: DataSheet) -> None:
+    reasons = {line.part: line.impossible for line in sheet.sensitivities if line.impossible}
+    assert reasons["link 4"].startswith("the space allows at most 55 mm, it has 5")
+    assert all("of the space" in reason for part, reason in reasons.items() if part != "link 4")
+
+
+def test_parts_are_numbered_like_the_joints_of_the_arm() -> None:
+    """A module of two joints has two actuators, and its link is after the second."""
+    content = {"joints": 2, "joint_types": ["O", "P"], "actuators": ["XM540-W270", "XM430-W350"], "motor_bodies": False}
+    space = DesignSpace.model_validate(content)
+    design = space.clipped((0.0, 0.0, 0.0), "OP", (0.1, 0.2))
+    weaker = aw.Design({**design.params, "motor_1": "XM430-W350", "motor_2": "XM430-W350"})
+    found = {variation.part: variation for variation in variations(space, weaker) if not variation.impossible}
+    assert list(found) == ["link 2", "link 3", "actuator 1, 2", "actuator 3"]
+    assert space.arm(varied(space, weaker, found["link 2"])).links[1].length == pytest.approx(0.11)
+    stronger = space.arm(varied(space, weaker, found["actuator 1, 2"]))
+    names = [joint.actuator.name for joint in stronger.joints if joint.actuator is not None]
+    assert names == ["XM540-W270", "XM540-W270", "XM430-W350"]
+
+
+def test_infeasible_designs_state_what_they_violate(sheet: DataSheet, history: History) -> None:
+    violations = history.trials[NUMBER].violations
+    assert len(sheet.violated) == sum(violation > 0.0 for violation in violations) > 0
+    assert verdict_of(sheet).startswith(f"Infeasible: {sheet.violated[0]}")
+
+
+def test_failed_evaluations_give_a_sheet_without_objectives(history: History) -> None:
+    trial = replace(
+        history.trials[NUMBER], number=0, values=(np.inf, np.inf), failure=Failure("exception", "no licence")
+    )
+    failed = replace(history, trials=[trial])
+    sheet = sheet_of(failed, failed.member(0), Verdict())
+    assert sheet.violated == ("its evaluation failed: no licence",)
+    assert {value for value, _ in sheet.objectives.values()} == {None}
+    json.dumps(sheet_record(sheet), allow_nan=False)
+
+
+def test_prices_keep_what_the_catalogue_says_of_them() -> None:
+    source = price_source(named_actuator("XM540-W270"))
+    assert source.startswith("price robotis.us")
+    assert source.count("(") == source.count(")")
+
+
+def test_price_is_the_sum_of_the_parts(sheet: DataSheet) -> None:
+    stated = [part.price for part in sheet.parts if part.price is not None]
+    assert sheet.price == pytest.approx(sum(stated))
+    motors = [part for part in sheet.parts if part.part.startswith("XM")]
+    assert sum(part.count for part in motors) == 4
+    assert all(part.source.startswith("https://") and "robotis.us" in part.price_source for part in motors)
+    (brackets,) = [part for part in sheet.parts if part.part == "brackets and screws"]
+    assert brackets.price is None
+
+
+def test_unknown_values_are_not_stated_and_never_zero(plain: Path) -> None:
+    sheet = design_sheet(plain, 2)
+    for key in ("payload_at_full_reach", "deflection", "backlash_error", "cycle_time", "price", "peak_current"):
+        assert getattr(sheet, key) is None
+    assert sheet.missing["cycle_time"] == "the task has no cycle"
+    assert sheet.missing["price"] == "the space names no actuators"
+    assert {line.price for line in sheet.sensitivities} == {None}
+    assert {line.impossible for line in sheet.sensitivities} >= {"the space names no actuator"}
+    assert all(line.payload is None for line in sheet.over_reach)
+
+
+def test_sheet_of_a_urdf_is_that_of_the_design_that_it_was_written_from(
+    sheet: DataSheet, history: History, tmp_path: Path
+) -> None:
+    arm = history.member(NUMBER).arm
+    file = tmp_path / "arm.urdf"
+    file.write_text(to_urdf(arm), encoding="utf-8")
+    described = read_urdf(file, tip="tip")
+    motors = [joint.actuator.name for joint in arm.joints if joint.actuator is not None]
+    named = read_actuators(",".join(f"{n}={name}" for n, name in enumerate(motors, start=1)), described.joints)
+    existing = urdf_sheet(driven(described, named), named)
+    assert existing.reach == pytest.approx(sheet.reach, rel=1e-3)
+    assert existing.payload_at_full_reach == pytest.approx(sheet.payload_at_full_reach, rel=1e-2)
+    ours, theirs = sheet.over_reach[-1].backlash_error, existing.over_reach[-1].backlash_error
+    assert theirs == pytest.approx(ours, rel=1e-2)
+    assert existing.price is None
+    assert existing.missing["price"] == "a URDF states no price; try --price"
+
+
+def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
+    """Limits and used ranges, in a place where the base is turned, against Pinocchio's reading of the file."""
+    described = read_urdf(robot("panda"))
+    task = Task(name="feeder", targets=((0.4, -0.2, 0.3), (0.4, 0.2, 0.3), (0.1, 0.4, 0.5)))
+    problem = aw.Problem(task, DesignSpace.model_validate(SPACE))
+    there = mounted(described, Mounting((0.0, 0.0, 0.0), 0.4))
+    sheet = urdf_sheet(there, job=Job(problem, Mounting((0.0, 0.0, 0.0), 0.4), "here"))
+    model = pinocchio.buildModelFromUrdf(str(robot("panda")))
+    places = [model.joints[model.getJointId(joint.name)].idx_q for joint in sheet.joints]
+    assert [joint.lower for joint in sheet.joints] == pytest.approx(model.lowerPositionLimit[places], abs=1e-12)
+    assert [joint.upper for joint in sheet.joints] == pytest.approx(model.upperPositionLimit[places], abs=1e-12)
+    q = there.values_in_urdf(problem.physics_of_arms(stack_arms([there.arm])).q[0])
+    assert [joint.used for joint in sheet.joints] == [
+        pytest.approx(ends) for ends in zip(q.min(axis=0), q.max(axis=0), strict=True)
+    ]
+    for joint in sheet.joints:
+        assert joint.used is not None
+        assert joint.unused == pytest.approx((joint.used[0] - joint.lower, joint.upper - joint.used[1]), abs=1e-12)
+    assert sheet.assumptions["place"] == "here"
+    assert (sheet.base_position, sheet.base_yaw) == ((0.0, 0.0, 0.0), 0.4)
+    assert not sheet.drawing.is_at_zero  # the fourth joint cannot be at 0
+    values = np.clip(pinocchio.neutral(model), model.lowerPositionLimit, model.upperPositionLimit)
+    data = model.createData()
+    pinocchio.framesForwardKinematics(model, data, values)
+    tip = data.oMf[model.getFrameId(described.tip, pinocchio.FrameType.BODY)].translation
+    end = pinocchio.utils.rotate("z", 0.4) @ tip
+    assert sheet.drawing.links[-1][2] == pytest.approx(end, abs=1e-6)
+    assert sheet.missing.keys() >= {"payload", "cycle_time", "deflection"}
+    assert sheet.position_error is not None
+
+
+def test_efforts_and_speeds_that_the_cycle_exceeds_are_stated() -> None:
+    """A URDF states no corner speed, so that its utilisation is unknown, but its effort and its speed are limits."""
+    points = ((0.5, -0.3, 0.2), (0.5, 0.3, 0.2))
+    cycle = {"time": 0.2, "steps": [{"to": 1}, {"to": 2}]}
+    task = Task(name="fast", targets=points, payload=2.0, cycle=cycle)  # type: ignore[arg-type]
+    problem = aw.Problem(task, DesignSpace(joints=3))
+    arm = replace(read_urdf(robot("ur5_robot")).arm, safety_factor=1.5)
+    described = replace(read_urdf(robot("ur5_robot")), arm=arm)
+    sheet = urdf_sheet(described, job=Job(problem, Mounting(), "here"))
+    evaluation = problem.physics_of_arms(stack_arms([arm]))
+    torque = np.abs(evaluation.loads.torques[0]).max(axis=(0, 1))
+    speed = np.abs(evaluation.loads.speeds[0]).max(axis=(0, 1))
+    efforts = np.array([joint.effort for joint in arm.joints])
+    speeds = np.array([joint.speed for joint in arm.joints])
+    assert [joint.peak_utilisation for joint in sheet.joints] == pytest.approx(1.5 * torque / efforts, rel=1e-5)
+    assert (1.5 * torque / efforts).max() > 1.0
+    assert (speed / speeds).max() > 1.0
+    effort, fastest = sheet.violated[-2:]
+    assert effort.startswith(f"an effort of its file (along the cycle it needs {(1.5 * torque / efforts).max():.0%}, ")
+    assert fastest == f"a speed of its file (along the cycle it needs {(speed / speeds).max():.0%})"
+
+
+def test_command_places_an_existing_arm_on_a_task(tmp_path: Path) -> None:
+    found = {}
+    for name, options in {"searched": (), "given": ("--base", "-0.2,0,0,30"), "bare": None}.items():
+        task = () if options is None else ("--task", "target-1", *options)
+        done = armwright("datasheet", robot("panda"), *task, "--price", 15000, "--out", tmp_path / name, "--json")
+        found[name] = json.loads(done.stdout)
+    assert "the best of 1,500 places" in found["searched"]["assumptions"]["place"]
+    assert found["given"]["assumptions"]["place"] == "base at (-0.2, 0, 0) m, turned by 30°"
+    assert found["bare"]["position_error"] is None
+    assert {one["price"] for one in found.values()} == {15000.0}
+    assert found["searched"]["name"] == "panda on target-1"
+    assert list(found["searched"]["objectives"]) == ["position_error", "torque"]
+
+
+def test_efforts_of_a_urdf_are_used_without_actuators() -> None:
+    sheet = urdf_sheet(read_urdf(robot("ur5_robot")))
+    assert [joint.peak_torque for joint in sheet.joints] == [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]
+    assert sheet.payload_at_full_reach is not None
+    assert sheet.over_reach[-1].backlash_error is None
+    assert sheet.mass == pytest.approx(sum(line.mass for line in sheet.masses))
+
+
+def test_first_recommended_design_is_the_default(run: Path, tmp_path: Path) -> None:
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+    first = [one["design"] for one in summary["recommended"][:1]]
+    done = armwright("datasheet", run, "--out", tmp_path, "--json")
+    if first:
+        sheet = json.loads(done.stdout)
+        assert sheet["design"] == first[0]
+        assert sheet["role"] == ", ".join(one["role"] for one in summary["recommended"] if one["design"] == first[0])
+    else:
+        assert done.returncode == 1
+
+
+@pytest.mark.slow
+def test_command_writes_html_and_json(run: Path, tmp_path: Path) -> None:
+    done = armwright("datasheet", run, "--design", NUMBER)
+    files = [Path(line) for line in done.stdout.splitlines()]
+    assert [file.name for file in files] == ["datasheet.html", "datasheet.json"]
+    assert {file.parent for file in files} == {run / "designs" / f"{NUMBER:04d}"}
+    record = json.loads(files[1].read_text(encoding="utf-8"))
+    assert record["design"] == NUMBER
+    assert record["units"]["reach"] == "m"
+    assert files[0].read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--actuators", "shoulder_pan_joint"), "expected JOINT=NAME; try shoulder_pan_joint=XM430-W350"),
+        (("--actuators", "elbow=XM430-W350"), 'unknown joint "elbow". Did you mean "elbow_joint"?'),
+        (("--actuators", "1=XM430-W35"), 'unknown actuator "XM430-W35". Did you mean "XM430-W350"?'),
+        (("--actuators", "1=XM430-W350,1=XM430-W350"), "expected one actuator"),
+        (("--base", "0,0,0"), "--base 0,0,0: expected a task, too; try --task TASK"),
+        (("--space", "desk"), "--space desk: expected a task, too; try --task TASK"),
+        (("--price", "-3"), "price: expected a finite number of at least 0 USD, got -3"),
+        (("--price", "cheap"), '--price "cheap": expected a number of USD, such as 28000'),
+        (("--price", "nan"), "price: expected a finite number of at least 0 USD, got nan"),
+        (("--task", "target-11"), 'Did you mean "target-1"?'),
+        (("--design", "2"), "--design 2: expected a run folder, got"),
+    ],
+)
+def test_wrong_options_of_an_existing_arm_get_one_line(options: tuple[str, str], message: str) -> None:
+    assert message in refused(2, "datasheet", robot("ur5_robot"), *options)
+
+
+def test_wrong_options_of_a_run_get_one_line(run: Path) -> None:
+    assert "has the designs 0 to 6" in refused(2, "datasheet", run, "--design", 99)
+    assert "expected a URDF, got the run" in refused(2, "datasheet", run, "--actuators", "1=XM430-W350")
