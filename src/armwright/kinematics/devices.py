@@ -110,7 +110,7 @@ def _kernels(name: str, device: Device, *variant: Hashable) -> Any:
     with report_cache_errors():
         made: Any = getattr(import_module(f"{__package__}.{name}"), name.rpartition(".")[2])(*variant)
         parts: dict[str, Any] = vars(made)
-        _load_modules([part.module for part in parts.values() if hasattr(part, "adj")], device)  # of kernels
+        _load_modules([part.module for part in parts.values() if getattr(part, "adj", None)], device)  # of kernels
     return made
 
 
