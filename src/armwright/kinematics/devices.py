@@ -108,9 +108,9 @@ def _warp() -> Any:
 @cache
 def _kernels(name: str, device: Device, *variant: Hashable) -> Any:
     with report_cache_errors():
-        made: Any = getattr(import_module(f"{__package__}.{name}"), name.rpartition(".")[2])(*variant)
-        parts: dict[str, Any] = vars(made)
-        _load_modules([part.module for part in parts.values() if getattr(part, "adj", None)], device)  # of kernels
+        made = getattr(import_module(f"{__package__}.{name}"), name.rpartition(".")[2])(*variant)
+        parts = cast("Iterable[Any]", vars(made).values())
+        _load_modules([part.module for part in parts if hasattr(part, "adj")], device)  # those of kernels
     return made
 
 
