@@ -7,6 +7,7 @@
     │   ├── DesignError         parameter values that are not in their design space
     │   ├── ArmError            a chain that cannot exist, or that the kernels cannot compute yet
     │   ├── SettingsError       the settings of a run
+    │   │   └── UnknownQuantityError  a quantity that task and arms leave open
     │   ├── RunConflictError    the run folder holds a run with other settings
     │   └── MissingExtraError   an optional dependency that is not installed
     ├── AnswerPendingError      a question waits for an answer (manual:DIR, wait: false)        (exit code 0)
@@ -64,6 +65,14 @@ class ArmError(UsageError):
 
 class SettingsError(UsageError):
     """The settings of a run."""
+
+
+class UnknownQuantityError(SettingsError):
+    """A quantity that task and arms leave open."""
+
+    def __init__(self, message: str, reason: str) -> None:
+        super().__init__(message)
+        self.reason = reason  # why, without a way out: for tables and sheets
 
 
 class RunConflictError(UsageError):

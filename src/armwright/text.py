@@ -1,5 +1,6 @@
 """Untrusted text made safe to show."""
 
+import math
 import re
 import unicodedata
 from collections.abc import Callable
@@ -25,6 +26,13 @@ def visible(text: str) -> str:
 def rounded(value: float) -> str:
     """Return a value with three significant digits; a large one with all its digits, not with an exponent."""
     return f"{value:.3g}" if abs(value) < 1e3 else f"{value:,.0f}"
+
+
+def significant(value: float, digits: int = 3, signed: bool = False) -> str:
+    """Return a value with significant digits, without an exponent and with at most three decimals."""
+    decimals = 0 if value == 0.0 else digits - 1 - math.floor(math.log10(abs(value)))
+    text = f"{value:{'+' if signed else ''},.{min(max(decimals, 0), 3)}f}"
+    return text if any(letter in "123456789" for letter in text) else "0"
 
 
 _THOUGHTS = re.compile(r"<(/?)think(?:ing)?>", re.IGNORECASE)

@@ -50,21 +50,21 @@ def pick(
     conditions = [read_condition(text) for text in where or ()]
     weighed = None if weights is None else read_weights(weights)
     with activity(f"reading {run}"):
-        history, picked = pick_from(run, conditions, by, weighed, robust)
+        history, picked, records = pick_from(run, conditions, by, weighed, robust)
     chosen = picked if all_ else picked[:n]
     names = [*(condition.name for condition in conditions), *([] if by is None else [by])]
     if csv_:
-        print_csv(picked_rows(history, chosen, names))
+        print_csv(picked_rows(history, chosen, names, records))
         return
     if all_ and not json_:
-        show_picked_table(open_console(), history, chosen, names)
+        show_picked_table(open_console(), history, chosen, names, records)
         return
     with activity("perturbing the chosen designs"):
         survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
     if json_:
-        print_json(list(picked_records(history, chosen, names, survival)))
+        print_json(list(picked_records(history, chosen, names, records, survival)))
         return
-    show_picked(open_console(), run, history, picked, survival, n)
+    show_picked(open_console(), run, history, picked, records, survival, n)
 
 
 def export(

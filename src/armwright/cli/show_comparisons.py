@@ -10,7 +10,7 @@ from rich.console import Console
 from armwright.cli.notes import payload_note
 from armwright.cli.streams import list_files
 from armwright.cli.tables import Column, Table, numbers, print_table
-from armwright.existing.compare_arms import MEASURES, ArmComparison, ComparedArm
+from armwright.existing.compare_arms import ArmComparison, ComparedArm
 from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
@@ -110,10 +110,10 @@ def show_files(console: Console, tables: Sequence[Path], figures: Sequence[Path]
 def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]) -> None:
     """Print existing arms next to designs, with the base of each arm."""
     objectives, space = comparison.problem.objectives, comparison.problem.space
-    others = [o for o in objectives if o not in MEASURES and o.name != "mass"]
+    others = [o for o in objectives if o.name not in _ARM_COLUMNS and o.name != "mass"]
     title = "; ".join(filter(None, (f"Arms on {comparison.problem.task.name}", payload_note(comparison.problem.task))))
     shown = [*comparison.arms, *comparison.designs]
-    measures = [one.name for one in MEASURES if any(arm.measures[one.name] is not None for arm in shown)]
+    measures = [name for name in _ARM_COLUMNS if any(arm.value(name) is not None for arm in shown)]
     minimised = [objective.name for objective in objectives]
     columns = (
         Column("arm", least=12),
@@ -125,9 +125,10 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     rows: list[list[str]] = []
     for arm in shown:
         values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
-        known = [*(arm.measures[name] for name in measures), *(values[objective.name] for objective in others)]
+        known = [*(arm.value(name) for name in measures), *(values[objective.name] for objective in others)]
         cells = ["-" if value is None else _format_measure(value) for value in known]
-        rows.append([arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", _format_payload(arm), *cells])
+        reach, mass = arm.value("reach") or 0.0, arm.value("mass") or 0.0
+        rows.append([arm.name, str(arm.joints), f"{reach:.2f}", f"{mass:.3g}", _format_payload(arm), *cells])
     print_table(console, Table(columns, rows, "--json and --csv print all", title=title, gap=1))
     console.print(
         f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; torque "
@@ -164,13 +165,10 @@ def arm_rows(comparison: ArmComparison) -> Iterator[dict[str, Any]]:
         yield {
             "name": arm.name,
             "joints": arm.joints,
-            "reach": arm.reach,
-            "mass": arm.mass,
-            "price": "" if arm.price is None else arm.price,
-            "payload_at_full_reach": arm.payload_at_full_reach,
+            **{name: arm.value(name) for name in ("reach", "mass", "price", "payload_at_full_reach")},
             **dict(zip(("base_x", "base_y", "base_z"), arm.base, strict=True)),
             "base_yaw": arm.yaw,
-            **arm.measures,
+            **{name: arm.value(name) for name in _ARM_COLUMNS},
             **dict(zip(names, arm.values, strict=True)),
             "dominates": arm.dominates,
             "dominated_by": arm.dominated_by,
@@ -180,9 +178,9 @@ def arm_rows(comparison: ArmComparison) -> Iterator[dict[str, Any]]:
 
 def _show_prices(console: Console, comparison: ArmComparison) -> None:
     """Print the known prices, and what neither price nor mass of designs include."""
-    priced = [arm for arm in (*comparison.arms, *comparison.designs) if arm.price is not None]
+    priced = [arm for arm in (*comparison.arms, *comparison.designs) if arm.value("price") is not None]
     if priced:
-        console.print("prices: " + ", ".join(f"{arm.name} {arm.price:,.2f} USD" for arm in priced))
+        console.print("prices: " + ", ".join(f"{arm.name} {arm.facts['price'].text}" for arm in priced))
     if comparison.designs:
         console.print(f"masses and prices of designs do not include {NOT_MODELLED}")
 
@@ -201,7 +199,7 @@ _ARM_COLUMNS = {
 
 
 def _format_payload(arm: ComparedArm) -> str:
-    held = arm.payload_at_full_reach
+    held = arm.value("payload_at_full_reach")
     return "-" if held is None else "any" if held >= MAX_MASS else _format_measure(held)
 
 

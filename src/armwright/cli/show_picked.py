@@ -12,18 +12,25 @@ from armwright.cli.show_results import format_value
 from armwright.cli.streams import format_point, print_named
 from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.problem.assumptions import assumed_values, count_assumed
+from armwright.problem.facts import describe_supply
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import QUANTITIES, TORQUE, TORQUE_SCALE
-from armwright.problem.supply import supply_of
-from armwright.proof.cycle_faults import describe_extremes, path_record
+from armwright.proof.cycle_faults import describe_path
+from armwright.proof.design_record import DesignRecord, facts_by_number
 from armwright.proof.selection import quantities_of_front
 from armwright.runs.history import FrontMember, History, source_label
 from armwright.spaces.custom_parameters import describe_custom
 from armwright.spaces.parameters import CategoricalParameter
 
+Records = Mapping[int, DesignRecord]
+
 
 def picked_records(
-    history: History, picked: Sequence[FrontMember], names: Sequence[str], survival: Mapping[int, Mapping[str, Any]]
+    history: History,
+    picked: Sequence[FrontMember],
+    names: Sequence[str],
+    records: Records,
+    survival: Mapping[int, Mapping[str, Any]],
 ) -> Iterator[dict[str, Any]]:
     """Yield the chosen designs for JSON.
 
@@ -31,18 +38,22 @@ def picked_records(
         history: The trials of the run.
         picked: The chosen designs.
         names: Quantities to include beside those that the run evaluated.
+        records: Records of the designs by number.
         survival: Records of their survival by number.
     """
-    quantities = quantities_of_front(history, names)
+    quantities = quantities_of_front(history, names, facts_by_number(records))
     for member in picked:
         record = {"number": member.number, "source": member.source, **quantities[member.number]}
-        record |= {"joints": member.design.joints} | path_record(history.evaluation([member.number]), 0)
+        path = records[member.number].path
+        record |= {"joints": member.design.joints} | ({} if path is None else {"path": path})
         yield record | ({"survival": survival[member.number]} if member.number in survival else {})
 
 
-def picked_rows(history: History, picked: Sequence[FrontMember], names: Sequence[str]) -> Iterator[dict[str, Any]]:
+def picked_rows(
+    history: History, picked: Sequence[FrontMember], names: Sequence[str], records: Records
+) -> Iterator[dict[str, Any]]:
     """Yield the chosen designs as rows of CSV: parameters and quantities."""
-    quantities = quantities_of_front(history, names)
+    quantities = quantities_of_front(history, names, facts_by_number(records))
     categorical = [p.name for p in history.problem.space.parameters if isinstance(p, CategoricalParameter)]
     for member in picked:
         yield {
@@ -53,9 +64,11 @@ def picked_rows(history: History, picked: Sequence[FrontMember], names: Sequence
         }
 
 
-def show_picked_table(console: Console, history: History, picked: Sequence[FrontMember], names: Sequence[str]) -> None:
+def show_picked_table(
+    console: Console, history: History, picked: Sequence[FrontMember], names: Sequence[str], records: Records
+) -> None:
     """Print the chosen designs in a table: their objectives, and the quantities of these names."""
-    quantities = quantities_of_front(history, names)
+    quantities = quantities_of_front(history, names, facts_by_number(records))
     minimised = [objective.name for objective in history.problem.objectives]
     further = [name for name in dict.fromkeys(names) if name not in minimised]
     units = {
@@ -93,6 +106,7 @@ def show_picked(
     run: Path,
     history: History,
     picked: Sequence[FrontMember],
+    records: Records,
     survival: Mapping[int, Mapping[str, Any]],
     most: int,
 ) -> None:
@@ -103,6 +117,7 @@ def show_picked(
         run: The run folder.
         history: Its trials.
         picked: The chosen designs.
+        records: Records of the designs by number.
         survival: Records of their survival by number.
         most: Number of designs to print.
     """
@@ -117,11 +132,11 @@ def show_picked(
         console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}{tubes}")
         if custom := describe_custom(history.problem.space.custom, member.design.params):
             console.print(f"  {custom}")
-        evaluation = history.evaluation([member.number])
-        if along := describe_extremes(evaluation, 0):
+        record = records[member.number]
+        if along := describe_path(record.path):
             console.print(f"  worst along its cycle: {along}")
-        if supply := supply_of(evaluation, 0):
-            console.print(f"  supply along its cycle: {supply.description}")
+        if supply := describe_supply(record.facts):
+            console.print(f"  supply along its cycle: {supply}")
         if assumed := assumed_values(history.problem, [member.arm]):
             console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
         if member.number in survival:

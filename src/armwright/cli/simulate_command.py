@@ -103,7 +103,7 @@ def _show(
     console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: Sequence[dict[str, Any]]
 ) -> None:
     from armwright.cli.show_results import show_recommended
-    from armwright.proof.design_folders import DESIGNS
+    from armwright.proof.design_record import DESIGNS
     from armwright.proof.simulation import PASS, mujoco_version
 
     if not results:

@@ -140,6 +140,6 @@ def _known_violation(problem: Problem, evaluation: Evaluation) -> Array:
     """Return (N,) sums of the violations of constraints on known quantities."""
     violation = np.zeros(len(evaluation))
     for constraint in problem.constraints:
-        if known_values(constraint.quantity, evaluation) is not None:
+        if not known_values(constraint.quantity, evaluation)[1]:
             violation += np.maximum(constraint(evaluation), 0.0)
     return violation

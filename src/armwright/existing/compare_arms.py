@@ -20,18 +20,7 @@ from armwright.existing.existing_arm import ExistingArm
 from armwright.files import MAX_DERIVED, read_bytes
 from armwright.kinematics.arms.arm_arrays import FIXED, stack_arms
 from armwright.pareto import front_indices, knee_index, paper_solution_indices
-from armwright.problem.objectives import (
-    BACKLASH_ERROR,
-    CYCLE_TIME,
-    DEFLECTION,
-    PEAK_TORQUE,
-    POSITION_ERROR,
-    PRICE,
-    TORQUE,
-    TORQUE_UTILISATION,
-    UNREACHED_TARGETS,
-    WORST_ERROR,
-)
+from armwright.problem.facts import Fact, reach_facts
 from armwright.problem.over_reach import reach_lines
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Vector
@@ -45,25 +34,17 @@ from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 
 EXISTING_ARMS = "existing_arms.json"  # in a run folder: the arms of its last comparison
-MEASURES = (
-    POSITION_ERROR, TORQUE, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, TORQUE_UTILISATION, DEFLECTION,
-    BACKLASH_ERROR, CYCLE_TIME,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ComparedArm:
     """An arm evaluated on a task.
 
-    reach: the largest horizontal distance of its tip from its first joint [m].
-    mass: without payload [kg].
     base: position of its base link, or of a design's first joint [m].
     yaw: turn of its base link about the vertical [rad].
-    payload_at_full_reach: what its actuators hold at that distance in all postures found [kg]; None if unknown.
     values: of the problem's objectives; None if unknown, such as a price.
-    measures: of the quantities in `MEASURES`, by name.
+    facts: what is known of it; the price of an existing arm as stated.
     dominates, dominated_by: numbers of designs on the run's front, see `dominance_counts`; None without a run.
-    price: of an existing arm as stated, of a design that of its parts with a price [USD]; None if unknown.
     violated: constraints of the task that it violates. Such an arm is not compared with feasible designs.
     notes: assumptions, changes and missing data.
     """
@@ -72,18 +53,18 @@ class ComparedArm:
 
     name: str
     joints: int
-    reach: float
-    mass: float
     base: Vector
     values: tuple[float | None, ...]
-    measures: Mapping[str, float | None]
+    facts: Mapping[str, Fact]
     dominates: int | None = None
     dominated_by: int | None = None
     violated: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    price: float | None = None
     yaw: float = 0.0
-    payload_at_full_reach: float | None = None
+
+    def value(self, name: str) -> float | None:
+        """Return a quantity of `facts`; None if it is not known."""
+        return self.facts[name].value
 
 
 _ARMS = TypeAdapter(tuple[ComparedArm, ...])
@@ -270,17 +251,13 @@ def _compared(
     return ComparedArm(
         name=name,
         joints=int((existing.evaluation.arms.motion < FIXED).sum()),
-        reach=farthest.distance,
-        mass=arm.mass,
         base=arm.base,
         values=values,
-        measures={objective.name: existing.value(objective) for objective in MEASURES},
+        facts={**reach_facts(farthest), **existing.facts},
         dominates=dominates,
         dominated_by=dominated_by,
         violated=violated,
         notes=tuple(notes),
-        price=existing.value(PRICE),
-        payload_at_full_reach=farthest.payload,
     )
 
 

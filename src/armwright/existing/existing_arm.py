@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from armwright.arrays import Array
-from armwright.exceptions import SettingsError
+from armwright.arrays import Array, finite_or_none
 from armwright.problem.constraints import Constraint
 from armwright.problem.evaluation import Evaluation
+from armwright.problem.facts import Facts, fact_of, facts_of
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     CLEARANCE_QUANTITIES,
@@ -21,20 +22,11 @@ from armwright.problem.problem import Problem
 from armwright.text import rounded
 
 
-def known_values(quantity: Objective, evaluation: Evaluation, minimised: bool = False) -> Array | None:
-    """Return (N,) values of existing arms; None if their URDFs do not tell.
-
-    Args:
-        quantity: The quantity.
-        evaluation: Physics of the arms.
-        minimised: Return its value as an objective, which ignores errors below stated tolerances.
-    """
+def known_values(quantity: Objective, evaluation: Evaluation, minimised: bool = False) -> tuple[Array, str]:
+    """Return what `Objective.known` does of existing arms, whose URDFs do not tell clearances."""
     if quantity in CLEARANCE_QUANTITIES:
-        return None
-    try:
-        return quantity.minimised(evaluation) if minimised else quantity(evaluation)
-    except SettingsError:
-        return None
+        return np.full(len(evaluation), np.nan), "a URDF states no shape that clearances are measured from"
+    return quantity.known(evaluation, minimised)
 
 
 @dataclass(frozen=True)
@@ -52,11 +44,17 @@ class ExistingArm:
     price: float | None = None
 
     def value(self, quantity: Objective, minimised: bool = False) -> float | None:
-        """Return a quantity; None if it is not known or not finite."""
+        """Return a quantity; None if it is not known."""
         if quantity == PRICE and self.price is not None:
             return self.price
-        values = known_values(quantity, self.evaluation, minimised)
-        return float(values[0]) if values is not None and np.isfinite(values[0]) else None
+        return finite_or_none(known_values(quantity, self.evaluation, minimised)[0][0])
+
+    @cached_property
+    def facts(self) -> Facts:
+        """What is known of the arm."""
+        (facts,) = facts_of(self.evaluation, known=known_values)
+        stated = {} if self.price is None else {PRICE.name: fact_of(PRICE, self.price)}
+        return {**facts, **stated}
 
     @property
     def objectives(self) -> tuple[float | None, ...]:

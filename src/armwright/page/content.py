@@ -13,23 +13,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.existing.compare_arms import dominance_counts, read_existing_arms
+from armwright.existing.compare_arms import ComparedArm, dominance_counts, read_existing_arms
 from armwright.experiments.run_record import describe_method
 from armwright.kinematics.arms.forward import column_solid
 from armwright.kinematics.arms.motor_bodies import NO_BODY, MotorBodies
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
-from armwright.page.cycles import cycle_motions, cycle_of_design
 from armwright.page.reach_maps import ReachMapFiles
-from armwright.page.recommendations import explained, recommended_designs, why_nothing
+from armwright.page.recommendations import explained, recommended_designs, shown, why_nothing
 from armwright.page.repeat_command import repeat_command
 from armwright.pareto import hypervolume
 from armwright.pictures.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.problem.assumptions import assumed_values
+from armwright.problem.facts import ASKED, Facts, describe_supply
 from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import TORQUE, TORQUE_SCALE
+from armwright.proof.design_record import DesignRecord, read_records
 from armwright.proof.front_gap import known_front
 from armwright.proof.results import read_summary
-from armwright.proof.selection import bounded_numbers, numbers_of
+from armwright.proof.selection import bounded_numbers
 from armwright.robot.arm import AXES, Arm, Joint, Link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
@@ -60,9 +61,8 @@ class RunContent:
         self._reach_maps = ReachMapFiles(folder)
         self._chunks: list[tuple[int, Arrays]] = []  # chunks of designs, by the number of the first
         self._n = 0
-        self._cycle_of: dict[int, dict[str, Any]] = {}  # of designs that are or were on the front
-        self._chosen: Sequence[Mapping[str, Any]] = ()  # recommendations of the summary
-        self._recommended: list[dict[str, Any]] = []  # the same as the page shows them
+        self._is_finished = False
+        self._records: dict[int, DesignRecord] = {}  # of designs that are or were on the front
         self.history = self._nothing()
         self.refresh()
 
@@ -77,19 +77,25 @@ class RunContent:
         self.config = read_config(self.folder)  # the reference point may have been chosen since
         is_other = self._reader.read_on() or len(self._reader.trials) < self._n
         if is_other:
-            self._chunks, self._n, self._cycle_of, self.history = [], 0, {}, self._nothing()
+            self._chunks, self._n, self._records, self.history = [], 0, {}, self._nothing()
         summary = read_summary(self.folder)
         # A summary of another kind of run does not belong to this one.
         self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
         self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
         self.history = self.history.grown(self._reader.trials, self.config.reference_point)
-        chosen = (self.summary or {}).get("recommended", ())
-        if chosen != self._chosen:
-            self._chosen, self._recommended = chosen, recommended_designs(self.history, chosen)
+        self._read_records()
         if len(self.history) > self._n:
             self._chunks.append((self._n, _designs(self.history, range(self._n, len(self.history)))))
             self._n = len(self.history)
         return is_other
+
+    def _read_records(self) -> None:
+        """Read the records of the front; those of a finished run are its results."""
+        if self.summary is not None and not self._is_finished:
+            self._records = {}
+        self._is_finished = self.summary is not None
+        front = [member.number for member in self.history.front]
+        self._records |= read_records(self.folder, self.history, [n for n in front if n not in self._records])
 
     def _nothing(self) -> History:
         return History(self.config.problem, (), self.config.method.n_init, self.config.reference_point)
@@ -114,23 +120,28 @@ class RunContent:
         search = None if self.summary is None or self.study is not None else self.summary["search"]
         spent = None if search is None else search["evaluations"]
         reach_maps = self._reach_maps.read(self.history)
+        records = {number: self._records[number] for number in front}
+        chosen: Sequence[Mapping[str, Any]] = (self.summary or {}).get("recommended", ())
+        existing = read_existing_arms(self.folder, len(self.history.problem.objectives))
         head = {
             **_about(self.config, self.folder, self.history, spent),
             "n": self._n,
             "designs_from": designs_from,
             "front": front,
-            "arms": {number: _of_arm(self.history, number) for number in front},
-            "cycles": self._cycles(),
+            "arms": {number: _selectable(self.history, number, records[number].facts) for number in front},
+            "cycles": {number: _cycle(record) for number, record in records.items() if record.way is not None},
             "proposals": _proposals(self.history, designs_from),
             "failures": _failures(self.history, designs_from),
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
             "looks": {trial.source: look(trial.source)._asdict() for trial in self.history},
             "existing": EXISTING._asdict(),
-            "existing_arms": _existing_arms(self.folder, self.history),
+            "existing_arms": [_existing_arm(arm, self.history) for arm in existing],
             "not_modelled": NOT_MODELLED,
             "reach_maps": {number: shown.head for number, shown in reach_maps.items()},
             "result": _result(self.history, self.summary),
-            "recommended": self._recommended,
+            "recommended": recommended_designs(chosen, records),
+            "asked": ASKED,
+            "quantities": explained([*(record.facts for record in records.values()), *(arm.facts for arm in existing)]),
             "nothing": why_nothing(self.history, self.summary),
             "calls_from": calls_from,
             "calls": [asdict(call) for call in self.calls[calls_from:]],
@@ -139,32 +150,16 @@ class RunContent:
         levels = {f"reach_{number}": shown.levels for number, shown in reach_maps.items()}
         return pack(head, {**arrays, **levels, "curve": self.history.hypervolumes})
 
-    def _cycles(self) -> dict[int, dict[str, Any]]:
-        """Return how the designs of the front move through the cycle of the task; empty without one."""
-        if self.config.task.cycle is None:
-            return {}
-        new = [member for member in self.history.front if member.number not in self._cycle_of]
-        if new:
-            evaluation = self.history.evaluation([member.number for member in new])
-            for row, member in enumerate(new):
-                self._cycle_of[member.number] = cycle_of_design(evaluation, row, len(member.arm.joints))
-        return {member.number: self._cycle_of[member.number] for member in self.history.front}
 
-
-def _existing_arms(folder: Path, history: History) -> list[dict[str, Any]]:
-    """Return the existing arms of the last comparison and their relation to the present front."""
-    return [
-        {
-            "name": arm.name,
-            "values": arm.values,
-            "reach": arm.reach,
-            "payload_at_full_reach": arm.payload_at_full_reach,
-            "quantities": {**arm.measures, "mass": arm.mass, "price": arm.price},
-            "violated": arm.violated,
-            "dominance": dominance_counts(arm.values, arm.violated, history),
-        }
-        for arm in read_existing_arms(folder, len(history.problem.objectives))
-    ]
+def _existing_arm(arm: ComparedArm, history: History) -> dict[str, Any]:
+    """Return an existing arm and its relation to the present front."""
+    return {
+        "name": arm.name,
+        "values": arm.values,
+        "facts": shown(arm.facts),
+        "violated": arm.violated,
+        "dominance": dominance_counts(arm.values, arm.violated, history),
+    }
 
 
 def design_files(history: History, number: int) -> dict[str, str]:
@@ -173,10 +168,27 @@ def design_files(history: History, number: int) -> dict[str, str]:
     return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}
 
 
-def _of_arm(history: History, number: int) -> dict[str, float]:
-    """Return quantities of an arm that do not depend on the targets, named as in `armwright pick`."""
-    numbers = numbers_of(history, history.member(number))
-    return {name: numbers[name] for name in ("length", "mass", *bounded_numbers(history, number))}
+def _selectable(history: History, number: int, facts: Facts) -> dict[str, float]:
+    """Return the quantities of a design of the front by which `pick` selects, besides parameters."""
+    known = {name: fact.value for name, fact in facts.items() if fact.value is not None}
+    return {**known, **bounded_numbers(history, number)}
+
+
+def _cycle(record: DesignRecord) -> dict[str, Any]:
+    """Return the way of a design through the cycle, and its currents in words."""
+    way = {} if record.way is None else record.way.model_dump()
+    return {**way, "supply": describe_supply(record.facts)}
+
+
+def _cycle_motions(task: Task) -> list[dict[str, Any]]:
+    """Return step, target and rest [s] of each motion of the cycle; empty without a cycle."""
+    if task.cycle is None:
+        return []
+    plan = task.plan(task.target_positions)
+    return [
+        {"step": motion.step + 1, "target": plan.targets[motion.step], "rest": rest}
+        for motion, rest in zip(plan.motions, plan.dwells, strict=True)
+    ]
 
 
 def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
@@ -284,7 +296,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "workspace": [{"low": r.low, "high": r.high, "description": r.describe()} for r in task.workspace],
         "cycle": task.cycle_description,
         "lines": _lines(task),
-        "motions": cycle_motions(task),
+        "motions": _cycle_motions(task),
         "is_closed": task.cycle is not None and task.cycle.closed,
         "reference_point": reference,
         "constraints": [
@@ -323,7 +335,6 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
             "infeasible": INFEASIBLE,
         },
         "joint_labels": JOINT_LABEL,
-        "quantities": explained(),
     }
 
 

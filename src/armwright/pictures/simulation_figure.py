@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from armwright.arrays import Array
 from armwright.pictures.drawing import write_drawn
-from armwright.proof.design_folders import DESIGNS, design_name
+from armwright.proof.design_record import DESIGNS, design_name
 from armwright.proof.results import FIGURES
 from armwright.proof.simulated_run import SimulatedMember
 from armwright.proof.simulation_model import TIMESTEP

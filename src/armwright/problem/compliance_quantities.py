@@ -3,7 +3,7 @@
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError
+from armwright.exceptions import UnknownQuantityError
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.reach.compliance import (
     Stiffness,
@@ -19,11 +19,12 @@ from armwright.tasks.moments import MAX_MASS
 
 
 def require_sections(arms: ArmArrays, quantity: str) -> None:
-    """Raise SettingsError if the stiffness of a link is not known."""
+    """Raise UnknownQuantityError if the stiffness of a link is not known."""
     if np.isnan(arms.bending_stiffness).any() or np.isnan(arms.torsional_stiffness).any():
-        raise SettingsError(
+        raise UnknownQuantityError(
             f"objective {quantity} needs the section and the material of the links; try link_section: "
-            "{tubes: [[0.03, 0.002]], material: aluminium} in the space file"
+            "{tubes: [[0.03, 0.002]], material: aluminium} in the space file",
+            "no section and material of the links are stated",
         )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError
+from armwright.exceptions import UnknownQuantityError
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.reach.reachable_poses import PoseSearch, PostureConditions, Tolerances, sample_postures
 from armwright.tasks.obstacles import Obstacle
@@ -27,11 +27,11 @@ def dexterous_volumes(arms: ArmArrays, workspace: Sequence[Region], obstacles: S
     arm touches itself, either.
 
     Raises:
-        SettingsError: No region has directions.
+        UnknownQuantityError: No region has directions.
     """
     asked = [(region, region.directions) for region in workspace if region.directions is not None]
     if not asked:
-        raise SettingsError(NO_DIRECTIONS)
+        raise UnknownQuantityError(NO_DIRECTIONS, "the task has no workspace with directions")
     tolerances = Tolerances(REACHED, ALIGNED)
     free = PostureConditions(clearance=0.0, obstacles=tuple(obstacles)) if obstacles else None
     dexterous = np.zeros(len(arms))

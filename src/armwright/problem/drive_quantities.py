@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError
+from armwright.exceptions import UnknownQuantityError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.kinematics.cycle.supply import SupplyCurrents
@@ -33,15 +33,19 @@ KEYS = {"peak": "peak_torque", "continuous": "rated_torque", "no_load_speed": "s
 
 
 def require_ratings(actuation: Actuation | None, quantity: str) -> Actuation:
-    """Return the actuation of arms; SettingsError if it lacks what a quantity of this name needs."""
+    """Return the actuation of arms; UnknownQuantityError if it lacks what a quantity of this name needs."""
     if actuation is None:
-        raise SettingsError(f"objective {quantity} needs actuators: name some in the space file (actuators: [...])")
+        raise UnknownQuantityError(
+            f"objective {quantity} needs actuators: name some in the space file (actuators: [...])",
+            "no actuators are named",
+        )
     for rating in RATINGS[quantity]:
         if np.isnan(getattr(actuation, rating)).any():
             key = KEYS.get(rating, rating)
-            raise SettingsError(
+            raise UnknownQuantityError(
                 f"objective {quantity} needs the {key} of every actuator; try {key} [{UNITS[key]}] in the record of "
-                "each in the space file, or leave out those without"
+                "each in the space file, or leave out those without",
+                f"the {key.replace('_', ' ')} of an actuator is not known",
             )
     return actuation
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError, TaskError
+from armwright.exceptions import SettingsError, TaskError, UnknownQuantityError
 from armwright.kinematics.arms.arm_arrays import ArmArrays, carrying, stack_arms
 from armwright.kinematics.arms.forward import Frames, forward_kinematics
 from armwright.kinematics.arms.jacobian import jacobian_of
@@ -102,7 +102,7 @@ class Evaluation(Scene):
     def paths(self) -> CyclePaths:
         """The arms along the motions of the cycle; SettingsError if the task has none."""
         if self.cycle_paths is None:
-            raise SettingsError(NO_CYCLE)
+            raise UnknownQuantityError(NO_CYCLE, "the task has no cycle")
         return self.cycle_paths
 
     @property
@@ -208,7 +208,7 @@ class Evaluation(Scene):
     def workspace_error(self) -> Array:
         """(N, W) distance of the tip from each point of the workspace [m]; SettingsError where there is none."""
         if not self.workspace:
-            raise SettingsError(NO_WORKSPACE)
+            raise UnknownQuantityError(NO_WORKSPACE, "the task has no workspace")
         points = sample_regions(self.workspace)
         reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)

@@ -1,15 +1,23 @@
 """An objective: a number for each target, made from an evaluation, and how these become one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.exceptions import UnknownQuantityError
 from armwright.problem.evaluation import Evaluation
 
 Over = Literal["sum", "max", "min", "rms", "arm"]
+_OVER: Mapping[Over, str] = {
+    "sum": " Summed over the targets.",
+    "max": " The worst target counts.",
+    "min": " The target where it is smallest counts.",
+    "rms": " The root mean square over the targets.",
+    "arm": "",
+}
 
 
 @dataclass(frozen=True)
@@ -46,6 +54,20 @@ class Objective:
         """Return one value per arm, (N,), as searches minimise it."""
         return self._total(self.shares(evaluation))
 
+    def known(self, evaluation: Evaluation, minimised: bool = False) -> tuple[Array, str]:
+        """Return (N,) values and an empty reason; NaN and the reason if task or arms leave the quantity open.
+
+        Args:
+            evaluation: Physics of N arms. What is not known of one is not known of any.
+            minimised: Return the value that searches minimise.
+        """
+        try:
+            values = self.minimised(evaluation) if minimised else self(evaluation)
+        except UnknownQuantityError as unknown:
+            return np.full(len(evaluation), np.nan), unknown.reason
+        finite = np.isfinite(values)
+        return np.where(finite, values, np.nan), "" if finite.all() else "it is not finite"
+
     def shares(self, evaluation: Evaluation) -> Array:
         """Return the shares of the targets in the minimised value, (N, T); for `over="arm"` the value itself, (N,)."""
         return (self.excess or self.each)(evaluation)
@@ -62,6 +84,11 @@ class Objective:
                 return np.sqrt(np.mean(each**2, axis=1))
             case "arm":
                 return each
+
+    @property
+    def explanation(self) -> str:
+        """The quantity and how the targets count, in sentences."""
+        return f"{self.description[0].upper()}{self.description[1:]}.{_OVER[self.over]}"
 
     @property
     def unit_in_brackets(self) -> str:

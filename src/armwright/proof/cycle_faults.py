@@ -94,10 +94,9 @@ def path_record(evaluation: Evaluation, row: int) -> dict[str, Any]:
     return {"path": {**extremes, "jumps": jumping_steps(paths, row)}}
 
 
-def describe_extremes(evaluation: Evaluation, row: int) -> str:
-    """Describe where an arm is worst along its cycle, on one line; empty without a cycle."""
-    paths = evaluation.cycle_paths
-    found = {} if paths is None else path_extremes(paths, row)
+def describe_path(path: Mapping[str, Any] | None) -> str:
+    """Describe on one line where an arm is worst along its cycle, from `path` of its record; empty without one."""
+    found = {name: Extreme(**path[name]) for name in _SHOWN if name in path} if path else {}
     return "; ".join(_describe(name, extreme) for name, extreme in found.items())
 
 

@@ -4,7 +4,6 @@ For each it is stated which perturbations it survives.
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -12,8 +11,6 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import MissingExtraError, SettingsError
-from armwright.problem.evaluation import Evaluation
-from armwright.problem.objective import Objective
 from armwright.problem.objectives import DEFLECTION, ORIENTATION_ERROR, POSITION_ERROR, PRICE, TORQUE
 from armwright.proof.perturbations import FACTORS, Survival, evaluate_survival
 from armwright.proof.ranking import knee_first
@@ -95,18 +92,12 @@ def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str,
     if history.problem.evaluator is not None:
         return {}
 
-    def values(quantity: Objective, evaluation: Evaluation) -> Array | None:
-        with suppress(SettingsError):
-            found = quantity(evaluation)
-            return found if np.isfinite(found).all() else None
-        return None
-
     first = history.evaluation(numbers[:1])
     others = [quantity for quantity in (PRICE, DEFLECTION) if quantity not in history.problem.objectives]
-    asked = [quantity for quantity in others if values(quantity, first) is not None]
+    asked = [quantity for quantity in others if not quantity.known(first)[1]]
     evaluation = history.evaluation(numbers) if asked else first
-    found = {quantity.name: values(quantity, evaluation) for quantity in asked}
-    return {name: column for name, column in found.items() if column is not None}
+    found = {quantity.name: quantity.known(evaluation) for quantity in asked}
+    return {name: values for name, (values, reason) in found.items() if not reason}
 
 
 def recommend(

@@ -2,7 +2,7 @@
 
 summary.json              the result of the run
 trials.csv, front.csv     all trials, and those of the front
-designs/NNNN/             each design of the front (design_folders.py)
+designs/NNNN/             each design of the front (design_record.py)
 """
 
 import json
@@ -21,7 +21,7 @@ from armwright.pareto import hypervolume
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.failure import FAILURE_KINDS
 from armwright.proof.attribution import attribution_by_source
-from armwright.proof.design_folders import DESIGNS, design_name, objective_record, violation_record, write_designs
+from armwright.proof.design_record import DESIGNS, design_name, objective_record, violation_record, write_designs
 from armwright.proof.front_gap import front_gap
 from armwright.proof.infeasibility import ViolationTally, feasibility_record
 from armwright.proof.proposer_bias import proposer_bias
@@ -58,7 +58,8 @@ def write_results(
     folder.write_text("trials.csv", to_csv(rows))
     on_front = sorted(member.number for member in history.front)
     folder.write_text("front.csv", to_csv(rows[number] | _flat_verdict(verdicts.get(number)) for number in on_front))
-    write_designs(folder, history, verdicts)
+    recommended = {one["design"] for one in summary.get("recommended", ())}
+    write_designs(folder, history, verdicts, recommended)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 

@@ -9,8 +9,9 @@ from pydantic_core import to_jsonable_python
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.problem.conditions import Condition
-from armwright.problem.objective import Objective
+from armwright.problem.facts import Fact, Facts
 from armwright.problem.objectives import QUANTITIES
+from armwright.proof.design_record import DesignRecord, compute_facts, facts_by_number, read_records
 from armwright.proof.infeasibility import describe_infeasibility
 from armwright.proof.perturbations import evaluate_survival
 from armwright.proof.ranking import knee_first
@@ -46,6 +47,7 @@ def pick(
     by: str | None = None,
     weights: Mapping[str, float] | None = None,
     numbers: Sequence[int] | None = None,
+    facts: Mapping[int, Facts] | None = None,
 ) -> list[FrontMember]:
     """Select the designs of the front that satisfy all conditions, the best first.
 
@@ -57,6 +59,7 @@ def pick(
         by: The quantity to sort by, smallest first.
         weights: Weights of the objectives, which are divided by the reference point and summed.
         numbers: The trials to select from, such as the robust ones; None for all.
+        facts: What is known of the designs by number; None to compute it if needed.
 
     Raises:
         FailureError: No design satisfies the conditions.
@@ -75,7 +78,7 @@ def pick(
         raise FailureError(describe_infeasibility(history))
     objectives = [objective.name for objective in history.problem.objectives]
     asked = [*(condition.name for condition in where), *([] if by is None else [by])]
-    quantities = quantities_of_front(history, asked)
+    quantities = quantities_of_front(history, asked, facts)
     units = _units(history)
     where = [condition.in_unit(units[condition.name]) for condition in where]
     for name in weights or {}:
@@ -103,8 +106,11 @@ def pick_from(
     by: str | None = None,
     weights: Mapping[str, float] | None = None,
     robust: bool = False,
-) -> tuple[History, list[FrontMember]]:
-    """Select designs of a run folder; robust: only verified robust designs."""
+) -> tuple[History, list[FrontMember], dict[int, DesignRecord]]:
+    """Select designs of a run folder; return history, designs, and the records of the front by number.
+
+    robust: only verified robust designs.
+    """
     _, history = read_run(run)
     numbers = None
     if robust and history.front:
@@ -112,7 +118,8 @@ def pick_from(
         if verification is None:
             raise FailureError(f'{run} is not verified; armwright.verify_run("{run}") in Python verifies it')
         numbers = verification["robust_numbers"]
-    return history, pick(history, where, by, weights, numbers)
+    records = read_records(run, history, [member.number for member in history.front])
+    return history, pick(history, where, by, weights, numbers, facts_by_number(records)), records
 
 
 def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:
@@ -129,20 +136,35 @@ def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int
     return {number: one for number, one in {**stored, **evaluated}.items() if number in numbers}
 
 
-def quantities_of_front(history: History, names: Sequence[str]) -> dict[int, dict[str, float]]:
+def quantities_of_front(
+    history: History, names: Sequence[str], facts: Mapping[int, Facts] | None = None
+) -> dict[int, dict[str, float]]:
     """Return the quantities of the designs of the front by number: those of `numbers_of`, and these.
 
+    Args:
+        history: The trials.
+        names: Names of quantities.
+        facts: What is known of the designs by number; None to compute it if needed.
+
     Raises:
-        SettingsError: A name is unknown.
+        SettingsError: A name is unknown, or the quantity of a design.
     """
     quantities = {member.number: numbers_of(history, member) for member in history.front}
     known = list(quantities[history.front[0].number]) if history.front else []
     for name in dict.fromkeys(names):
         _check_name(name, list(dict.fromkeys([*known, *QUANTITIES])))
-        if name not in known:
-            for number, value in _evaluated(history, QUANTITIES[name]).items():
-                quantities[number][name] = value
+        if name not in known and quantities:
+            facts = compute_facts(history, list(quantities)) if facts is None else facts
+            for number, numbers in quantities.items():
+                numbers[name] = _value(name, facts[number][name])
     return quantities
+
+
+def _value(name: str, fact: Fact) -> float:
+    """Return the value of a fact; SettingsError if it is not known."""
+    if fact.value is None:
+        raise SettingsError(f"{name} is not known: {fact.reason}")
+    return fact.value
 
 
 def _units(history: History) -> dict[str, str]:
@@ -160,12 +182,6 @@ def _units(history: History) -> dict[str, str]:
         **{constraint.quantity.name: constraint.quantity.unit for constraint in problem.constraints},
         **{objective.name: objective.unit for objective in problem.objectives},
     }
-
-
-def _evaluated(history: History, quantity: Objective) -> dict[int, float]:
-    """Return a quantity of the designs of the front by number, in the task's first case; SettingsError if unknown."""
-    numbers = [member.number for member in history.front]
-    return dict(zip(numbers, quantity(history.evaluation(numbers)).tolist(), strict=True)) if numbers else {}
 
 
 def _check_name(name: str, known: Sequence[str]) -> None:

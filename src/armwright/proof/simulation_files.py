@@ -12,7 +12,7 @@ import numpy as np
 
 from armwright.kinematics.cycle.trajectory import PERIOD
 from armwright.proof.cycle_export import DIGITS
-from armwright.proof.design_folders import DESIGNS, design_name
+from armwright.proof.design_record import DESIGNS, design_name
 from armwright.proof.simulated_run import SimulatedMember
 from armwright.proof.simulation import PASS, mujoco_version
 from armwright.proof.simulation_model import TIMESTEP

@@ -10,11 +10,9 @@ from armwright.arrays import finite_or_none
 from armwright.exceptions import SettingsError
 from armwright.files import MAX_DERIVED, read_text
 from armwright.problem.assumptions import assumed_values, describe_assumed
-from armwright.problem.evaluation import Evaluation
-from armwright.problem.objective import Objective
-from armwright.problem.objectives import BACKLASH_ERROR, CYCLE_TIME, DEFLECTION, PRICE, WORST_ERROR
+from armwright.problem.facts import Facts, reach_facts
 from armwright.problem.over_reach import reach_lines
-from armwright.problem.supply import supply_of
+from armwright.proof.design_record import read_records
 from armwright.proof.recommendation import NOT_SIMULATED
 from armwright.proof.results import read_summary
 from armwright.proof.selection import pick
@@ -24,7 +22,7 @@ from armwright.runs.history import FrontMember, History
 from armwright.sheet.arm_drawing import drawing_of, link_line
 from armwright.sheet.joint_lines import joint_lines
 from armwright.sheet.parts import mass_lines, parts_list
-from armwright.sheet.record import DataSheet, ReachLine
+from armwright.sheet.record import DataSheet
 from armwright.sheet.sensitivities import sensitivities
 from armwright.text import rounded
 
@@ -54,7 +52,8 @@ def design_sheet(run: Path, number: int | None = None) -> DataSheet:
     if not 0 <= chosen < len(history):
         raise SettingsError(f"--design {chosen}: {run} has the designs 0 to {len(history) - 1}")
     records = [one for one in recommended if one["design"] == chosen]
-    return sheet_of(history, history.member(chosen), _verdict(run, chosen, records))
+    facts = read_records(run, history, [chosen])[chosen].facts
+    return sheet_of(history, history.member(chosen), facts, _verdict(run, chosen, records))
 
 
 def _first(history: History, recommended: Sequence[Mapping[str, Any]]) -> int:
@@ -62,11 +61,11 @@ def _first(history: History, recommended: Sequence[Mapping[str, Any]]) -> int:
     return int(recommended[0]["design"]) if recommended else pick(history)[0].number
 
 
-def sheet_of(history: History, member: FrontMember, verdict: Verdict) -> DataSheet:
-    """Return the data sheet of a design with a verdict."""
+def sheet_of(history: History, member: FrontMember, facts: Facts, verdict: Verdict) -> DataSheet:
+    """Return the data sheet of a design of which these facts are known, with a verdict."""
     problem, arm = history.problem, member.arm
     evaluation = history.evaluation([member.number])
-    supply, payload = supply_of(evaluation, 0), float(problem.task.payloads.max())
+    payload = float(problem.task.payloads.max())
     over_reach = reach_lines(arm, payload)
     return DataSheet(
         name=problem.task.name,
@@ -79,18 +78,8 @@ def sheet_of(history: History, member: FrontMember, verdict: Verdict) -> DataShe
         survival=verdict.survival,
         violated=_violated(history, member.number),
         objectives=_objectives(history, member),
-        reach=over_reach[-1].distance,
-        mass=arm.mass,
         payload=payload or None,
-        payload_at_full_reach=over_reach[-1].payload,
-        position_error=_known(WORST_ERROR, evaluation),
-        deflection=_known(DEFLECTION, evaluation),
-        backlash_error=_known(BACKLASH_ERROR, evaluation),
-        cycle_time=_known(CYCLE_TIME, evaluation),
-        price=_known(PRICE, evaluation),
-        peak_current=None if supply is None else supply.peak_current,
-        mean_current=None if supply is None else supply.mean_current,
-        voltage=None if supply is None else supply.voltage,
+        facts={**reach_facts(over_reach[-1]), **facts},
         joints=joint_lines(arm, evaluation),
         links=tuple(link_line(arm, n) for n in range(1, len(arm.links) + 1)),
         masses=mass_lines(arm),
@@ -98,7 +87,6 @@ def sheet_of(history: History, member: FrontMember, verdict: Verdict) -> DataShe
         over_reach=over_reach,
         sensitivities=sensitivities(problem, member.design),
         drawing=drawing_of(arm, evaluation.targets),
-        missing=_missing(history, member, evaluation, over_reach),
         assumptions=_assumptions(history, member, payload),
     )
 
@@ -131,47 +119,6 @@ def _violated(history: History, number: int) -> tuple[str, ...]:
         for constraint, violation in zip(history.problem.constraints, trial.violations, strict=True)
         if violation > 0.0
     )
-
-
-def _known(quantity: Objective, evaluation: Evaluation) -> float | None:
-    """Return a quantity of the only arm of an evaluation; None if it needs what is not known of it."""
-    try:
-        return float(quantity(evaluation)[0])
-    except SettingsError:
-        return None
-
-
-def _missing(
-    history: History, member: FrontMember, evaluation: Evaluation, over_reach: tuple[ReachLine, ...]
-) -> dict[str, str]:
-    """Return why values are not stated."""
-    space, task = history.problem.space, history.problem.task
-    motors = [joint.actuator for joint in member.arm.joints if joint.actuator is not None]
-    found: dict[str, str] = {}
-    if not task.payloads.any():
-        found["payload"] = "the task carries none"
-    if over_reach[-1].payload is None:
-        found["payload_at_full_reach"] = "no posture was found there" if motors else NO_ACTUATORS
-    if _known(DEFLECTION, evaluation) is None:
-        sections = "link_section in the space states no material"
-        found["deflection"] = NO_ACTUATORS if not motors else sections
-    if not motors:
-        found |= dict.fromkeys(("backlash_error", "utilisation"), NO_ACTUATORS)
-    if not motors and not member.arm.structure_price:
-        found["price"] = NO_ACTUATORS
-    elif _known(PRICE, evaluation) is None:
-        unpriced = dict.fromkeys(motor.name for motor in motors if motor.price is None)
-        found["price"] = f"no price is known of {', '.join(unpriced) or 'the actuators'}"
-    if task.cycle is None:
-        found |= dict.fromkeys(("cycle_time", "supply", "thermal_utilisation"), "the task has no cycle")
-    elif _known(CYCLE_TIME, evaluation) is None:
-        reason = "the task leaves durations open, and no actuators are known" if not motors else "a speed is not known"
-        found |= dict.fromkeys(("cycle_time", "supply", "thermal_utilisation"), reason)
-    elif supply_of(evaluation, 0) is None:
-        found["supply"] = NO_ACTUATORS if not motors else "an actuator states no voltage or current"
-    if space.actuators and not any(part.source for part in parts_list(member.arm, space)):
-        found["source"] = "the space file states no source of its actuators"
-    return found
 
 
 def _assumptions(history: History, member: FrontMember, payload: float) -> dict[str, str]:

@@ -74,7 +74,7 @@ def draw_top(axes: Any, sheet: DataSheet) -> None:
     axes.plot(*(MM * base), marker="s", markersize=5, color=FRONT, zorder=4)
     _frame(axes, low, high, "x [mm]", "y [mm]")
     starred = "; stars: targets" if len(targets) else ""
-    axes.set_title(f"Top view, tip within R = {MM * sheet.reach:.0f} mm{starred}")
+    axes.set_title(f"Top view, tip within R = {MM * (sheet.facts['reach'].value or 0.0):.0f} mm{starred}")
 
 
 def draw_payload(axes: Any, sheet: DataSheet) -> None:
@@ -82,13 +82,17 @@ def draw_payload(axes: Any, sheet: DataSheet) -> None:
     lines = [line for line in sheet.over_reach if line.payload is not None and line.payload < MAX_MASS]
     axes.set_title("Payload held over the reach")
     if not lines:
-        _state_missing(axes, "payload held: " + sheet.missing.get("payload_at_full_reach", "no motor feels it"))
+        _state_missing(axes, "payload held: " + (sheet.facts["payload_at_full_reach"].reason or "no motor feels it"))
         return
     axes.plot([MM * line.distance for line in lines], [line.payload for line in lines], "o-", color=FRONT, markersize=4)
     if sheet.payload is not None:
         axes.axhline(sheet.payload, color=LINK, linewidth=0.9, linestyle=(0, (4, 2)), label="payload of the task")
         axes.legend(loc="upper right")
-    axes.set(xlabel="distance from the base axis [mm]", ylabel="payload [kg]", xlim=(0.0, 1.05e3 * sheet.reach))
+    axes.set(
+        xlabel="distance from the base axis [mm]",
+        ylabel="payload [kg]",
+        xlim=(0.0, 1.05e3 * sheet.reach),
+    )
     axes.set_ylim(0.0, 1.25 * max([line.payload or 0.0 for line in lines] + [sheet.payload or 0.0]) or 1.0)
 
 
@@ -104,9 +108,13 @@ def draw_errors(axes: Any, sheet: DataSheet) -> None:
             most = max(most, MM * float(y.max()))
             axes.plot(x, MM * y, style, color=colour, markersize=4, label=key.replace("_", " "))
     if not axes.lines:
-        _state_missing(axes, "deflection and backlash: " + sheet.missing.get("deflection", "not known"))
+        _state_missing(axes, "deflection and backlash: " + (sheet.facts["deflection"].reason or "not known"))
         return
-    axes.set(xlabel="distance from the base axis [mm]", ylabel="tip moves by [mm]", xlim=(0.0, 1.05e3 * sheet.reach))
+    axes.set(
+        xlabel="distance from the base axis [mm]",
+        ylabel="tip moves by [mm]",
+        xlim=(0.0, 1.05e3 * sheet.reach),
+    )
     axes.set_ylim(0.0, 1.4 * most or 1.0)
     axes.legend(loc="upper left")
 

@@ -7,18 +7,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from armwright.kinematics.reach.reach_outline import Outline
+from armwright.problem.facts import Facts
 from armwright.problem.over_reach import ReachLine
 
 NOT_STATED = "not stated"
 NOT_MODELLED = "housings, cables, brakes, controller, power supply and assembly"
-UNITS: Mapping[str, str] = {
-    "reach": "m", "fraction": "of the reach", "distance": "m", "payload": "kg; 10000 if no actuator feels it",
-    "payload_at_full_reach": "as payload",
+UNITS: Mapping[str, str] = {  # of all keys outside `facts`, which state their own
+    "fraction": "of the reach", "distance": "m", "payload": "kg; 10000 if no actuator feels it",
     "mass": "kg", "length": "m", "outer_diameter": "m", "wall": "m", "position_error": "m", "deflection": "m",
-    "backlash_error": "m", "cycle_time": "s", "price": "USD", "unit_price": "USD", "peak_current": "A",
-    "mean_current": "A", "voltage": "V", "lower": "rad, or m of a prismatic joint", "upper": "as lower",
-    "used": "as lower", "unused": "as lower", "torque": "N m, or N of a prismatic joint", "peak_torque": "as torque",
-    "peak_utilisation": "of the peak torque, safety factor included", "speed_utilisation": "of the no-load speed",
+    "backlash_error": "m", "price": "USD", "unit_price": "USD", "lower": "rad, or m of a prismatic joint",
+    "upper": "as lower", "used": "as lower", "unused": "as lower", "torque": "N m, or N of a prismatic joint",
+    "peak_torque": "as torque", "peak_utilisation": "of the peak torque, safety factor included",
+    "speed_utilisation": "of the no-load speed",
     "thermal_utilisation": "of the continuous torque, safety factor included", "base": "m",
     "base_position": "m", "base_yaw": "rad", "points": "m", "targets": "m", "links": "m",
 }  # fmt: skip
@@ -178,18 +178,8 @@ class DataSheet:
         survival: Which perturbations it holds.
         violated: The constraints that it violates, or why its evaluation failed.
         objectives: What the run evaluated, by name with the unit.
-        reach: The horizontal reach of the tip from the first joint.
-        mass: Without payload.
-        payload: The largest payload of the task.
-        payload_at_full_reach: What the actuators hold at full reach.
-        position_error: The largest at the targets.
-        deflection: The largest at the targets.
-        backlash_error: The largest at the targets.
-        cycle_time: The duration of the cycle.
-        price: Of all parts that state one.
-        peak_current: The largest current along the cycle.
-        mean_current: The mean current over the cycle.
-        voltage: Of the supply; None if the actuators have several.
+        payload: The largest payload of the task; None without one.
+        facts: What is known of the arm by quantity, or why it is not.
         joints: The joints that move.
         links: The links.
         masses: The parts of the mass, which sum up to it.
@@ -197,7 +187,6 @@ class DataSheet:
         over_reach: Payload and errors over the reach.
         sensitivities: What changes of the design change.
         drawing: The drawing.
-        missing: Why a value is not stated, by its key.
         assumptions: What the values assume, by what they are about.
         not_modelled: What neither mass nor price include.
     """
@@ -205,8 +194,7 @@ class DataSheet:
     name: str
     design: int | None
     joint_letters: str
-    reach: float
-    mass: float
+    facts: Facts
     joints: tuple[JointLine, ...]
     links: tuple[LinkLine, ...]
     masses: tuple[MassLine, ...]
@@ -220,17 +208,12 @@ class DataSheet:
     violated: tuple[str, ...] = ()
     objectives: Mapping[str, tuple[float | None, str]] = field(default_factory=dict[str, tuple[float | None, str]])
     payload: float | None = None
-    payload_at_full_reach: float | None = None
-    position_error: float | None = None
-    deflection: float | None = None
-    backlash_error: float | None = None
-    cycle_time: float | None = None
-    price: float | None = None
-    peak_current: float | None = None
-    mean_current: float | None = None
-    voltage: float | None = None
     parts: tuple[Part, ...] = ()
     sensitivities: tuple[Sensitivity, ...] = ()
-    missing: Mapping[str, str] = field(default_factory=dict[str, str])
     assumptions: Mapping[str, str] = field(default_factory=dict[str, str])
     not_modelled: str = NOT_MODELLED
+
+    @property
+    def reach(self) -> float:
+        """The horizontal reach of the tip from the first joint [m]."""
+        return self.over_reach[-1].distance

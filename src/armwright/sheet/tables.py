@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from armwright.problem.facts import ASKED, PAYLOAD_AT_FULL_REACH, VOLTAGE
 from armwright.sheet.record import NOT_STATED, DataSheet, JointLine, Sensitivity
 from armwright.tasks.moments import MAX_MASS
+from armwright.text import significant
 
 AXIS_NAMES = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
-MOST_DECIMALS = 3
-ENOUGH = 3  # significant digits
 SHOWN_UNITS = {"m": (1e3, " mm"), "rad": (math.degrees(1.0), "°")}  # of objectives
 
 
@@ -36,10 +36,7 @@ def number(value: float | None, factor: float = 1.0, signed: bool = False, missi
     """Return a value in other units, with three significant digits and no exponent; never more than 3 decimals."""
     if value is None:
         return missing
-    shown = factor * value
-    digits = 0 if shown == 0.0 else ENOUGH - 1 - math.floor(math.log10(abs(shown)))
-    text = f"{shown:{'+' if signed else ''},.{min(max(digits, 0), MOST_DECIMALS)}f}"
-    return text if any(letter in "123456789" for letter in text) else "0"
+    return significant(factor * value, signed=signed)
 
 
 def money(value: float | None, missing: str = NOT_STATED) -> str:
@@ -63,27 +60,16 @@ def verdict_of(sheet: DataSheet) -> str:
 
 def key_figures(sheet: DataSheet) -> Table:
     """Return what an engineer asks first."""
-    voltage = "" if sheet.voltage is None else f" at {sheet.voltage:g} V"
-    supply = f"{number(sheet.peak_current)} A peak, {number(sheet.mean_current)} A mean{voltage}"
-    payload = "none" if sheet.missing.get("payload", "").startswith("the task") else _stated(sheet, "payload", "kg")
-    held = sheet.payload_at_full_reach
-    at_reach = "any" if held is not None and held >= MAX_MASS else _stated(sheet, "payload_at_full_reach", "kg")
-    if held == 0.0:
-        at_reach += " (the actuators do not hold the arm itself)"
+    asked = {name: sheet.facts[name] for name in (*ASKED, VOLTAGE)}
+    held = asked[PAYLOAD_AT_FULL_REACH].value
+    note = " (the actuators do not hold the arm itself)" if held == 0.0 else ""
     rows = [
-        ("horizontal reach", f"{number(sheet.reach, 1e3)} mm"),
         ("base", NOT_STATED if sheet.base_position is None else _base(sheet.base_position, sheet.base_yaw or 0.0)),
-        ("mass", _stated(sheet, "mass", "kg") if sheet.mass else f"{NOT_STATED} ({sheet.missing['mass']})"),
-        ("payload of the task", payload),
-        ("payload held at full reach", at_reach),
-        ("position error at the targets", _stated(sheet, "position_error", "mm", 1e3)),
-        ("deflection at the targets", _stated(sheet, "deflection", "mm", 1e3)),
-        ("backlash error at the targets", _stated(sheet, "backlash_error", "mm", 1e3)),
-        ("cycle time", _stated(sheet, "cycle_time", "s")),
-        ("current", f"{NOT_STATED} ({sheet.missing['supply']})" if sheet.peak_current is None else supply),
-        ("price", _stated(sheet, "price", "USD") if sheet.price is None else f"{money(sheet.price)} USD"),
+        ("payload of the task", "none" if sheet.payload is None else f"{significant(sheet.payload)} kg"),
+        *((fact.label, fact.text + note * (name == PAYLOAD_AT_FULL_REACH)) for name, fact in asked.items()),
     ]
-    rows += [("objective " + name, _objective(value, unit)) for name, (value, unit) in sheet.objectives.items()]
+    others = ((name, one) for name, one in sheet.objectives.items() if name not in asked)
+    rows += [("objective " + name, _objective(value, unit)) for name, (value, unit) in others]
     return Table("Key figures", (), tuple(rows), (0, 1))
 
 
@@ -96,9 +82,9 @@ def joint_table(sheet: DataSheet) -> Table:
     if idle:
         notes.append(f"Joint {', '.join(idle)} does not move in this task.")
     reasons = {
-        sheet.missing[key]: key for key in ("thermal_utilisation", "utilisation", "used") if key in sheet.missing
+        sheet.facts[name].reason: sheet.facts[name].label for name in ("thermal_utilisation", "torque_utilisation")
     }
-    notes += [f"{key.replace('_', ' ').capitalize()}: {NOT_STATED}, {reason}." for reason, key in reasons.items()]
+    notes += [f"{label}: {NOT_STATED}, {reason}." for reason, label in reasons.items() if reason]
     return Table("Joints and drives", header, rows, (1, 2), " ".join(notes))
 
 
@@ -126,9 +112,10 @@ def link_table(sheet: DataSheet) -> Table:
 
 def mass_table(sheet: DataSheet) -> Table:
     """Return the mass by parts, with the sum."""
-    rows = [(line.part, number(line.mass, 1e3), f"{line.mass / sheet.mass:.0%}") for line in sheet.masses]
-    rows += [("together", number(sheet.mass, 1e3), "100%")] if rows else []
-    return Table("Mass", ("part", "mass [g]", "share"), tuple(rows), (0,), sheet.missing.get("mass", ""))
+    whole = sum(line.mass for line in sheet.masses)
+    rows = [(line.part, number(line.mass, 1e3), f"{line.mass / whole:.0%}") for line in sheet.masses]
+    rows += [("together", number(whole, 1e3), "100%")] if rows else []
+    return Table("Mass", ("part", "mass [g]", "share"), tuple(rows), (0,), sheet.facts["mass"].reason)
 
 
 def parts_table(sheet: DataSheet) -> Table:
@@ -178,7 +165,8 @@ def sensitivity_table(sheet: DataSheet) -> Table:
         if line.impossible:
             parts_by_reason.setdefault(f"({line.change}): {line.impossible}", []).append(line.part)
     shown = [f"{', '.join(parts)} {reason}" for reason, parts in parts_by_reason.items()]
-    note = f"Impossible: {'; '.join(shown)}." if shown else sheet.missing.get("sensitivities", "")
+    note = "An existing arm has no design space." if sheet.design is None else ""
+    note = f"Impossible: {'; '.join(shown)}." if shown else note
     return Table("Sensitivities", header, rows, (0, 1, 7), note)
 
 
@@ -192,14 +180,6 @@ def _objective(value: float | None, unit: str) -> str:
     """Return an objective, a length in millimetres and an angle in degrees."""
     factor, shown = SHOWN_UNITS.get(unit, (1.0, f" {unit}"))
     return number(value) if value is None else f"{number(value, factor)}{shown}".rstrip()
-
-
-def _stated(sheet: DataSheet, key: str, unit: str, factor: float = 1.0) -> str:
-    """Return a value of the sheet with its unit, or why it is not stated."""
-    value: float | None = getattr(sheet, key)
-    if value is not None:
-        return f"{number(value, factor)} {unit}"
-    return f"{NOT_STATED} ({sheet.missing[key]})" if key in sheet.missing else NOT_STATED
 
 
 def _joint_row(sheet: DataSheet, joint: JointLine) -> tuple[str, ...]:

@@ -9,10 +9,10 @@ from armwright.exceptions import SettingsError, did_you_mean
 from armwright.existing.existing_arm import ExistingArm
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.assumptions import ALONG_CYCLE, describe_assumed
-from armwright.problem.objectives import BACKLASH_ERROR, CYCLE_TIME, DEFLECTION, WORST_ERROR
+from armwright.problem.facts import VOLTAGE, Fact, Facts, fact_of, reach_facts
+from armwright.problem.objectives import MASS, PRICE, QUANTITIES
 from armwright.problem.over_reach import reach_lines
 from armwright.problem.problem import Problem
-from armwright.problem.supply import supply_of
 from armwright.robot.actuators import ActuatorRecord, named_actuator, value_of
 from armwright.robot.arm import Arm, Joint
 from armwright.robot.mounting import Mounting
@@ -24,12 +24,7 @@ from armwright.sheet.record import DataSheet, JointLine, MassLine, Part
 
 SAFETY_FACTOR = 1.5  # of torques, as that of designs by default
 NO_TASK = "an arm without a task"
-OF_TASK = (
-    "base_position", "base_yaw", "payload", "position_error", "backlash_error", "cycle_time", "supply", "used",
-    "utilisation", "thermal_utilisation",
-)  # fmt: skip
-NO_EFFORT = "not every joint states an effort"
-NO_DRIVES = "a URDF states no {} of its drives"
+NO_PRICE = "a URDF states no price; try --price"
 ENTERING = ("stall_torque", "peak_torque", "backlash")  # values of actuators that a sheet without a task shows
 
 
@@ -109,10 +104,7 @@ def urdf_sheet(
         name=described.name,
         design=None,
         joint_letters="",
-        reach=over_reach[-1].distance,
-        mass=arm.mass,
-        payload_at_full_reach=over_reach[-1].payload,
-        price=price,
+        facts={**_facts(arm, existing, price), **reach_facts(over_reach[-1])},
         joints=_joints(described, existing),
         links=tuple(link_line(arm, n) for n in range(1, len(arm.links) + 1)),
         masses=_masses(arm),
@@ -128,12 +120,12 @@ def urdf_sheet(
         sheet = replace(sheet, base_position=job.mounting.position, base_yaw=job.mounting.yaw)
     if price is not None:
         sheet = replace(sheet, assumptions={**sheet.assumptions, "price": "as stated by the user"})
-    return replace(sheet, missing=_missing(sheet, existing))
+    return sheet
 
 
 def _on_task(sheet: DataSheet, existing: ExistingArm) -> DataSheet:
     """Return a data sheet with what an arm does on its task."""
-    objectives, supply = existing.problem.objectives, supply_of(existing.evaluation, 0)
+    objectives = existing.problem.objectives
     assumptions = dict(sheet.assumptions)
     if existing.undecided:
         assumptions["constraints"] = f"unknown whether it meets {', '.join(existing.undecided)}"
@@ -144,13 +136,6 @@ def _on_task(sheet: DataSheet, existing: ExistingArm) -> DataSheet:
         violated=existing.violated,
         objectives={o.name: (one, o.unit) for o, one in zip(objectives, existing.objectives, strict=True)},
         payload=float(existing.problem.task.payloads.max()) or None,
-        position_error=existing.value(WORST_ERROR),
-        deflection=existing.value(DEFLECTION),
-        backlash_error=existing.value(BACKLASH_ERROR),
-        cycle_time=existing.value(CYCLE_TIME),
-        peak_current=None if supply is None else supply.peak_current,
-        mean_current=None if supply is None else supply.mean_current,
-        voltage=None if supply is None else supply.voltage,
     )
 
 
@@ -223,43 +208,16 @@ def _parts(actuators: Mapping[str, ActuatorRecord]) -> tuple[Part, ...]:
     )
 
 
-def _missing(sheet: DataSheet, existing: ExistingArm | None) -> dict[str, str]:
-    """Return why values are not stated."""
-    found = {"sensitivities": "an existing arm has no design space"}
-    if existing is None:
-        found |= dict.fromkeys(OF_TASK, NO_TASK)
+def _facts(arm: Arm, existing: ExistingArm | None, price: float | None) -> Facts:
+    """Return what is known of an arm; without a task, its mass and its price."""
+    if existing is not None:
+        facts = dict(existing.facts)
     else:
-        found |= _missing_on_task(sheet, existing)
-    if sheet.price is None:
-        found["price"] = "a URDF states no price; try --price"
-    if sheet.deflection is None:
-        found["deflection"] = "a URDF states no stiffness of links"
-    if not sheet.mass:
-        found["mass"] = "no link of the URDF states a mass"
-    if sheet.over_reach[-1].payload is None:
-        has_efforts = all(joint.peak_torque is not None for joint in sheet.joints)
-        found["payload_at_full_reach"] = "no posture was found there" if has_efforts else NO_EFFORT
-    return found
-
-
-def _missing_on_task(sheet: DataSheet, existing: ExistingArm) -> dict[str, str]:
-    found: dict[str, str] = {}
-    if sheet.payload is None:
-        found["payload"] = "the task carries none"
-    if sheet.backlash_error is None:
-        found["backlash_error"] = NO_DRIVES.format("backlash")
-    if existing.problem.task.cycle is None:
-        found |= dict.fromkeys(("cycle_time", "supply", "thermal_utilisation"), "the task has no cycle")
-    else:
-        if sheet.cycle_time is None:
-            found["cycle_time"] = f"the task leaves durations open, and {NO_DRIVES.format('corner speed')}"
-        if sheet.peak_current is None:
-            found["supply"] = NO_DRIVES.format("currents")
-        if not any(joint.thermal_utilisation for joint in sheet.joints):
-            found["thermal_utilisation"] = NO_DRIVES.format("continuous torque")
-    if any(joint.peak_torque is None for joint in sheet.joints):
-        found["utilisation"] = NO_EFFORT
-    return found
+        facts = {name: fact_of(quantity, None, NO_TASK) for name, quantity in QUANTITIES.items()}
+        facts[VOLTAGE] = Fact("Supply voltage", "V", "The voltage of all actuators.", None, NO_TASK)
+        facts[PRICE.name] = fact_of(PRICE, price, "" if price is not None else NO_PRICE)
+    mass = arm.mass or None
+    return facts | {MASS.name: fact_of(MASS, mass, "" if mass else "no link of the URDF states a mass")}
 
 
 def _assumptions(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError
+from armwright.exceptions import UnknownQuantityError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
@@ -84,7 +84,7 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
         terms: Their torque terms, from `torque_terms`.
 
     Raises:
-        SettingsError: A step should be as fast as possible, but the arms have no actuators with known speeds.
+        UnknownQuantityError: A step should be as fast as possible, but the arms have no actuators with known speeds.
     """
     plan, n = paths.plan, len(paths.jumps)
     m, dof = len(plan.motions), paths.groups[0].arms.dof
@@ -153,14 +153,15 @@ def check_durations(drives: Actuation | None, plan: CyclePlan) -> Actuation | No
     """Return the drives if their torques and speeds are known, else None.
 
     Raises:
-        SettingsError: They are not known, and a step should be as fast as possible.
+        UnknownQuantityError: They are not known, and a step should be as fast as possible.
     """
     if drives is not None and not np.isnan(drives.peak + drives.no_load_speed + drives.corner_speed).any():
         return drives
     if any(plan.times[motion.step] is None for motion in plan.motions):
-        raise SettingsError(
+        raise UnknownQuantityError(
             "cycle_time and other quantities of time need the duration of each step, or actuators with known torques "
-            "and speeds; try cycle: {time: 1.5, ...}"
+            "and speeds; try cycle: {time: 1.5, ...}",
+            "the task leaves durations open, and a torque or speed of the drives is not known",
         )
     return None
 

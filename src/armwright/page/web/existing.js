@@ -1,16 +1,9 @@
 // Existing arms beside the recommended designs: what an arm that can be bought does better, and what worse.
 
-import { REACH } from "./recommended.js";
 import { listen, set, state } from "./state.js";
 import { $, element, plural, quantity, why } from "./format.js";
 
-const HORIZONTAL = { name: "reach", label: "Reach", unit: "m", more: true, description: REACH };
-const PAYLOAD = {
-  name: "payload_at_full_reach", label: "Payload there", unit: "kg", more: true,
-  description: "The mass that the actuators hold at that distance in every posture found, with the safety factor.",
-};
-const ASKED = ["price", "mass", "cycle_time", "deflection", "backlash_error"]; // after the objectives
-const ANY = 1e4; // [kg]; as much as is computed
+const MORE = ["reach", "payload_at_full_reach", "payload_capacity"]; // of which more is better
 
 let content = null;
 let drawn = ""; // what the table shows, so that it is not drawn again under an open explanation
@@ -22,14 +15,14 @@ export function openExisting(shownContent) {
 }
 
 export function drawExisting() {
-  const { existing_arms: arms, quantities: explained, recommended } = content.head, asked = JSON.stringify([arms, recommended]);
+  const { existing_arms: arms, quantities, recommended } = content.head, shown = JSON.stringify([arms, recommended]);
   $("existing-box").hidden = !arms.length;
-  if (!arms.length || asked === drawn) return;
-  drawn = asked;
-  const objectives = content.objectives.map((one) => ({ ...one, ...explained[one.name] }));
-  const others = ASKED.filter((name) => objectives.every((one) => one.name !== name)).map((name) => ({ name, ...explained[name] }));
+  if (!arms.length || shown === drawn) return;
+  drawn = shown;
   const rows = [...recommended.map(ofDesign), ...arms.map(ofArm)];
-  const columns = [...objectives, HORIZONTAL, PAYLOAD, ...others].filter(({ name }) => rows.some((row) => isKnown(row.values[name])));
+  const names = [...new Set([...content.objectives.map(({ name }) => name), ...content.head.asked])];
+  const columns = names.filter((name) => rows.some((row) => isKnown(row.values[name])))
+    .map((name) => ({ name, more: MORE.includes(name), ...content.objectives.find((one) => one.name === name), ...quantities[name] }));
   const best = new Map(columns.map((column) => [column.name, bestOf(column, rows)]));
   const heads = columns.map(({ label, description }) => element("th", {}, label, why(label, description)));
   $("existing").replaceChildren(
@@ -45,16 +38,20 @@ export function drawExisting() {
 
 const isKnown = (value) => value !== null && value !== undefined;
 
-function ofDesign({ design, reach, payload_at_full_reach, quantities }) {
-  const values = { ...quantities, reach, payload_at_full_reach };
-  content.objectives.forEach(({ name }, k) => { values[name] = content.values(design)[k]; });
-  return { name: `#${design} ${content.joints(design)}`, values, design, verdict: "meets all constraints" };
+function ofDesign({ design, facts }) {
+  return { name: `#${design} ${content.joints(design)}`, design, verdict: "meets all constraints", ...known(facts, content.values(design)) };
 }
 
-function ofArm({ name, reach, payload_at_full_reach, quantities, values: minimised, violated, dominance }) {
-  const values = { ...quantities, reach, payload_at_full_reach };
-  content.objectives.forEach((one, k) => { values[one.name] = minimised[k]; });
-  return { name, values, violated, verdict: describeDominance({ violated, dominance, values: minimised }) };
+function ofArm({ name, facts, values, violated, dominance }) {
+  return { name, violated, verdict: describeDominance({ violated, dominance, values }), ...known(facts, values) };
+}
+
+// Values and texts of the facts, and the values of the objectives, by name.
+function known(facts, minimised) {
+  const values = {}, texts = {};
+  for (const [name, { value, text }] of Object.entries(facts)) [values[name], texts[name]] = [value, text];
+  content.objectives.forEach((one, k) => { [values[one.name], texts[one.name]] = [minimised[k], quantity(minimised[k], one.unit)]; });
+  return { values, texts };
 }
 
 function bestOf({ name, more }, rows) {
@@ -62,10 +59,10 @@ function bestOf({ name, more }, rows) {
   return new Set(values).size > 1 ? Math[more ? "max" : "min"](...values) : null;
 }
 
-function tableRow({ name, values, design, violated, verdict }, columns, best) {
+function tableRow({ name, values, texts, design, violated, verdict }, columns, best) {
   const cells = columns.map((column) => {
     const value = values[column.name] ?? null;
-    const text = value === null ? "–" : column === PAYLOAD && value >= ANY ? "any" : quantity(value, column.unit);
+    const text = value === null ? "–" : texts[column.name];
     return element("td", {}, !violated?.length && value !== null && value === best.get(column.name) ? element("strong", {}, text) : text);
   });
   const first = design === undefined ? name : element("button", { type: "button", onclick: () => set({ design }) }, name);

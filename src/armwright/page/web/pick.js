@@ -15,7 +15,7 @@ let names = [];
 
 export function openPick(shownContent) {
   content = shownContent;
-  names = [...content.objectives.map((o) => o.name), "length", "mass", ...content.head.constraints.map((c) => c.name),
+  names = [...content.objectives.map((o) => o.name), ...new Set(content.head.front.flatMap((i) => Object.keys(content.head.arms[i]))),
     ...content.head.parameters.filter((p) => !p.choices).map((p) => p.name)];
   names = [...new Set(names)];
   $("pick-by").append(new Option("the knee", KNEE), new Option("weights", WEIGHTS),

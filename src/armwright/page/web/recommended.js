@@ -8,7 +8,6 @@ import { $, element, onTheme, plural, quantity, why } from "./format.js";
 const ROLES = {
   knee: "Best compromise", "least price": "Cheapest", "least deflection": "Stiffest", "least cycle_time": "Fastest", "least mass": "Lightest",
 };
-export const REACH = "The largest horizontal distance of the tip from the first joint.";
 
 let content = null;
 
@@ -61,14 +60,12 @@ function card(one) {
 
 const downloads = () => [["urdf", "URDF"], ["mjcf", "MJCF"], ...(hasServer() ? [["datasheet", "Data sheet"]] : [])];
 
-function rows({ design, reach, quantities }) {
-  const { quantities: explained } = content.head, measured = { ...quantities };
-  content.objectives.forEach((o, k) => { measured[o.name] = content.values(design)[k]; });
-  const named = Object.entries(measured).map(([name, value]) => {
-    const known = explained[name] ?? content.objectives.find((o) => o.name === name);
-    return [known.label, quantity(value, known.unit), known.description];
-  });
-  return [["Reach", quantity(reach, "m"), REACH], ...named];
+// What an engineer asks, as far as it is known, and the objectives: label, text, explanation.
+function rows({ design, facts }) {
+  const { asked, quantities } = content.head;
+  const known = asked.filter((name) => name in facts).map((name) => [quantities[name].label, facts[name].text, quantities[name].description]);
+  const others = content.objectives.flatMap((o, k) => (o.name in facts ? [] : [[o.label, quantity(content.values(design)[k], o.unit), quantities[o.name]?.description ?? o.description]]));
+  return [...known, ...others];
 }
 
 function verdict(status) {

@@ -1,0 +1,261 @@
+"""The record of a design of the front: what is known of it, computed once and read by everything that shows it.
+
+designs/NNNN/arm.urdf     for simulators
+designs/NNNN/design.json  the record: facts, postures, errors and torques at every target, the way through a cycle
+designs/NNNN/arm.xml, trajectory.csv  with a cycle: its model for MuJoCo, and its motion (cycle_export.py)
+"""
+
+import json
+import shutil
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import BaseModel
+
+from armwright.arrays import Array
+from armwright.exceptions import UnknownQuantityError
+from armwright.files import MAX_DERIVED, read_text
+from armwright.kinematics.cycle.motion_path import MotionPath
+from armwright.problem.assumptions import assumed_values
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.facts import Fact, Facts, alike, as_json, facts_of, reach_facts
+from armwright.problem.over_reach import reach_lines
+from armwright.problem.unreached_reason import unreached_reason
+from armwright.proof.cycle_export import cycle_files, trajectory_of
+from armwright.proof.cycle_faults import path_record
+from armwright.robot.arm import Arm, Joint
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.folder import RunFolder
+from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial
+
+T = TypeVar("T")
+
+DESIGNS = "designs"
+LINE_POINTS = (2, 3, 5, 9)  # of a motion, between which readers interpolate: as few as are near enough
+NEAR = 5e-3  # [rad] or [m]
+MOTION_DECIMALS = 3  # of joint values [rad] or [m] and of durations [s]
+UNTIMED = 1.0  # [s] of each motion if durations are not known
+INSTANTS = 160  # of a cycle, between which the largest load of each joint counts
+LOAD_DIGITS = 4
+
+
+class Way(BaseModel):
+    """The way of a design through the cycle of its task."""
+
+    seconds: list[float]  # of each motion
+    q: list[list[list[float]]]  # of each motion: points at equal shares, of each the joint values [rad] or [m]
+
+
+class Loads(BaseModel):
+    """What the moving joints of a design bear along the cycle; torques with the safety factor."""
+
+    seconds: float  # duration of the cycle
+    torque: list[list[float]]  # of each joint, the largest at INSTANTS times [N m] or [N]
+    speed: list[list[float]]  # likewise [rad/s] or [m/s]
+    slides: list[bool]
+    peak: list[float | None]  # limits; None where unknown
+    continuous: list[float | None]
+    no_load: list[float | None]
+
+
+class DesignRecord(BaseModel, extra="allow"):
+    """What `design.json` says, as far as others read it."""
+
+    number: int
+    facts: dict[str, Fact]
+    path: dict[str, Any] | None = None  # where it is worst along the cycle (cycle_faults.py)
+    way: Way | None = None
+    loads: Loads | None = None  # of recommended designs
+
+
+def write_designs(
+    folder: RunFolder, history: History, verdicts: Mapping[int, Mapping[str, Any]], recommended: Collection[int]
+) -> None:
+    """Write the folders of the front's designs, with their verdicts of the verification by number; remove others."""
+    numbers = [member.number for member in history.front]
+    names = {design_name(number) for number in numbers}
+    for stale in (folder.path / DESIGNS).glob("[0-9]*"):
+        if stale.name not in names:
+            shutil.rmtree(stale)
+    for number, arm, evaluation, row, record in _records(history, numbers, recommended):
+        place, name = f"{DESIGNS}/{design_name(number)}", f"{history.problem.task.name}-{number}"
+        folder.write_text(f"{place}/arm.urdf", to_urdf(arm, name))
+        for file, text in cycle_files(history.problem, arm, evaluation, row, name).items():
+            folder.write_text(f"{place}/{file}", text)
+        if number in verdicts:
+            record["verification"] = verdicts[number]
+        folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
+
+
+def design_name(number: int) -> str:
+    """Return the name of a design's folder."""
+    return f"{number:04d}"
+
+
+def read_records(folder: Path, history: History, numbers: Sequence[int]) -> dict[int, DesignRecord]:
+    """Return the records of designs by number; those that the folder lacks, as of a running run, are computed."""
+    found: dict[int, DesignRecord] = {}
+    for number in numbers:
+        try:
+            text = read_text(folder / DESIGNS / design_name(number) / "design.json", MAX_DERIVED, ValueError)
+            record = DesignRecord.model_validate_json(text)
+        except ValueError:  # none, or a damaged one; pydantic's errors included
+            continue
+        if record.number == number and _is_of(record, history):
+            found[number] = record
+    return found | compute_records(history, [number for number in numbers if number not in found])
+
+
+def compute_records(
+    history: History, numbers: Sequence[int], recommended: Collection[int] = ()
+) -> dict[int, DesignRecord]:
+    """Return the records of designs by number."""
+    records = _records(history, numbers, recommended)
+    return {number: DesignRecord.model_validate(record) for number, _, _, _, record in records}
+
+
+def facts_by_number(records: Mapping[int, DesignRecord]) -> dict[int, Facts]:
+    """Return the facts of records."""
+    return {number: record.facts for number, record in records.items()}
+
+
+def compute_facts(history: History, numbers: Sequence[int]) -> dict[int, Facts]:
+    """Return the facts of designs by number."""
+    found: dict[int, Facts] = {}
+    for group in _alike(history, numbers):
+        found |= zip(group, facts_of(history.evaluation(group)), strict=True)
+    return found
+
+
+def _is_of(record: DesignRecord, history: History) -> bool:
+    """Return whether a record is of this history's design, whose number another design may have had."""
+    return (record.model_extra or {}).get("params") == dict(history.trials[record.number].design.params)
+
+
+def _alike(history: History, numbers: Sequence[int]) -> list[list[int]]:
+    """Return the numbers of designs in groups of which the same is known."""
+    designs = [history.trials[number].design for number in numbers]
+    return [[numbers[row] for row in rows] for rows in alike(history.problem, designs)] if designs else []
+
+
+def _records(
+    history: History, numbers: Sequence[int], recommended: Collection[int]
+) -> Iterator[tuple[int, Arm, Evaluation, int, dict[str, Any]]]:
+    """Yield numbers of designs, their arms, evaluations with the row, and their records in JSON types."""
+    payload = float(history.problem.task.payloads.max())
+    for group in _alike(history, numbers):
+        evaluation = history.evaluation(group)
+        for row, (number, facts) in enumerate(zip(group, facts_of(evaluation), strict=True)):
+            arm = history.member(number).arm
+            extra: dict[str, Any] = {}
+            if number in recommended:
+                facts = {**reach_facts(reach_lines(arm, payload)[-1]), **facts}
+                extra["loads"] = _loads(arm, evaluation, row)
+            record = _record(history, number, arm, evaluation, row) | {"facts": as_json(facts), **extra}
+            yield number, arm, evaluation, row, record
+
+
+def _record(history: History, number: int, arm: Arm, evaluation: Evaluation, row: int) -> dict[str, Any]:
+    trial = history.trials[number]
+    assumed = assumed_values(history.problem, [arm])
+    return {
+        "number": number,
+        "source": trial.source,
+        "reason": trial.reason,
+        "params": dict(trial.design.params),
+        "objectives": objective_record(history, trial.values),
+        **({"violations": violation_record(history, trial)} if trial.violations else {}),
+        "masses": history.problem.space.mass_note,
+        **({"assumed": assumed} if assumed else {}),
+        **path_record(evaluation, row),
+        **({} if evaluation.cycle_paths is None else {"way": _way(evaluation, row, len(arm.joints))}),
+        "targets": [_target_record(evaluation, row, t, arm) for t in range(len(evaluation.targets))],
+    }
+
+
+def _target_record(evaluation: Evaluation, row: int, target: int, arm: Arm) -> dict[str, Any]:
+    """Return the posture of an arm, which is row `row` of an evaluation, at a target."""
+    angle_error = float(evaluation.angle_error[row, target])
+    return {
+        "target": evaluation.targets[target].tolist(),
+        "q": evaluation.q[row, target, : len(arm.joints)].tolist(),
+        "reached": evaluation.reached[row, target].tolist(),
+        "position_error": float(evaluation.position_error[row, target]),
+        **({"angle_error": angle_error} if evaluation.target_arrays.n_angular[target] else {}),
+        "unreached_reason": unreached_reason(arm, evaluation, row, target) or None,
+        "joint_torques": evaluation.joint_torques[row, target, : len(arm.joints)].tolist(),
+    }
+
+
+def _way(evaluation: Evaluation, row: int, joints: int) -> dict[str, Any]:
+    """Return the way of an arm through the cycle, with its number of joints."""
+    _, paths = evaluation.paths.of_arm(row)
+    try:
+        seconds = evaluation.loads.durations[row]
+    except UnknownQuantityError:
+        seconds = np.full(len(paths), UNTIMED)
+    return {
+        "seconds": np.round(seconds, MOTION_DECIMALS).tolist(),
+        "q": [np.round(_points(path)[:, :joints], MOTION_DECIMALS).tolist() for path in paths],
+    }
+
+
+def _points(path: MotionPath) -> Array:
+    """Return (F, D) joint values of one arm at equal shares, between which the path is nearly straight."""
+    n = next((n for n in LINE_POINTS if _distance(path, n) <= NEAR), LINE_POINTS[-1])
+    return path.at(np.linspace(0.0, 1.0, n))[0]
+
+
+def _distance(path: MotionPath, n: int) -> float:
+    """Return the largest distance of a joint [rad] or [m] from straight lines between n points of its path."""
+    points, at = path.at(np.linspace(0.0, 1.0, n))[0], path.share * (n - 1)
+    before = np.minimum(at.astype(np.intp), n - 2)
+    part = (at - before)[:, None]
+    straight = (1.0 - part) * points[before] + part * points[before + 1]
+    return float(np.abs(straight - path.q[0]).max())
+
+
+def _loads(arm: Arm, evaluation: Evaluation, row: int) -> dict[str, Any] | None:
+    """Return the loads of the moving joints; None without a cycle of known durations and drives."""
+    joints = [joint for joint in arm.joints if joint.kind != "fixed"]
+    if evaluation.plan is None or any(joint.actuator is None for joint in joints):
+        return None
+    try:
+        trajectory = trajectory_of(arm, evaluation, row)
+    except UnknownQuantityError:
+        return None
+    return {
+        "seconds": float(trajectory.time[-1]),
+        "torque": _thinned(trajectory.tau * arm.safety_factor),
+        "speed": _thinned(trajectory.qd),
+        "slides": [joint.kind == "prismatic" for joint in joints],
+        "peak": [joint.effort for joint in joints],
+        "continuous": [_continuous(joint) for joint in joints],
+        "no_load": [joint.speed for joint in joints],
+    }
+
+
+def _continuous(joint: Joint) -> float | None:
+    """Return the torque [N m] or force [N] that a joint can hold forever; None if unknown."""
+    torque = None if joint.actuator is None else joint.actuator.continuous_torque
+    return None if torque is None else torque / joint.travel
+
+
+def _thinned(rows: Array) -> list[list[float]]:
+    """Return for each joint the value of largest size in each of INSTANTS parts of a trajectory (R, D)."""
+    parts = np.array_split(rows, min(INSTANTS, len(rows)))
+    largest = np.array([np.take_along_axis(p, np.abs(p).argmax(axis=0)[None], axis=0)[0] for p in parts])
+    return [[float(f"{value:.{LOAD_DIGITS}g}") for value in column] for column in largest.T.tolist()]
+
+
+def violation_record(history: History, trial: FinishedTrial) -> dict[str, float]:
+    """Return the violations of a trial by constraint."""
+    return {c.description: value for c, value in zip(history.problem.constraints, trial.violations, strict=True)}
+
+
+def objective_record(history: History, values: Sequence[T]) -> dict[str, T]:
+    """Return values by objective."""
+    return {o.name: value for o, value in zip(history.problem.objectives, values, strict=True)}
