@@ -59,7 +59,7 @@ def knee_of(name: str, out: Path) -> tuple[FrontMember, Evaluation]:
     options = ["--evaluations", "2000", "--no-figures", "--out", str(out)]
     result = CliRunner().invoke(app, ["design", str(EXAMPLES / name), *space, *options])
     assert result.exit_code == 0, result.output
-    history, (knee, *_) = pick_from(out)
+    history, (knee, *_), _ = pick_from(out)
     return knee, history.evaluation([knee.number])
 
 

@@ -84,10 +84,10 @@ def test_exported_design_compared_as_existing_arm_keeps_its_values(run: Path, hi
     comparison = compare_arms(TASK, files, run, base=(0.0, 0.0, 0.0))
     for member, arm in zip(members, comparison.arms, strict=True):
         assert arm.values == pytest.approx(member.values, rel=1e-3, abs=1e-4)
-        assert arm.mass == pytest.approx(member.arm.mass)
-        assert arm.reach == pytest.approx(design_sheet(run, member.number).reach, rel=1e-3)
+        assert arm.value("mass") == pytest.approx(member.arm.mass)
+        assert arm.value("reach") == pytest.approx(design_sheet(run, member.number).reach, rel=1e-3)
         assert arm.joints == 3
-        assert (arm.measures["position_error"], arm.measures["torque"]) == arm.values
+        assert (arm.value("position_error"), arm.value("torque")) == arm.values
     assert len({arm.name for arm in comparison.arms}) == 4  # all files are called arm.urdf
     assert comparison.places == 0
 
@@ -98,13 +98,13 @@ def test_measures_match_formulas_at_the_found_base(compared: ArmComparison) -> N
         evaluation = compared.problem.physics_of_arms(stack_arms([there]))
         torque, error = evaluation.joint_torques[0], evaluation.position_error[0]
         efforts = [joint.effort for joint in there.joints]
-        assert arm.values == (arm.measures["position_error"], arm.measures["torque"])
-        assert arm.measures["position_error"] == pytest.approx(error.sum())
-        assert arm.measures["torque"] == pytest.approx(40 * np.linalg.norm(torque, axis=1).sum())
-        assert arm.measures["worst_error"] == pytest.approx(error.max())
-        assert arm.measures["unreached_targets"] == (error >= 1e-3).sum()
-        assert arm.measures["peak_torque"] == pytest.approx(np.abs(torque).max())
-        assert arm.measures["torque_utilisation"] == pytest.approx((1.5 * np.abs(torque) / efforts).max())
+        assert arm.values == (arm.value("position_error"), arm.value("torque"))
+        assert arm.value("position_error") == pytest.approx(error.sum())
+        assert arm.value("torque") == pytest.approx(40 * np.linalg.norm(torque, axis=1).sum())
+        assert arm.value("worst_error") == pytest.approx(error.max())
+        assert arm.value("unreached_targets") == (error >= 1e-3).sum()
+        assert arm.value("peak_torque") == pytest.approx(np.abs(torque).max())
+        assert arm.value("torque_utilisation") == pytest.approx((1.5 * np.abs(torque) / efforts).max())
         without = replace(compared.problem, task=TASK.model_copy(update={"payload": 0.0}))
         lighter = without.physics_of_arms(stack_arms([there])).joint_torques[0]
         assert not np.allclose(lighter[:2], torque[:2])
@@ -129,8 +129,8 @@ def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compa
         evaluation = compared.problem.physics_of_arms(stack_arms(moved))
         missed = np.maximum(evaluation.position_error - 1e-3, 0.0).sum(axis=1)
         torque = 40 * np.linalg.norm(evaluation.joint_torques, axis=2).sum(axis=1)
-        assert arm.measures["unreached_targets"] == 0
-        assert arm.measures["torque"] <= 1.01 * torque[missed == 0.0].min()  # type: ignore[operator]
+        assert arm.value("unreached_targets") == 0
+        assert arm.value("torque") <= 1.01 * torque[missed == 0.0].min()  # type: ignore[operator]
     assert compare_arms(TASK, [PANDA], space=SPACE).arms[0].base == compared.arms[1].base
     assert compare_arms(TASK, [PANDA], space=SPACE, seed=1).arms[0].base != compared.arms[1].base
 
@@ -142,7 +142,7 @@ def test_base_search_prefers_positions_that_meet_the_constraints() -> None:
     (placed,) = compare_arms(task, [UR5], space=SPACE, base=light.base).arms
     assert placed.violated == ("manipulability >= 0.05 (it has 0.00373)",)
     assert moved.violated == ()
-    assert moved.measures["unreached_targets"] == 0
+    assert moved.value("unreached_targets") == 0
 
 
 def test_base_is_turned_where_the_first_joint_does_not_reach() -> None:
@@ -153,32 +153,33 @@ def test_base_is_turned_where_the_first_joint_does_not_reach() -> None:
     (unturned,) = compare_arms(behind, [so101], space=space, base=(0.0, 0.0, 0.0)).arms
     (turned,) = compare_arms(behind, [so101], space=space).arms
     (again,) = compare_arms(behind, [so101], space=space, base=(*turned.base, turned.yaw)).arms
-    assert unturned.measures["unreached_targets"] == 3
-    assert turned.measures["unreached_targets"] == 0
+    assert unturned.value("unreached_targets") == 3
+    assert turned.value("unreached_targets") == 0
     assert abs(turned.yaw) > 1.0
     assert again == turned
     before = behind.model_copy(update={"targets": tuple((-x, y, z) for x, y, z in behind.target_positions.tolist())})
     (needless,) = compare_arms(before, [so101], space=space).arms
-    assert needless.measures["unreached_targets"] == 0
+    assert needless.value("unreached_targets") == 0
     assert needless.yaw == 0.0  # a turn would save less than 1 % of the torque
+
+
+def values_of(arm: ComparedArm) -> dict[str, float | None]:
+    return {name: fact.value for name, fact in arm.facts.items()}
 
 
 def test_designs_and_arms_have_the_values_of_their_data_sheets(run: Path, compared: ArmComparison) -> None:
     for design in compared.designs:
         sheet = design_sheet(run, int(design.name[1:].split()[0]))
-        assert (sheet.reach, sheet.payload_at_full_reach) == (design.reach, design.payload_at_full_reach)
-        assert (sheet.mass, sheet.price, sheet.cycle_time) == (design.mass, design.price, design.measures["cycle_time"])
-        assert sheet.position_error == design.measures["worst_error"]
+        assert {name: fact.value for name, fact in sheet.facts.items()} == values_of(design)
         assert tuple(value for value, _ in sheet.objectives.values()) == design.values
     for arm, file in zip(compared.arms, (UR5, PANDA), strict=True):
         placement = placed(compared.problem, read_urdf(file), seed=0)
         sheet = urdf_sheet(placement.described, job=Job(compared.problem, placement.mounting, placement.description))
-        assert (sheet.reach, sheet.payload_at_full_reach) == (arm.reach, arm.payload_at_full_reach)
-        assert (sheet.mass, sheet.price, sheet.violated) == (arm.mass, arm.price, arm.violated)
-        assert sheet.position_error == arm.measures["worst_error"]
+        assert {name: fact.value for name, fact in sheet.facts.items()} == values_of(arm)
+        assert sheet.violated == arm.violated
         assert tuple(value for value, _ in sheet.objectives.values()) == arm.values
         used = max(joint.peak_utilisation for joint in sheet.joints)  # type: ignore[type-var]
-        assert used == pytest.approx(arm.measures["torque_utilisation"])
+        assert used == pytest.approx(arm.value("torque_utilisation"))
 
 
 def test_dominance_counts_match_pairwise_comparison(history: History) -> None:
@@ -223,8 +224,8 @@ def test_run_folder_keeps_existing_arms_for_figures_and_page(run: Path, compared
         assert stated[arm.name]["On this task"] == (
             f"dominates {designs} of the front, dominated by {arm.dominated_by}"
         )
-        assert stated[arm.name]["Reach"] == (f"{1e3 * arm.reach:.3g} mm" if arm.reach < 1.0 else f"{arm.reach:.3g} m")
-        assert stated[arm.name]["Mass"] == f"{arm.mass:.3g} kg"
+        assert stated[arm.name]["Reach"] == arm.facts["reach"].text
+        assert stated[arm.name]["Mass"] == arm.facts["mass"].text
 
 
 def test_page_shows_existing_arms_beside_the_recommended_designs(tmp_path: Path, tab: Tab) -> None:
@@ -243,11 +244,11 @@ def test_page_shows_existing_arms_beside_the_recommended_designs(tmp_path: Path,
     for name in shown:
         assert stated[name]["On this task"] == "meets all constraints"
     for name in set(shown) & set(designs):
-        design, held = designs[name], designs[name].payload_at_full_reach
+        design, held = designs[name], designs[name].value("payload_at_full_reach")
         assert held is not None
-        assert stated[name]["Reach"] == f"{1e3 * design.reach:.3g} mm"
+        assert stated[name]["Reach"] == design.facts["reach"].text
         assert stated[name]["Payload there"] == f"{held:.3g} kg"
-        assert stated[name]["Deflection"] == f"{1e3 * (design.measures['deflection'] or 0.0):.3g} mm"
+        assert stated[name]["Deflection"] == design.facts["deflection"].text
     tab.page.locator("#existing button").last.click()
     assert tab.page.locator("#existing tr.chosen button").inner_text() == shown[-1]
     assert tab.faults == []
@@ -294,8 +295,8 @@ def test_unknown_price_and_effort_are_not_compared(tmp_path: Path) -> None:
     silent.write_text(UR5.read_text(encoding="utf-8").replace('effort="', 'effort="0" was="'), encoding="utf-8")
     ur5, without = compare_arms(TASK, [UR5, silent], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
     assert (ur5.values[2], without.values[2]) == (None, None)
-    assert ur5.values[3] == ur5.measures["torque_utilisation"] != None  # noqa: E711
-    assert (without.values[3], without.measures["torque_utilisation"]) == (None, None)
+    assert ur5.values[3] == ur5.value("torque_utilisation") != None  # noqa: E711
+    assert (without.values[3], without.value("torque_utilisation")) == (None, None)
     assert (ur5.dominates, ur5.dominated_by) == (None, None)
     assert any("price unknown" in note for note in ur5.notes)
     assert any("not every joint states an effort" in note for note in without.notes)
@@ -311,11 +312,16 @@ def test_stated_prices_are_compared_and_bounded(tmp_path: Path) -> None:
     prices = {"ur5_robot": 28_000.0, "panda": 15_000.0}
     found = compare_arms(task, [UR5, PANDA], tmp_path / "run", base=(0.0, 0.0, 0.0), prices=prices)
     ur5, panda = found.arms
-    assert (ur5.price, ur5.values[1], panda.price, panda.values[1]) == (28_000.0, 28_000.0, 15_000.0, 15_000.0)
+    assert (ur5.value("price"), ur5.values[1], panda.value("price"), panda.values[1]) == (
+        28_000.0,
+        28_000.0,
+        15_000.0,
+        15_000.0,
+    )
     assert ur5.violated == ("price <= 20000 (it has 28,000)",)
     assert panda.violated == ()
     assert panda.dominates is not None
-    assert {design.price for design in found.designs} == {3 * 482.89}
+    assert {design.value("price") for design in found.designs} == {3 * 482.89}
 
 
 def test_violated_constraints_exclude_an_arm_from_the_front(tmp_path: Path) -> None:
@@ -336,7 +342,7 @@ def test_existing_arm_drives_a_cycle_of_stated_durations() -> None:
     task = Task(name="feeder", targets=TASK.targets, payload=0.5, cycle=cycle, objectives=["dynamic_torque", "price"])  # type: ignore[arg-type]
     space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
     (ur5,) = compare_arms(task, [UR5], space=space, base=(-0.2, 0.0, 0.0)).arms
-    peak = ur5.measures["peak_torque"]
+    peak = ur5.value("peak_torque")
     assert peak is not None
     assert ur5.values[0] > peak  # type: ignore[operator]
     assert ur5.values[1] is None

@@ -4,7 +4,6 @@ import http.client
 import http.server
 import json
 import re
-import shutil
 import socket
 import threading
 from collections.abc import Iterator
@@ -275,10 +274,14 @@ def test_names_in_a_run_folder_are_escaped(tmp_path: Path, browser: Browser) -> 
     for trial in trials[3:]:
         trial |= {"source": LINK, "reason": LINK, "proposal": LINK, "fault": LINK}
     (folder / "trials.jsonl").write_text("".join(f"{json.dumps(trial)}\n" for trial in trials), encoding="utf-8")
-    arm = {"joints": 6, "reach": 0.5, "mass": 1.0, "base": [0, 0, 0], "values": trials[-1]["values"], "measures": {},
+    fact = {"label": LINK, "unit": LINK, "explanation": LINK, "value": 0.5}
+    arm = {"joints": 6, "base": [0, 0, 0], "values": trials[-1]["values"], "facts": {"mass": fact, LINK: fact},
            "dominates": 1, "dominated_by": 0, "violated": [], "notes": [LINK]}  # fmt: skip
     (folder / "existing_arms.json").write_text(json.dumps([{"name": LINK, **arm}]), encoding="utf-8")
-    shutil.rmtree(folder / "designs")
+    for file in (folder / "designs").glob("*/design.json"):
+        record = json.loads(file.read_text(encoding="utf-8"))
+        record["facts"] |= {name: {**one, "label": LINK, "explanation": LINK} for name, one in record["facts"].items()}
+        file.write_text(json.dumps(record), encoding="utf-8")
     tab = Tab(browser, offline=True)
     page = write_report(folder)
     tab.open(page, "#design=5")

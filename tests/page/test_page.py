@@ -305,7 +305,7 @@ def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", ro
 
 def picked(run: Path, *conditions: str, **wishes: Any) -> list[int]:
     """The same of `armwright pick`."""
-    _, members = pick_from(run, [read_condition(condition) for condition in conditions], **wishes)
+    _, members, _ = pick_from(run, [read_condition(condition) for condition in conditions], **wishes)
     return [member.number for member in members]
 
 

@@ -99,12 +99,12 @@ def test_cards_state_what_the_kernels_compute(
         return float(QUANTITIES[name](evaluation)[0])
 
     assert stated["Reach"] == f"{1e3 * design_sheet(run, number).reach:.3g} mm"
-    assert stated["Price"] == f"{value('price'):,.0f} USD"
+    assert stated["Price"] == f"{value('price'):,.2f} USD"
     assert stated["Mass"] == f"{arm.mass:.3g} kg"
     assert stated["Cycle time"] == f"{value('cycle_time'):.3g} s"
     assert stated["Payload capacity"] == f"{value('payload_capacity'):.3g} kg"
     assert stated["Deflection"] == f"{1e3 * value('deflection'):.3g} mm"
-    assert stated["Thermal utilisation"] == f"{100 * value('thermal_utilisation'):.0f} % of allowed"
+    assert stated["Thermal utilisation"] == f"{100 * value('thermal_utilisation'):.3g} % of allowed"
 
 
 def test_every_quantity_of_a_card_is_explained(run: Path, tab: Tab) -> None:

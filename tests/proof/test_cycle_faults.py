@@ -14,7 +14,7 @@ from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.evaluation import Evaluation
-from armwright.proof.cycle_faults import describe_extremes, describe_faults, path_extremes, path_record, via_point
+from armwright.proof.cycle_faults import describe_faults, describe_path, path_extremes, path_record, via_point
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.tasks.task import Task
 from tests.support.command_line import armwright
@@ -89,12 +89,12 @@ def test_motions_of_a_step_with_approach_are_named() -> None:
 
 def test_cycle_that_the_arm_follows_has_no_faults() -> None:
     assert describe_faults(driven(SWEEP), 0) == ""
-    assert "clearance" in describe_extremes(driven(SWEEP), 0)
+    assert "clearance" in describe_path(path_record(driven(SWEEP), 0)["path"])
 
 
 def test_tasks_without_a_cycle_have_nothing_to_report() -> None:
     evaluation = aw.evaluate([turntable()], SIDES)
-    assert (describe_extremes(evaluation, 0), describe_faults(evaluation, 0), path_record(evaluation, 0)) == (
+    assert (describe_path(None), describe_faults(evaluation, 0), path_record(evaluation, 0)) == (
         "",
         "",
         {},

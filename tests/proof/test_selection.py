@@ -63,7 +63,7 @@ def test_weights_are_relative_to_the_reference_point(history: History) -> None:
 def test_pick_can_be_restricted_to_robust_designs(run: Path) -> None:
     robust = json.loads((run / "summary.json").read_text(encoding="utf-8"))["verification"]["robust_numbers"]
     assert robust
-    _, picked = pick_from(run, robust=True)
+    _, picked, _ = pick_from(run, robust=True)
     assert sorted(member.number for member in picked) == sorted(robust)
 
 

@@ -24,6 +24,7 @@ from armwright.problem.objectives import (
     TORQUE_UTILISATION,
     WORST_ERROR,
 )
+from armwright.proof.design_record import compute_facts
 from armwright.robot.actuators import named_actuator
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.mounting import Mounting, mounted
@@ -92,8 +93,8 @@ def sheet(run: Path) -> DataSheet:
 
 def test_masses_are_those_of_the_exported_models(sheet: DataSheet, history: History) -> None:
     arm = history.member(NUMBER).arm
-    assert sum(line.mass for line in sheet.masses) == pytest.approx(sheet.mass)
-    moving = sheet.mass - arm.standing_mass  # what stands has no mass in any format
+    assert sum(line.mass for line in sheet.masses) == pytest.approx(sheet.facts["mass"].value)
+    moving = sheet.facts["mass"].value - arm.standing_mass  # what stands has no mass in any format
     pin = pinocchio.buildModelFromXML(to_urdf(arm))
     assert sum(inertia.mass for inertia in pin.inertias[1:]) == pytest.approx(moving)
     assert mujoco.MjModel.from_xml_string(to_mjcf(arm)).body_mass.sum() == pytest.approx(moving)
@@ -197,7 +198,7 @@ def test_failed_evaluations_give_a_sheet_without_objectives(history: History) ->
         history.trials[NUMBER], number=0, values=(np.inf, np.inf), failure=Failure("exception", "no licence")
     )
     failed = replace(history, trials=[trial])
-    sheet = sheet_of(failed, failed.member(0), Verdict())
+    sheet = sheet_of(failed, failed.member(0), compute_facts(failed, [0])[0], Verdict())
     assert sheet.violated == ("its evaluation failed: no licence",)
     assert {value for value, _ in sheet.objectives.values()} == {None}
     json.dumps(sheet_record(sheet), allow_nan=False)
@@ -211,7 +212,7 @@ def test_prices_keep_what_the_catalogue_says_of_them() -> None:
 
 def test_price_is_the_sum_of_the_parts(sheet: DataSheet) -> None:
     stated = [part.price for part in sheet.parts if part.price is not None]
-    assert sheet.price == pytest.approx(sum(stated))
+    assert sheet.facts["price"].value == pytest.approx(sum(stated))
     motors = [part for part in sheet.parts if part.part.startswith("XM")]
     assert sum(part.count for part in motors) == 4
     assert all(part.source.startswith("https://") and "robotis.us" in part.price_source for part in motors)
@@ -222,9 +223,9 @@ def test_price_is_the_sum_of_the_parts(sheet: DataSheet) -> None:
 def test_unknown_values_are_not_stated_and_never_zero(plain: Path) -> None:
     sheet = design_sheet(plain, 2)
     for key in ("payload_at_full_reach", "deflection", "backlash_error", "cycle_time", "price", "peak_current"):
-        assert getattr(sheet, key) is None
-    assert sheet.missing["cycle_time"] == "the task has no cycle"
-    assert sheet.missing["price"] == "the space names no actuators"
+        assert sheet.facts[key].value is None
+    assert sheet.facts["cycle_time"].reason == "the task has no cycle"
+    assert sheet.facts["price"].reason == "no actuators are named"
     assert {line.price for line in sheet.sensitivities} == {None}
     assert {line.impossible for line in sheet.sensitivities} >= {"the space names no actuator"}
     assert all(line.payload is None for line in sheet.over_reach)
@@ -241,11 +242,13 @@ def test_sheet_of_a_urdf_is_that_of_the_design_that_it_was_written_from(
     named = read_actuators(",".join(f"{n}={name}" for n, name in enumerate(motors, start=1)), described.joints)
     existing = urdf_sheet(driven(described, named), named)
     assert existing.reach == pytest.approx(sheet.reach, rel=1e-3)
-    assert existing.payload_at_full_reach == pytest.approx(sheet.payload_at_full_reach, rel=1e-2)
+    assert existing.facts["payload_at_full_reach"].value == pytest.approx(
+        sheet.facts["payload_at_full_reach"].value, rel=1e-2
+    )
     ours, theirs = sheet.over_reach[-1].backlash_error, existing.over_reach[-1].backlash_error
     assert theirs == pytest.approx(ours, rel=1e-2)
-    assert existing.price is None
-    assert existing.missing["price"] == "a URDF states no price; try --price"
+    assert existing.facts["price"].value is None
+    assert existing.facts["price"].reason == "a URDF states no price; try --price"
 
 
 def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
@@ -275,8 +278,9 @@ def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
     tip = data.oMf[model.getFrameId(described.tip, pinocchio.FrameType.BODY)].translation
     end = pinocchio.utils.rotate("z", 0.4) @ tip
     assert sheet.drawing.links[-1][2] == pytest.approx(end, abs=1e-6)
-    assert sheet.missing.keys() >= {"payload", "cycle_time", "deflection"}
-    assert sheet.position_error is not None
+    assert sheet.payload is None
+    assert all(sheet.facts[name].reason for name in ("cycle_time", "deflection"))
+    assert sheet.facts["worst_error"].value is not None
 
 
 def test_efforts_and_speeds_that_the_cycle_exceeds_are_stated() -> None:
@@ -309,8 +313,8 @@ def test_command_places_an_existing_arm_on_a_task(tmp_path: Path) -> None:
         found[name] = json.loads(done.stdout)
     assert "the best of 1,500 places" in found["searched"]["assumptions"]["place"]
     assert found["given"]["assumptions"]["place"] == "base at (-0.2, 0, 0) m, turned by 30°"
-    assert found["bare"]["position_error"] is None
-    assert {one["price"] for one in found.values()} == {15000.0}
+    assert found["bare"]["facts"]["worst_error"]["value"] is None
+    assert {one["facts"]["price"]["value"] for one in found.values()} == {15000.0}
     assert found["searched"]["name"] == "panda on target-1"
     assert list(found["searched"]["objectives"]) == ["position_error", "torque"]
 
@@ -318,9 +322,9 @@ def test_command_places_an_existing_arm_on_a_task(tmp_path: Path) -> None:
 def test_efforts_of_a_urdf_are_used_without_actuators() -> None:
     sheet = urdf_sheet(read_urdf(robot("ur5_robot")))
     assert [joint.peak_torque for joint in sheet.joints] == [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]
-    assert sheet.payload_at_full_reach is not None
+    assert sheet.facts["payload_at_full_reach"].value is not None
     assert sheet.over_reach[-1].backlash_error is None
-    assert sheet.mass == pytest.approx(sum(line.mass for line in sheet.masses))
+    assert sheet.facts["mass"].value == pytest.approx(sum(line.mass for line in sheet.masses))
 
 
 def test_first_recommended_design_is_the_default(run: Path, tmp_path: Path) -> None:
