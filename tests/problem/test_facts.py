@@ -63,9 +63,9 @@ def test_unknown_drives_and_tasks_without_a_cycle_have_no_currents(
 def test_an_actuator_of_unknown_voltage_hides_only_the_designs_that_use_it() -> None:
     space = aw.DesignSpace.model_validate({**SPACE, "actuators": ["XM540-W270", WEAK], "restrict": {}})
     problem = aw.Problem(Desk().problem.task, space)
-    designs = space.sample(20, seed=0)
+    designs = space.sample(200, seed=0)
     groups = alike(problem, designs)
-    assert sorted(np.concatenate(groups)) == list(range(20))
+    assert sorted(np.concatenate(groups)) == list(range(200))
     assert len(groups) == 2
     for group in groups:
         chosen = [designs[row] for row in group]

@@ -157,7 +157,7 @@ def _show_hypervolume(console: Console, history: History, summary: dict[str, Any
     if volume["final"] is not None:
         console.print(f"hypervolume {volume['final']:.3f} ({mean}reference point {reference})")
     if len(history) and not history.feasible.any():
-        reason = describe_infeasibility(history, summary.get("feasibility", {}).get("conflict"))
+        reason = describe_infeasibility(history, summary.get("feasibility"))
         advice = "" if history.failed.all() else f" Use {remedy} or looser constraints."
         console.print(f"{reason[0].upper()}{reason[1:]}.{advice}")
     elif volume["final"] == 0.0:

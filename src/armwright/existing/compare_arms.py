@@ -23,6 +23,7 @@ from armwright.pareto import front_indices, knee_index, paper_solution_indices
 from armwright.problem.facts import Fact, reach_facts
 from armwright.problem.over_reach import reach_lines
 from armwright.problem.problem import Problem
+from armwright.proof.design_record import compute_facts
 from armwright.robot.arm import Arm, Vector
 from armwright.robot.mounting import Mounting
 from armwright.robot.robot_descriptions import find_urdf
@@ -236,10 +237,10 @@ def _compared(
     history: History | None,
     name: str,
     arm: Arm,
-    notes: Sequence[str] = (),
-    price: float | None = None,
+    notes: Sequence[str],
+    price: float | None,
 ) -> ComparedArm:
-    """Evaluate an arm in its place; price: as stated [USD], in place of that of its parts."""
+    """Evaluate an existing arm in its place; price: as stated [USD], in place of that of its parts."""
     existing = ExistingArm(problem, problem.physics_of_arms(stack_arms([arm])), price)
     values, violated = existing.objectives, existing.violated
     unknown = [o.name for o, one in zip(problem.objectives, values, strict=True) if one is None]
@@ -274,6 +275,11 @@ def _chosen_designs(history: History) -> list[ComparedArm]:
 
 
 def _compared_design(history: History, member: FrontMember) -> ComparedArm:
-    name = f"#{member.number} {member.design.joints}"
-    compared = _compared(history.problem, None, name, member.arm)
-    return replace(compared, values=member.values, violated=(), notes=())
+    farthest = reach_lines(member.arm, float(history.problem.task.payloads.max()))[-1]
+    return ComparedArm(
+        name=f"#{member.number} {member.design.joints}",
+        joints=sum(joint.kind != "fixed" for joint in member.arm.joints),
+        base=member.arm.base,
+        values=member.values,
+        facts={**reach_facts(farthest), **compute_facts(history, [member.number])[member.number]},
+    )

@@ -58,6 +58,5 @@ def why_nothing(history: History, summary: Mapping[str, Any] | None) -> dict[str
     """Return why no design of a run with constraints is feasible, and the nearest one; None if one is feasible."""
     if not history.problem.constraints or not len(history) or history.feasible.any():
         return None
-    feasibility: Mapping[str, Any] = (summary or {}).get("feasibility") or {}
     (number,) = history.nearest(1)
-    return {"nearest": number, "description": describe_infeasibility(history, feasibility.get("conflict"))}
+    return {"nearest": number, "description": describe_infeasibility(history, (summary or {}).get("feasibility"))}

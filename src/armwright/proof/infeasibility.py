@@ -138,27 +138,28 @@ def _rounded(constraint: Constraint, violation: float) -> float:
     return float(f"{step * outwards(value / step - (1e-9 if outwards is math.ceil else -1e-9)):.{DIGITS}g}")
 
 
-def describe_infeasibility(history: History, record: Mapping[str, Any] | None = None) -> str:
+def describe_infeasibility(history: History, feasibility: Mapping[str, Any] | None = None) -> str:
     """Describe why a history has no feasible design.
 
     Args:
         history: The history; of a direct search, only the designs that it kept.
-        record: The conflicts of all evaluated designs, of `conflict_record`; None for those of the history.
+        feasibility: The result of `feasibility_record` of all evaluated designs; None for those of the history.
     """
     (number,) = history.nearest(1)
     failure, constraints = history.trials[number].failure, history.problem.constraints
     if failure is not None:
         return f"no evaluation succeeded; that of #{number}: {failure.description}"
+    found: Mapping[str, Any] = feasibility or {}
+    if found.get("nearest") is None:
+        found = feasibility_record(history)["feasibility"]
     pairs = zip(constraints, history.violations[number].tolist(), strict=True)
     worst_first = sorted(pairs, key=lambda pair: -pair[1])
     violated = [f"{c.description} ({c.measured(v):.4g} {c.quantity.unit})" for c, v in worst_first if v > 0.0]
     others = f", and {', '.join(violated[1:])}" if len(violated) > 1 else ""
-    faults = describe_faults(history.evaluation([number]), 0)
-    along = f"; along its cycle: {faults}" if faults else ""
-    found = record or conflict_record(constraints, ViolationTally.of(history.violations[~history.failed]))
+    along = f"; along its cycle: {found['nearest']['faults']}" if found["nearest"]["faults"] else ""
     return (
         f"no design meets all constraints yet; the nearest, #{number}, violates {violated[0]} most{others}{along}; "
-        f"{describe_conflict(found)}"
+        f"{describe_conflict(found['conflict'])}"
     )
 
 
@@ -187,7 +188,7 @@ def feasibility_record(history: History, tally: ViolationTally | None = None) ->
 
     Returns:
         nearest: If no design is feasible, the one with the smallest violation, the quantities that constraints bound,
-            and where along its cycle it is worst.
+            where along its cycle it is worst, and where it fails to follow it, in words.
         conflict: If no design is feasible, the result of `conflict_record`.
     """
     constraints = history.problem.constraints
@@ -197,13 +198,14 @@ def feasibility_record(history: History, tally: ViolationTally | None = None) ->
     nearest = conflict = None
     if not history.failed.all() and not history.feasible.any():
         (number,) = history.nearest(1)
-        violations = history.violations[number]
+        violations, evaluation = history.violations[number], history.evaluation([number])
         measured = [constraint.measured(value) for constraint, value in zip(constraints, violations, strict=True)]
         nearest = {
             "number": number,
             "violation": float(total_violation(violations[None])[0]),
             "measured": dict(zip(names, measured, strict=True)),
-            **path_record(history.evaluation([number]), 0),
+            **path_record(evaluation, 0),
+            "faults": describe_faults(evaluation, 0),
         }
         conflict = conflict_record(constraints, tally or ViolationTally.of(history.violations[~history.failed]))
     counts = (history.violations > 0.0).sum(axis=0).tolist()

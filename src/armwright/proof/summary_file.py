@@ -135,12 +135,31 @@ class _Search(_Record):
     reduced: _Reduced
 
 
+class _Nearest(_Record):
+    number: Count
+    faults: str
+
+
+class _Conflict(_Record):
+    designs: Count
+    satisfied_by: dict[str, Count]
+    conflicts: list[list[str]]
+    admitting: list[str]
+    admitting_alone: str | None
+
+
+class _Feasibility(_Record):
+    nearest: _Nearest | None
+    conflict: _Conflict | None
+
+
 class _Summary(_Record):
     n_trials: Count
     by_source: dict[str, Count]
     front_gap: FrontGap | None
     front_size: Count
     verification: _Verification | None
+    feasibility: _Feasibility | None = None
     assumed: dict[str, dict[str, float]] = {}
     recommended: list[_Recommended] = []
 
