@@ -38,7 +38,7 @@ def test_several_voltages_have_no_common_one() -> None:
     motors = {"restrict": {**SPACE["restrict"], "motor_1": "weak", **{f"motor_{k}": "XM540-W270" for k in range(2, 6)}}}
     desk = Desk(space={**SPACE, "actuators": ["XM540-W270", weak], **motors})
     assert {joint.actuator.voltage for joint in desk.arm.joints if joint.actuator} == {12.0, 24.0}
-    (facts,) = facts_of(desk.evaluation)
+    (facts,) = facts_of(desk.evaluation, [desk.arm])
     assert facts["voltage"].value is None
     assert describe_supply(facts).endswith("at several voltages")
 
@@ -55,7 +55,8 @@ def test_several_voltages_have_no_common_one() -> None:
 def test_unknown_drives_and_tasks_without_a_cycle_have_no_currents(
     space: dict[str, Any], task: dict[str, Any], reason: str
 ) -> None:
-    (facts,) = facts_of(Desk(space=space, **task).evaluation)
+    desk = Desk(space=space, **task)
+    (facts,) = facts_of(desk.evaluation, [desk.arm])
     assert (facts["peak_current"].value, facts["peak_current"].reason) == (None, reason)
     assert describe_supply(facts) == ""
 
@@ -69,7 +70,9 @@ def test_an_actuator_of_unknown_voltage_hides_only_the_designs_that_use_it() -> 
     assert len(groups) == 2
     for group in groups:
         chosen = [designs[row] for row in group]
-        for design, facts in zip(chosen, facts_of(problem.physics(chosen)), strict=True):
+        for design, facts in zip(
+            chosen, facts_of(problem.physics(chosen), [problem.arm(design) for design in chosen]), strict=True
+        ):
             assert (facts["voltages"].value is None) == ("weak" in design.motors)
 
 

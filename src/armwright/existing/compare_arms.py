@@ -254,7 +254,7 @@ def _compared(
         joints=int((existing.evaluation.arms.motion < FIXED).sum()),
         base=arm.base,
         values=values,
-        facts={**reach_facts(farthest), **existing.facts},
+        facts={**reach_facts(farthest), **existing.facts(arm)},
         dominates=dominates,
         dominated_by=dominated_by,
         violated=violated,

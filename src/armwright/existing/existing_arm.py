@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from armwright.problem.objectives import (
     SPEED_UTILISATION,
 )
 from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm
 from armwright.text import rounded
 
 
@@ -49,10 +49,9 @@ class ExistingArm:
             return self.price
         return finite_or_none(known_values(quantity, self.evaluation, minimised)[0][0])
 
-    @cached_property
-    def facts(self) -> Facts:
-        """What is known of the arm."""
-        (facts,) = facts_of(self.evaluation, known=known_values)
+    def facts(self, arm: Arm) -> Facts:
+        """Return what is known of the arm, which was evaluated."""
+        (facts,) = facts_of(self.evaluation, [arm], known_values)
         stated = {} if self.price is None else {PRICE.name: fact_of(PRICE, self.price)}
         return {**facts, **stated}
 

@@ -15,9 +15,10 @@ from armwright.arrays import Array, finite_or_none
 from armwright.problem.drive_quantities import RATINGS
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import QUANTITIES
+from armwright.problem.objectives import MASS, QUANTITIES
 from armwright.problem.over_reach import ReachLine
 from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm
 from armwright.spaces.parameters import Design
 from armwright.tasks.moments import MAX_MASS
 from armwright.text import significant
@@ -72,20 +73,26 @@ def fact_of(quantity: Objective, value: float | None, reason: str = "") -> Fact:
 
 
 def facts_of(
-    evaluation: Evaluation, known: Callable[[Objective, Evaluation], tuple[Array, str]] = Objective.known
+    evaluation: Evaluation,
+    arms: Sequence[Arm],
+    known: Callable[[Objective, Evaluation], tuple[Array, str]] = Objective.known,
 ) -> list[Facts]:
     """Return the facts of each arm of an evaluation; what is not known of one is not known of any.
 
-    known: Returns values or the reason why they are not known, as `Objective.known`.
+    Args:
+        evaluation: Physics of N arms.
+        arms: The same arms.
+        known: Returns values or the reason why they are not known, as `Objective.known`.
     """
     columns = [(quantity, *known(quantity, evaluation)) for quantity in QUANTITIES.values()]
     currents = [_voltage(evaluation, row) for row in range(len(evaluation))]
     return [
         {
             **{q.name: fact_of(q, finite_or_none(values[row]), reason) for q, values, reason in columns},
+            MASS.name: fact_of(MASS, arm.mass),  # which arrays have in the precision of the kernels
             VOLTAGE: currents[row],
         }
-        for row in range(len(evaluation))
+        for row, arm in enumerate(arms)
     ]
 
 

@@ -126,7 +126,9 @@ def compute_facts(history: History, numbers: Sequence[int]) -> dict[int, Facts]:
     """Return the facts of designs by number."""
     found: dict[int, Facts] = {}
     for group in _alike(history, numbers):
-        found |= zip(group, facts_of(history.evaluation(group)), strict=True)
+        found |= zip(
+            group, facts_of(history.evaluation(group), [history.member(number).arm for number in group]), strict=True
+        )
     return found
 
 
@@ -148,8 +150,8 @@ def _records(
     payload = float(history.problem.task.payloads.max())
     for group in _alike(history, numbers):
         evaluation = history.evaluation(group)
-        for row, (number, facts) in enumerate(zip(group, facts_of(evaluation), strict=True)):
-            arm = history.member(number).arm
+        arms = [history.member(number).arm for number in group]
+        for row, (number, arm, facts) in enumerate(zip(group, arms, facts_of(evaluation, arms), strict=True)):
             extra: dict[str, Any] = {}
             if number in recommended:
                 facts = {**reach_facts(reach_lines(arm, payload)[-1]), **facts}

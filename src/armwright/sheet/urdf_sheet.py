@@ -211,7 +211,7 @@ def _parts(actuators: Mapping[str, ActuatorRecord]) -> tuple[Part, ...]:
 def _facts(arm: Arm, existing: ExistingArm | None, price: float | None) -> Facts:
     """Return what is known of an arm; without a task, its mass and its price."""
     if existing is not None:
-        facts = dict(existing.facts)
+        facts = dict(existing.facts(arm))
     else:
         facts = {name: fact_of(quantity, None, NO_TASK) for name, quantity in QUANTITIES.items()}
         facts[VOLTAGE] = Fact("Supply voltage", "V", "The voltage of all actuators.", None, NO_TASK)
