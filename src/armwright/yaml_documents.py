@@ -8,15 +8,12 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from yaml.composer import Composer
 
-from armwright.exceptions import did_you_mean
 from armwright.files import read_text
-from armwright.schema_types import owners_of
-from armwright.validation_messages import describe_fault
+from armwright.validation_messages import describe_fault, describe_unknown_key
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
 MAX_BYTES = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has about 0.3 MB
-RENAMED = {"jitter": "target_noise", "link_radius": "link_section"}  # former keys of files
 MAX_NODES = 400_000  # values in a document; 10,000 targets with all their keys have 240,000
 
 
@@ -43,14 +40,9 @@ def load_document(text: str, error: type[Exception], where: str) -> Any:
 
 def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str) -> Schema:
     """Validate `data` as a value of `schema`; `where` names it in messages."""
-    keys = document_keys(schema)
     for key in data:
-        if key not in keys:
-            allowed = ", ".join(keys)
-            hint = did_you_mean(str(key), keys, RENAMED)
-            owners = owners_of(str(key), schema)
-            place = f" It is a key of {' and '.join(owners)}." if owners else ""
-            raise error(f'{where}: unknown key "{key}".{place} Allowed: {allowed}.{hint}')
+        if key not in document_keys(schema):
+            raise error(f"{where}: {describe_unknown_key(str(key), (), schema)}")
     try:
         return schema.model_validate(data)
     except ValidationError as fault:

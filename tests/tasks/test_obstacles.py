@@ -67,15 +67,21 @@ def test_valid_obstacles_are_accepted() -> None:
 @pytest.mark.parametrize(
     ("records", "words"),
     [
-        ([{"kind": "bxo"}], 'obstacle 1: unknown kind "bxo". Did you mean "box"? Kinds: box, sphere, '),
-        ([RECORDS[0], {"center": [0, 0, 0]}], "obstacle 2: kind is missing. Kinds: box, "),
+        (
+            [{"kind": "bxo"}],
+            'obstacles[0]: kind: expected one of box, sphere, cylinder, ground, got "bxo". Did you mean "box"?',
+        ),
+        (
+            [RECORDS[0], {"center": [0, 0, 0]}],
+            "obstacles[1]: kind: expected one of box, sphere, cylinder, ground, but the key is missing",
+        ),
         (
             [{**RECORDS[1], "siez": 1}],
-            'obstacle 1: unknown key "siez". Allowed: kind, name, center, size, yaw, rpy. Did you mean "size"?',
+            'obstacles[0]: unknown key "siez". Did you mean "size"? Allowed: kind, name, center, size, yaw, rpy',
         ),
         (
             [{"kind": "sphere", "center": [0, 0, 0]}],
-            "obstacle 1: radius: expected a number [m], but the key is missing",
+            "obstacles[0].radius: expected a number [m], but the key is missing",
         ),
         ([{**RECORDS[2], "radius": 0}], "radius: expected a number above 0 m, got 0"),
         ([{**RECORDS[2], "radius": 1001}], "radius: expected a number of at most 1000 m, got 1001"),
@@ -97,7 +103,7 @@ def test_invalid_obstacles_are_refused_in_one_line(records: list[object], words:
 
 
 def test_mapping_instead_of_a_list_is_refused() -> None:
-    with pytest.raises(TaskError, match="obstacles: expected a list of records, such as"):
+    with pytest.raises(TaskError, match="obstacles: expected a list, each entry a record, got"):
         parse_document("name: a\ntargets: [[0, 0, 1]]\nobstacles: {kind: ground}", Task, TaskError, "a.yaml")
 
 

@@ -139,20 +139,3 @@ def test_prompt_states_tool_and_payload() -> None:
     assert "The tip is 0.02, -0.03, 0.1 m from the end of the last link" in prompt
     assert "the tool has 0.7 kg, with its centre of mass at (0, 0, 0.05) m" in prompt
     assert "0.8 kg, centre at (0.02, -0.01, 0.05) m in the tip frame, a box of (0.06, 0.04, 0.1) m" in prompt
-
-
-@pytest.mark.parametrize(
-    ("payload", "words"),
-    [
-        ({"mas": 0.5}, r'Did you mean "mass"\?'),
-        ({"center": [0.0, 0.0, 0.1]}, r"payload: mass: expected a number \[kg\], but the key is missing"),
-        ({"mass": 0.0}, "payload: mass"),
-        ({"mass": 0.5, "size": [0.1, 0.1]}, "payload: size"),
-        ({"mass": 0.5, "size": [0.1, 0.1, 0.0]}, "payload: size"),
-        ({"mass": 0.5, "size": [0.1, 0.1, 0.1], "inertia": [1e-3, 1e-3, 1e-3]}, "expected size or inertia, got both"),
-        ({"mass": 0.5, "inertia": [1e-3, 1e-3, 3e-3]}, "at most the sum of the other two"),
-    ],
-)
-def test_invalid_payload_is_refused(payload: object, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        task(payload=payload)

@@ -219,5 +219,5 @@ targets = st.builds(
 def test_template_holds_the_targets(target: Target | Point) -> None:
     text = task_template(Path("mine.yaml"), [target])
     task = parse_document(text, Task, TaskError, "mine.yaml")
-    assert task.target_specs == (target,)
+    assert task.targets == (target,)
     assert len(yaml.safe_load(text)["targets"]) == 1

@@ -130,9 +130,9 @@ def show_task(
     reference = task.reference_point
     print_named(console, task.name, f": {task.description}" if task.description else "")
     if not is_brief:
-        points = " ".join(format_point(target) for target in task.targets)
+        points = " ".join(format_point(point) for point in task.target_positions.tolist())
         console.print(f"  {len(task.targets)} targets [m]: {points}")
-        for line in describe_targets(task.target_specs):
+        for line in describe_targets(task.targets):
             console.print(f"  {line}")
     if task.restarts:
         console.print(f"  {task.restarts + 1} initial postures of the inverse kinematics per target")
@@ -169,7 +169,7 @@ def show_target_table(console: Console, problem: Problem) -> None:
     heads = ("x [m]", "y [m]", "z [m]", "tolerance [mm]", "payload [kg]", f"nearest{NO_BREAK}base [m]")
     distances = distance_to_bases(problem.space, task.target_positions)
     rows: list[list[str]] = []
-    for i, point in enumerate(task.targets[:MAX_ROWS]):
+    for i, point in enumerate(task.target_positions[:MAX_ROWS].tolist()):
         values = (*point, 1e3 * arrays.tolerance[i], task.payloads[i], distances[i])
         rows.append([task.target_names[i], *(f"{value:.4g}" for value in values), _tool_direction(arrays, i)])
     console.print(f"  {len(task.targets)} targets:")

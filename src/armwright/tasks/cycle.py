@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Literal, Self, cast
 
-from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, StrictInt, StrictStr, field_validator, model_validator
 
 from armwright.exceptions import did_you_mean
 from armwright.tasks.targets import MIN_TOLERANCE
@@ -21,23 +21,7 @@ NEAR_DIRECTION = 0.02  # [rad] likewise
 _BY: Mapping[By, str] = {"line": "a line", "joint": "a joint motion"}
 
 
-def _check_duration(value: Any) -> Any:
-    is_time = isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 < value <= MAX_DURATION
-    if value != FASTEST and not is_time:
-        raise ValueError(f"expected seconds above 0, or {FASTEST}, got {value!r:.80}")
-    return value
-
-
-def _check_reference(value: Any) -> Any:
-    if isinstance(value, bool) or not isinstance(value, (int, str)):
-        raise ValueError(f"expected the name of a target or its number, from 1, got {value!r:.80}")
-    return value
-
-
-Duration = Annotated[
-    Literal["fastest"] | Annotated[float, Field(gt=0.0, le=MAX_DURATION)], BeforeValidator(_check_duration)
-]  # [s]
-Reference = Annotated[str | int, BeforeValidator(_check_reference)]
+Duration = Literal["fastest"] | Annotated[float, Field(gt=0.0, le=MAX_DURATION)]  # [s]
 
 
 class Strict(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -54,7 +38,7 @@ class Step(Strict, frozen=True):
         time: Duration from the previous target to this one [s], or fastest; by default the cycle's.
     """
 
-    to: Reference
+    to: StrictStr | StrictInt
     by: By = "joint"
     do: Action | None = None
     time: Duration | None = None
@@ -162,13 +146,6 @@ class Cycle(Strict, frozen=True):
             loaded.append(holds)
             holds = holds if step.do is None else step.do == "pick"
         return tuple(loaded)
-
-
-def read_cycle(value: Any, n_targets: int) -> Any:
-    """Return the steps that `in_order` stands for, and anything else unchanged, for pydantic to validate."""
-    if value != IN_ORDER:
-        return value
-    return {"closed": False, "steps": [{"to": number, "by": "line"} for number in range(1, n_targets + 1)]}
 
 
 def target_indices(steps: Sequence[Step], names: Mapping[str, int], n_targets: int) -> tuple[int, ...]:

@@ -1,13 +1,12 @@
 """Payloads that the tip carries."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Self
 
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.tasks.moments import MAX_MASS, Moments, check_moments, describe_vector
 from armwright.tasks.targets import MAX_COORDINATE, Position
-from armwright.yaml_documents import check_document
 
 Side = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
 Vector = tuple[float, float, float]
@@ -66,10 +65,3 @@ class Payload(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         parts += [] if self.size is None else [f"a box of {describe_vector(self.size)} m"]
         parts += [] if self.inertia is None else [f"moments of inertia {describe_vector(self.inertia)} kg m²"]
         return ", ".join(parts)
-
-
-def read_payload(value: Any) -> Any:
-    """Return the payload of a record in a task file, and anything else as it is."""
-    if not isinstance(value, dict):
-        return value
-    return check_document(cast("dict[Any, Any]", value), Payload, ValueError, "payload")

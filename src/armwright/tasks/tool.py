@@ -1,13 +1,12 @@
 """The tool that an arm carries at the end of its last link."""
 
 import math
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Self
 
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.tasks.moments import MAX_MASS, Moments, check_moments, describe_vector
 from armwright.tasks.targets import Position
-from armwright.yaml_documents import check_document
 
 Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]  # [rad]
 
@@ -52,12 +51,3 @@ class Tool(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
 
 NO_TOOL = Tool()
-
-
-def read_tool(value: Any) -> Tool:
-    """Return the tool of a record in a task file; raise ValueError for anything else."""
-    if isinstance(value, Tool):
-        return value
-    if not isinstance(value, dict):
-        raise ValueError(f"tool: expected a record such as {{tip: [0, 0, 0.1], mass: 0.35}}, got {value!r:.80}")
-    return check_document(cast("dict[Any, Any]", value), Tool, ValueError, "tool")
