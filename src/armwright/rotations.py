@@ -52,6 +52,13 @@ def rotation_to_axis(axis: Sequence[float] | Array) -> Array:
     return np.column_stack([x, np.cross(z, x), z])
 
 
+def rotation_about(axis: Array, angle: Array) -> Array:
+    """Return the (..., 3, 3) rotations by angles (...,) [rad] about a unit vector (3,), by Rodrigues' formula."""
+    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    s, c = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
+    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
+
+
 def cone_directions(axis: Sequence[float] | Array, half_angle: float, n: int) -> Array:
     """Return (n, 3) unit vectors spread evenly over a cone, by Fibonacci's lattice.
 

@@ -6,10 +6,10 @@ and get the default of the actuator's kind.
 
 import csv
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import resources
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -164,26 +164,9 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
     def actuator(self) -> Actuator:
         """Return the actuator of an arm, with the values of `completed`."""
-        values = self.completed()
-        return Actuator(
-            name=self.name,
-            mass=self.mass,
-            peak_torque=cast("float", values.peak_torque),
-            speed=self.speed,
-            price=self.price,
-            continuous_torque=values.rated_torque,
-            corner_speed=values.corner_speed,
-            rotor_inertia=values.rotor_inertia,
-            coulomb_friction=values.coulomb_friction,
-            viscous_friction=values.viscous_friction,
-            backlash=values.backlash,
-            joint_stiffness=values.joint_stiffness,
-            position_gain=values.position_gain,
-            damping_gain=values.damping_gain,
-            voltage=self.voltage,
-            current=values.current,
-            shape=self.body_shape,
-        )
+        values = dict(self.completed())
+        values |= {"continuous_torque": values["rated_torque"], "shape": self.body_shape}
+        return Actuator(**{field.name: values[field.name] for field in fields(Actuator)})
 
 
 def value_of(record: ActuatorRecord, name: str) -> float | None:
@@ -194,15 +177,10 @@ def value_of(record: ActuatorRecord, name: str) -> float | None:
 
 @dataclass(frozen=True)
 class Source:
-    """The source of a value.
+    """The source of a value."""
 
-    Attributes:
-        address: Where it is published.
-        statement: What is stated there, and how the value follows from it.
-    """
-
-    address: str
-    statement: str
+    address: str  # where it is published
+    statement: str  # what is stated there, and how the value follows from it
 
 
 @cache

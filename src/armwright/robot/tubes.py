@@ -16,15 +16,10 @@ MODULI = 1e6, 2e12  # [Pa], from rubber to diamond; values below are probably in
 
 @dataclass(frozen=True, slots=True)
 class Tube:
-    """The section of a round tube; a solid bar if the wall is half the diameter.
+    """The section of a round tube; a solid bar if the wall is half the diameter."""
 
-    Attributes:
-        outer_diameter: [m].
-        wall: Wall thickness [m], at most half the diameter.
-    """
-
-    outer_diameter: float
-    wall: float
+    outer_diameter: float  # [m]
+    wall: float  # wall thickness [m], at most half the diameter
 
     @property
     def name(self) -> str:

@@ -23,19 +23,13 @@ Name = Annotated[str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9 ._-]{0,39})?$")]
 
 @dataclass(frozen=True)
 class Solid:
-    """The shape of an obstacle in its own frame, for kernels and drawings.
+    """The shape of an obstacle in its own frame, for kernels and drawings."""
 
-    Attributes:
-        shape: The kind of the shape.
-        centre: The origin of the frame in the world [m]; a point of the surface for the ground.
-        rotation: (3, 3) the axes of the frame in the world as columns.
-        half: Half the sides of a box; radius, radius and half the height of a cylinder; three radii of a sphere [m].
-            Zeros for the ground, which fills everything below its x and y axes.
-    """
-
-    shape: Shape
-    centre: Point
-    rotation: NDArray[np.float64]
+    shape: Shape  # kind of the shape
+    centre: Point  # origin of the frame in the world [m]; a point of the surface for the ground
+    rotation: NDArray[np.float64]  # (3, 3) the axes of the frame in the world as columns
+    # Half the sides of a box; radius, radius and half the height of a cylinder; three radii of a sphere [m].
+    # Zeros for the ground, which fills everything below its x and y axes.
     half: Point
 
     def contains(self, points: NDArray[np.float64], depth: float = 0.0) -> NDArray[np.bool_]:

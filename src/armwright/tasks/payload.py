@@ -14,34 +14,22 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class LoadShape:
-    """How the mass of a payload is distributed, whatever that mass, in the tip frame.
+    """How the mass of a payload is distributed, whatever that mass, in the tip frame."""
 
-    Attributes:
-        center: Centre of mass [m].
-        gyration: Moments of inertia about the centre, around x, y and z, per mass [m²].
-    """
-
-    center: Vector = (0.0, 0.0, 0.0)
-    gyration: Vector = (0.0, 0.0, 0.0)
+    center: Vector = (0.0, 0.0, 0.0)  # centre of mass [m]
+    gyration: Vector = (0.0, 0.0, 0.0)  # moments of inertia about the centre, around x, y and z, per mass [m²]
 
 
 POINT_LOAD = LoadShape()
 
 
 class Payload(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """A rigid payload, in the tip frame.
+    """A rigid payload, in the tip frame."""
 
-    Attributes:
-        mass: [kg].
-        center: Centre of mass [m].
-        size: Sides of a box of uniform density along x, y and z [m].
-        inertia: Instead of a size, moments about the centre of mass, around x, y and z [kg m²].
-    """
-
-    mass: float = Field(gt=0.0, le=MAX_MASS)
-    center: Position = (0.0, 0.0, 0.0)
-    size: tuple[Side, Side, Side] | None = None
-    inertia: Moments | None = None
+    mass: float = Field(gt=0.0, le=MAX_MASS)  # [kg]
+    center: Position = (0.0, 0.0, 0.0)  # centre of mass [m]
+    size: tuple[Side, Side, Side] | None = None  # sides of a box of uniform density along x, y and z [m]
+    inertia: Moments | None = None  # instead of a size, moments about the centre of mass, around x, y and z [kg m²]
 
     @model_validator(mode="after")
     def _check(self) -> Self:
