@@ -12,7 +12,6 @@ from armwright.exceptions import did_you_mean
 from armwright.schema_types import all_keys_of, field_path, keys_of, members_of, owners_of, type_at
 from armwright.units import KEY_UNITS, read_quantity
 
-RENAMED = {"jitter": "target_noise", "link_radius": "link_section"}  # former keys of files
 _COUNTS = {2: "two", 3: "three", 4: "four"}
 _DIRECTIONS = {"down": "[0, 0, -1]", "up": "[0, 0, 1]"}
 _BOUNDS = {
@@ -58,7 +57,7 @@ def describe_unknown_key(key: str, path: Sequence[str | int], schema: Any, alter
     known = dict.fromkeys(name for record in named or members for name in all_keys_of(record))
     owners = owners_of(key, path, schema)
     place = f" It is a key of {' and '.join(owners)}." if owners else ""
-    return f'unknown key "{key}".{did_you_mean(key, known, RENAMED)}{place} Allowed: {", ".join(known)}'
+    return f'unknown key "{key}".{did_you_mean(key, known)}{place} Allowed: {", ".join(known)}'
 
 
 def _describe(error: ErrorDetails, path: Sequence[str | int], schema: Any, data: Any) -> str:

@@ -1,6 +1,6 @@
 """Untrusted YAML documents: read safely, checked against a schema, refused with a one-line error."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -9,6 +9,7 @@ from pydantic import BaseModel, ValidationError
 from yaml.composer import Composer
 
 from armwright.files import read_text
+from armwright.text import one_line
 from armwright.validation_messages import describe_fault, describe_unknown_key
 
 Schema = TypeVar("Schema", bound=BaseModel)
@@ -99,7 +100,7 @@ class _DocumentLoader(_Loader):
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         seen: set[str] = set()
-        for key in _scalar_keys(node):
+        for key in (str(key.value) for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             if key in seen:
                 raise yaml.YAMLError(f'duplicate key "{key}"')
             seen.add(key)
@@ -109,26 +110,12 @@ class _DocumentLoader(_Loader):
 _NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
-def _scalar_keys(node: Any) -> Iterator[str]:
-    for key, _ in getattr(node, "value", ()):
-        if isinstance(key, yaml.ScalarNode):
-            yield str(key.value)
-
-
 def _yaml_fault(fault: Exception) -> str:
     mark = getattr(fault, "problem_mark", None)
     problem = getattr(fault, "problem", None)
     if mark is not None and problem:
         return f"{problem}, line {mark.line + 1}, column {mark.column + 1}"
-    return "nested too deeply" if isinstance(fault, RecursionError) else _shorten(fault)
-
-
-def _shorten(value: object) -> str:
-    try:
-        text = str(value).replace("\n", " ")
-    except ValueError:  # an integer of more than 4300 digits
-        text = "a huge number"
-    return text if len(text) <= 80 else text[:77] + "..."
+    return "nested too deeply" if isinstance(fault, RecursionError) else one_line(str(fault), 80)
 
 
 class _DocumentDumper(yaml.SafeDumper):

@@ -18,7 +18,6 @@ from armwright.existing.base_placement import placed
 from armwright.existing.compare_arms import (
     EXISTING_ARMS,
     ArmComparison,
-    ComparedArm,
     compare_arms,
     dominance_counts,
     read_existing_arms,
@@ -454,12 +453,3 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
         assert done.returncode == 2
         (line,) = done.stderr.strip().splitlines()
         assert words in line
-
-
-def test_comparison_without_a_run_has_no_designs(compared: ArmComparison) -> None:
-    comparison = compare_arms(TASK, [UR5], space=SPACE, base=(0.0, 0.0, 0.0))
-    (arm,) = comparison.arms
-    assert isinstance(arm, ComparedArm)
-    assert (arm.dominates, arm.dominated_by, comparison.designs, comparison.run) == (None, None, (), None)
-    assert len(compared.designs) >= 2
-    assert all(design.name.startswith("#") for design in compared.designs)

@@ -1,6 +1,7 @@
 """URDF files in Pinocchio, MuJoCo, yourdfpy and scikit-robot."""
 
 import io
+from collections.abc import Callable
 from xml.etree import ElementTree
 
 import mujoco
@@ -9,28 +10,15 @@ import pinocchio
 import pytest
 import yourdfpy
 
-from armwright.robot.arm import Arm, Joint, Link, uniform_link
+from armwright.robot.arm import Arm, Joint, Link
+from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from tests.support import reference_kinematics as reference
 from tests.support.arms import general_arms, paper_arms
+from tests.support.exported_arms import BARE, moving
 
 ARMS = [*paper_arms(2, 4, 21), *general_arms(2, 3, 22), *general_arms(2, 8, 23)]
-MIXED = Arm(
-    (0.1, -0.2, 0.3),
-    (Joint("fixed", "x"), Joint("prismatic", "z", -0.1, 0.4), Joint("revolute", "y", -1.0, 2.0), Joint("fixed", "z")),
-    (
-        Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.02),  # no mass
-        uniform_link((0.1, 0.0, 0.0), 0.4, 0.02),
-        Link((0.0, 0.0, 0.0), 0.3, (0.0, 0.0, 0.0), 0.02),  # no length
-        uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),  # downward
-    ),
-)
-EVERY_ARM = pytest.mark.parametrize("arm", [*ARMS, MIXED])
-
-
-def moving(arm: Arm) -> list[tuple[int, Joint]]:
-    """(number from 1, joint) of the joints that move."""
-    return [(number, joint) for number, joint in enumerate(arm.joints, start=1) if joint.kind != "fixed"]
+EVERY_ARM = pytest.mark.parametrize("arm", [*ARMS, BARE])
 
 
 def cylinder_inertia(link: Link) -> np.ndarray:
@@ -138,15 +126,10 @@ def test_massless_arm_has_no_mass_in_any_parser() -> None:
     assert sum(inertia.mass for inertia in pinocchio.buildModelFromXML(to_urdf(arm)).inertias) == 0.0
 
 
-@pytest.mark.parametrize("name", ['<arm> & "friends"', "it's", "Ärmchen", "a]]>b"])
-def test_names_are_escaped(name: str) -> None:
-    text = to_urdf(ARMS[0], name)
-    assert ElementTree.fromstring(text).get("name") == name
-    assert pinocchio.buildModelFromXML(text).name == name
+@pytest.mark.parametrize("write", [to_urdf, to_mjcf])
+@pytest.mark.parametrize("name", ['<arm> & "friends"', "it's", "Ärmchen", "a]]>b", "", "two\nlines", "x" * 5000])
+def test_names_are_escaped(name: str, write: Callable[[Arm, str], str]) -> None:
+    text = write(ARMS[0], name)
+    root = ElementTree.fromstring(text)
+    assert root.get("name" if write is to_urdf else "model") == name
     assert mujoco.MjModel.from_xml_string(text).nv == 4
-
-
-def test_export_is_deterministic() -> None:
-    """The text holds no time and no arbitrary order."""
-    assert to_urdf(ARMS[0]) == to_urdf(ARMS[0])
-    assert to_urdf(ARMS[0]).startswith('<?xml version="1.0"?>\n<robot name="arm">')

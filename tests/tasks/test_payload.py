@@ -8,11 +8,8 @@ import pytest
 
 from armwright.kinematics.arms.arm_arrays import carrying, stack_arms
 from armwright.kinematics.ik.ik import solve_postures
-from armwright.llm.prompt import load_prompt
-from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.payload import Payload
 from armwright.tasks.task import Task
@@ -124,18 +121,3 @@ def test_shape_of_a_payload_does_not_change_other_arms_of_the_batch() -> None:
     points = rng.uniform(-0.4, 0.4, (4, 3))
     one, other = (solve_postures(arrays, points, payload=mass).torque for arrays in (plain, mixed))
     assert np.array_equal(one[::2], other[::2])
-
-
-def test_number_is_a_point_mass_at_the_tip() -> None:
-    problem = Problem(task(payload=0.8), SPACE)
-    designs = SPACE.sample(5, 6)
-    alone = evaluate([problem.arm(design) for design in designs], POINTS, payload=0.8)
-    assert np.array_equal(problem.physics(designs).joint_torques, alone.joint_torques)
-
-
-def test_prompt_states_tool_and_payload() -> None:
-    problem = Problem(task(tool=TOOL, payload=BOX.model_dump()), SPACE)
-    prompt = load_prompt("plus").render(History(problem, [], 1, problem.reference_point), 0)
-    assert "The tip is 0.02, -0.03, 0.1 m from the end of the last link" in prompt
-    assert "the tool has 0.7 kg, with its centre of mass at (0, 0, 0.05) m" in prompt
-    assert "0.8 kg, centre at (0.02, -0.01, 0.05) m in the tip frame, a box of (0.06, 0.04, 0.1) m" in prompt

@@ -72,7 +72,6 @@ POINT = "name: a\ntargets: [[0, 0, 0]]\n"
         ("name: ../../etc\ntargets: [[0, 0, 0]]", "name"),
         ("targets: [[0, 0, 0]]", "name"),
         ("name: a\ntargets: 3", "targets"),
-        (POINT + "jitter: 0.01", 'It is now called "target_noise".'),
         (POINT + "restarts: -1", "restarts: expected a number of at least 0, got -1"),
         (POINT + "reference_point: [0, 5]", "above 0"),
         (POINT + "reference_point: []", "reference_point"),

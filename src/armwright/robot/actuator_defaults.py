@@ -74,20 +74,13 @@ def default_values(
     return values
 
 
-@dataclass(frozen=True)
-class DefaultShape:
-    """Shape of an actuator, and which of its edges is along its shaft."""
-
-    shape: BodyShape
-    shaft_edge: Literal["width", "height", "depth"]
-
-
-def default_shape(kind: ActuatorKind, width: float, height: float, depth: float) -> DefaultShape:
-    """Return the default shape of a kind with these edges [m].
+def default_shape(
+    kind: ActuatorKind, width: float, height: float, depth: float
+) -> tuple[BodyShape, Literal["width", "height", "depth"]]:
+    """Return the default shape of a kind with these edges [m], and which of them is along its shaft.
 
     Two equal edges are those of a square or round section about the shaft. Otherwise makers of servos state the depth
     along it. Servos and geared drives are boxes, flat drives are cylinders.
     """
-    round_kinds = ("quasi-direct-drive", "harmonic")
     edge = "width" if height == depth != width else "height" if width == depth != height else "depth"
-    return DefaultShape("cylinder" if kind in round_kinds else "box", edge)
+    return "cylinder" if kind in ("quasi-direct-drive", "harmonic") else "box", edge

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.rotations import rotation_about
-from armwright.tasks.cycle import Action, By, Cycle
+from armwright.tasks.cycle import By, Cycle
 from armwright.tasks.targets import ORIENTATION, TargetArrays
 
 LINE_STEP = 0.02  # [m] largest distance of two samples of a line
@@ -224,7 +224,7 @@ def _motions(cycle: Cycle, targets: Sequence[int], points: dict[int, int]) -> tu
     for step in order:
         carries, do = carried[step], cycle.steps[step].do
         here, there = targets[step - 1], targets[step]
-        out, into = _approached(cycle.steps[step - 1].do, points), _approached(do, points)
+        out, into = (bool(points) and action is not None for action in (cycle.steps[step - 1].do, do))
         if out:
             motions.append(Motion(step, "line", here, points[here], carries, arrives=False))
             here = points[here]
@@ -234,10 +234,6 @@ def _motions(cycle: Cycle, targets: Sequence[int], points: dict[int, int]) -> tu
         else:
             motions.append(Motion(step, cycle.steps[step].by, here, there, carries, arrives=True))
     return tuple(motions)
-
-
-def _approached(do: Action | None, points: dict[int, int]) -> bool:
-    return do is not None and bool(points)
 
 
 def line_steps(poses: Poses, start: int, end: int) -> int:

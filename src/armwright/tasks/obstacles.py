@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from armwright.tasks.targets import MAX_COORDINATE, Coordinate, Point, Position
 
 Shape = Literal["box", "sphere", "cylinder", "ground"]
 
-SHAPES: tuple[Shape, ...] = ("box", "sphere", "cylinder", "ground")
+SHAPES: tuple[Shape, ...] = get_args(Shape)
 MAX_OBSTACLES = 100
 
 Size = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
