@@ -1,5 +1,6 @@
 """Messages about values that a schema refuses: the key, what is expected with its unit, what was found, what to try."""
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from types import NoneType
@@ -198,25 +199,12 @@ def _is_one_point(annotation: Any, around: Any) -> bool:
 
 
 def show(value: Any) -> str:
-    """Return a value as YAML writes it, shortened."""
+    """Return a value as YAML reads it, shortened."""
     try:
-        text = _flow(value)
+        text = json.dumps(value, ensure_ascii=False, skipkeys=True, default=str)
     except ValueError:  # an integer of more than 4300 digits
         text = "a huge number"
     return text if len(text) <= 80 else text[:77] + "..."
-
-
-def _flow(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_flow, cast('list[Any]', value)))}]"
-    if isinstance(value, dict):
-        pairs = cast("dict[Any, Any]", value).items()
-        return f"{{{', '.join(f'{key}: {_flow(entry)}' for key, entry in pairs)}}}"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if value is None:
-        return "nothing"
-    return '"' + value.replace("\n", " ") + '"' if isinstance(value, str) else str(value)
 
 
 def _value_at(data: Any, path: Sequence[str | int]) -> Any:

@@ -38,13 +38,9 @@ class Actuator:
     shape: ActuatorShape | None = None
 
     def __post_init__(self) -> None:
-        values = (getattr(self, field.name) for field in fields(self) if field.name not in ("name", "shape"))
-        numbers = [value for value in values if value is not None]
-        if not all(0.0 <= value < math.inf for value in numbers) or 0.0 in (
-            self.peak_torque,
-            self.speed,
-            self.joint_stiffness,
-        ):
+        numbers = [getattr(self, field.name) for field in fields(self) if field.name not in ("name", "shape")]
+        positive = (self.peak_torque, self.speed, self.joint_stiffness)
+        if 0.0 in positive or not all(value is None or 0.0 <= value < math.inf for value in numbers):
             raise ArmError(
                 "an actuator needs peak_torque, speed and joint_stiffness > 0, and no value below 0, all finite: "
                 f"{self}"

@@ -71,20 +71,19 @@ def parse_points(text: str, unit: str | None, where: str, offset: Point = (0.0, 
     if unit is not None and unit not in UNITS:
         raise TaskError(f'unit: expected {" or ".join(UNITS)}, got "{unit}"')
     (first, header), *rows = _read_table(text, where)
-    heads = [_read_head(cell) for cell in header]
-    direction = _check_columns(header, [name for name, _ in heads], f"{where}, line {first}")
-    factors = _factors(header, heads, unit, f"{where}, line {first}")
-    index = {name: heads.index((name, own)) for name, own in heads}
-    unused = [cell for cell, (name, _) in zip(header, heads, strict=True) if name not in _COLUMNS]
+    columns = _find_columns(header, unit, f"{where}, line {first}")
+    read = {index for index, _ in columns.values()}
+    unused = [cell for index, cell in enumerate(header) if index not in read]
     notes = [f"columns not used: {quote_names(unused)}"] if unused else []
-    numeric = (*POSITION, *direction)
-    if comma := _decimal_comma(((line, cells[index[name]]) for line, cells in rows for name in numeric), where)[:40]:
+    numbers = {name: column for name, column in columns.items() if name != NAME}
+    cells_of_numbers = ((line, cells[index]) for line, cells in rows for index, _ in numbers.values())
+    if comma := _decimal_comma(cells_of_numbers, where)[:40]:
         notes.append(f"numbers have decimal commas: {comma} is read as {comma.replace(',', '.')}")
     targets: list[Point | Target] = []
     lines: dict[str, int] = {}
     for line, cells in rows:
-        place, name = f"{where}, line {line}", cells[index[NAME]] if NAME in index else ""
-        values = [_read_number(cells[index[key]], f"{place}: {key}") * factors[key] for key in numeric]
+        place, name = f"{where}, line {line}", cells[columns[NAME][0]] if NAME in columns else ""
+        values = [_read_number(cells[i], f"{place}: {key}") * size for key, (i, size) in numbers.items()]
         if not re.fullmatch(TARGET_NAME, name):
             raise TaskError(
                 f"{place}: name: expected a letter, then at most 39 letters, digits, spaces, dots, _ or -, "
@@ -93,7 +92,7 @@ def parse_points(text: str, unit: str | None, where: str, offset: Point = (0.0, 
         if name and lines.setdefault(name, line) != line:
             raise TaskError(f'{place}: the name "{name}" is also in line {lines[name]}; rename one')
         position = [_tidy(value + shift) for value, shift in zip(values[:3], offset, strict=True)]
-        record = {NAME: name, "position": position, **_direction(direction, values[3:], place)}
+        record = {NAME: name, "position": position, **_direction(tuple(numbers)[3:], values[3:], place)}
         target = check_document(record, Target, TaskError, place)
         targets.append(target.position if target.is_plain else target)
     return TargetList(tuple(targets), tuple(notes))
@@ -183,44 +182,41 @@ def _read_head(cell: str) -> tuple[str, str]:
     return _ALIASES.get(name.strip().lower(), name.strip().lower()), unit.strip()
 
 
-def _check_columns(header: Sequence[str], names: Sequence[str], where: str) -> tuple[str, ...]:
-    """Return the columns of the tool direction; TaskError if columns are missing, given twice or in conflict."""
-    listed = f"columns: {quote_names(header)}"
-    for name in _COLUMNS:
-        if names.count(name) > 1:
-            raise TaskError(f"{where}: expected one column {name}, got two; rename or remove one ({listed})")
-    given = [kind for kind in (ANGLES, QUATERNION, AXIS) if not set(kind).isdisjoint(names)]
+def _find_columns(header: Sequence[str], unit: str | None, where: str) -> dict[str, tuple[int, float]]:
+    """Return index and size of the unit [m] or [rad] of x, y, z, of the columns of a tool direction, and of names."""
+    listed = f"(columns: {quote_names(header)})"
+    heads: dict[str, tuple[int, str]] = {}
+    for index, cell in enumerate(header):
+        name, own = _read_head(cell)
+        if name in heads:
+            raise TaskError(f"{where}: expected one column {name}, got two; rename or remove one {listed}")
+        if name in _COLUMNS:
+            heads[name] = index, own
+    given = [kind for kind in (ANGLES, QUATERNION, AXIS) if not heads.keys().isdisjoint(kind)]
     for kind in (POSITION, *given):
-        if missing := [name for name in kind if name not in names]:
+        if missing := [name for name in kind if name not in heads]:
             raise TaskError(
-                f"{where}: expected columns {', '.join(kind)}, got no {', '.join(missing)}; rename columns ({listed})"
+                f"{where}: expected columns {', '.join(kind)}, got no {', '.join(missing)}; rename columns {listed}"
             )
     if len(given) > 1:
         both = " and ".join(", ".join(kind) for kind in given)
-        raise TaskError(f"{where}: expected one kind of tool direction, got {both}; rename or remove one ({listed})")
-    return given[0] if given else ()
-
-
-def _factors(header: Sequence[str], heads: Sequence[tuple[str, str]], unit: str | None, where: str) -> dict[str, float]:
-    """Return the metres or radians per unit of each column of numbers."""
-    factors: dict[str, float] = {}
-    for cell, (name, own) in zip(header, heads, strict=True):
-        allowed = _COLUMNS.get(name)
-        if not allowed:
-            continue
-        if name in POSITION and own and unit and own != unit and own in UNITS:
-            raise TaskError(f'{where}: "{cell}" states {own}, but the unit is set to {unit}; use {own}')
+        raise TaskError(f"{where}: expected one kind of tool direction, got {both}; rename or remove one {listed}")
+    if unit is None and len({bool(heads[name][1]) for name in POSITION}) > 1:
+        texts = quote_names(header[heads[name][0]] for name in POSITION)
+        raise TaskError(f"{where}: expected a unit in each of {texts} or in none; write x [mm], y [mm], z [mm]")
+    columns = {NAME: (heads[NAME][0], 1.0)} if NAME in heads else {}
+    for name in (*POSITION, *(given[0] if given else ())):
+        index, own = heads[name]
+        if name in POSITION and own in UNITS and unit not in (None, own):
+            raise TaskError(f'{where}: "{header[index]}" states {own}, but the unit is set to {unit}; use {own}')
         own = own or unit or "m" if name in POSITION else own
+        allowed = _COLUMNS[name]
         if own not in allowed:
             units = " or ".join(f"{name} [{known}]" for known in allowed)
             expected = "no unit; rename a column that holds something else" if allowed is _NO_UNIT else units
-            raise TaskError(f'{where}: "{cell}": expected {expected}')
-        factors[name] = allowed[own]
-    places = [(cell, own) for cell, (name, own) in zip(header, heads, strict=True) if name in POSITION]
-    if unit is None and len({bool(own) for _, own in places}) > 1:
-        texts = quote_names(cell for cell, _ in places)
-        raise TaskError(f"{where}: expected a unit in each of {texts} or in none; write x [mm], y [mm], z [mm]")
-    return factors
+            raise TaskError(f'{where}: "{header[index]}": expected {expected}')
+        columns[name] = index, allowed[own]
+    return columns
 
 
 def _decimal_comma(cells: Iterable[tuple[int, str]], where: str) -> str:
