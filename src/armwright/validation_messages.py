@@ -53,7 +53,7 @@ def describe_unknown_key(key: str, path: Sequence[str | int], schema: Any, alter
     """Return the keys that the record at a path has instead of an unknown one; alternative: of a union, as pydantic."""
     members = members_of(type_at(schema, path))
     named = [
-        one for one in members if alternative in (getattr(one, "__name__", ""), *get_args(keys_of(one).get("kind")))
+        one for one in members if alternative in (getattr(one, "__name__", None), *get_args(keys_of(one).get("kind")))
     ]
     known = dict.fromkeys(name for record in named or members for name in all_keys_of(record))
     owners = owners_of(key, path, schema)

@@ -91,27 +91,6 @@ def test_exported_design_compared_as_existing_arm_keeps_its_values(run: Path, hi
     assert comparison.places == 0
 
 
-def test_measures_match_formulas_at_the_found_base(compared: ArmComparison) -> None:
-    """Recompute the objectives from postures, the masses of the URDF and the payloads of the task."""
-    for arm, there in zip(compared.arms, compared.placed, strict=True):
-        evaluation = compared.problem.physics_of_arms(stack_arms([there]))
-        torque, error = evaluation.joint_torques[0], evaluation.position_error[0]
-        efforts = [joint.effort for joint in there.joints]
-        assert arm.values == (arm.measures["position_error"], arm.measures["torque"])
-        assert arm.measures["position_error"] == pytest.approx(error.sum())
-        assert arm.measures["torque"] == pytest.approx(40 * np.linalg.norm(torque, axis=1).sum())
-        assert arm.measures["worst_error"] == pytest.approx(error.max())
-        assert arm.measures["unreached_targets"] == (error >= 1e-3).sum()
-        assert arm.measures["peak_torque"] == pytest.approx(np.abs(torque).max())
-        assert arm.measures["torque_utilisation"] == pytest.approx((1.5 * np.abs(torque) / efforts).max())
-        without = replace(compared.problem, task=TASK.model_copy(update={"payload": 0.0}))
-        lighter = without.physics_of_arms(stack_arms([there])).joint_torques[0]
-        assert not np.allclose(lighter[:2], torque[:2])
-        assert np.array_equal(lighter[2], torque[2])
-    assert [arm.name for arm in compared.arms] == ["ur5_robot", "panda"]
-    assert [arm.joints for arm in compared.arms] == [6, 7]
-
-
 def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compared: ArmComparison) -> None:
     """No other of 1000 positions that reaches all targets needs clearly less torque; equal seeds give equal bases."""
     rng = np.random.default_rng(5)

@@ -8,13 +8,12 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.arms.forward import joint_positions
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from tests.support import reference_kinematics as reference
 from tests.support.arms import general_arms, paper_arms
-from tests.support.exported_arms import BARE, load, moving, postures
+from tests.support.exported_arms import BARE, moving, postures
 from tests.support.reference_kinematics import Array
 
 
@@ -69,28 +68,6 @@ def test_names_limits_and_masses() -> None:
             assert np.array_equal(model.jnt_axis[i], np.eye(3)["xyz".index(joint.axis)])
         stated = [link.mass for link in arm.links]
         assert np.allclose(model.body_mass, [0.0, 0.0, *stated], rtol=1e-9, atol=1e-11)  # nor has the base any
-
-
-def test_mjcf_tip_matches_the_arm() -> None:
-    """And each link's frame at its joint."""
-    for arm in ARMS:
-        simulated = Simulated(arm)
-        for q in postures(arm):
-            simulated.put(q)
-            every = np.zeros(len(arm.joints))
-            every[[number - 1 for number, _ in moving(arm)]] = q
-            places = joint_positions(arm, every)
-            assert np.abs(simulated.data.site("tip").xpos - places[-1]).max() < 1e-9
-            assert np.abs(simulated.data.xpos[2:] - places[:-1]).max() < 1e-9
-
-
-def test_mjcf_gravity_torque_matches_the_reference() -> None:
-    for arm in TURNING:
-        simulated, chain = Simulated(arm), reference.chains([arm])
-        for q in postures(arm):
-            simulated.put(q)
-            torque = reference.gravity_torque(chain, q[None, None])[0, 0]
-            assert np.abs(simulated.data.qfrc_bias - torque).max() < 1e-9 * load(arm)
 
 
 def test_mjcf_motion_matches_the_urdf() -> None:

@@ -1,6 +1,5 @@
 """URDF files in Pinocchio, MuJoCo, yourdfpy and scikit-robot."""
 
-import io
 from collections.abc import Callable
 from xml.etree import ElementTree
 
@@ -8,7 +7,6 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
-import yourdfpy
 
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.mjcf import to_mjcf
@@ -65,30 +63,6 @@ def test_urdf_in_mujoco_matches_the_arm(arm: Arm) -> None:
         assert np.allclose(seen.range, [joint.lower, joint.upper])
         assert np.allclose(seen.axis, np.eye(3)["xyz".index(joint.axis)])
     assert model.body_mass.sum() == pytest.approx(sum(link.mass for link in arm.links))
-
-
-@EVERY_ARM
-def test_urdf_in_yourdfpy_matches_the_arm(arm: Arm) -> None:
-    """Every inertia is that of a solid cylinder about its centre of mass, and one that a body can have."""
-    urdf = yourdfpy.URDF.load(io.BytesIO(to_urdf(arm).encode()))
-    assert urdf.validate()
-    joints = {joint.name: joint for joint in urdf.robot.joints}
-    for number, joint in enumerate(arm.joints, start=1):
-        assert joints[f"joint_{number}"].type == joint.kind
-    for number, joint in moving(arm):
-        seen = joints[f"joint_{number}"]
-        assert np.allclose(seen.axis, np.eye(3)["xyz".index(joint.axis)])
-        assert (seen.limit.lower, seen.limit.upper) == pytest.approx((joint.lower, joint.upper))
-    links = {link.name: link for link in urdf.robot.links}
-    for number, link in enumerate(arm.links, start=1):
-        inertial = links[f"link_{number}"].inertial
-        assert inertial.mass == pytest.approx(link.mass)
-        assert np.allclose(inertial.origin[:3, 3], link.com)
-        R = inertial.origin[:3, :3]
-        assert np.allclose(R @ inertial.inertia @ R.T, cylinder_inertia(link), rtol=1e-6, atol=1e-12)
-        least, middle, most = np.linalg.eigvalsh(inertial.inertia)
-        assert least + middle >= most * (1 - 1e-12)
-        assert least > 0.0 or link.mass == 0.0
 
 
 @EVERY_ARM

@@ -76,12 +76,6 @@ def test_example_of_the_issue_is_read_to_the_letter() -> None:
     assert read.target_arrays.tolerance.tolist() == [0.001, 0.002]
 
 
-def test_targets_are_named_or_numbered_from_one() -> None:
-    assert plan(steps("tray", 3, "bin")).targets == plan(steps(2, 3, 1)).targets == (1, 2, 0)
-    with_points = plan(steps("tray", 1), [POINTS[0], {"name": "tray", "position": POINTS[1]}])
-    assert with_points.targets == (1, 0)
-
-
 @pytest.mark.parametrize("target", [NAMED[0], {"name": "gate", "position": POINTS[0]}])
 def test_cycle_round_trips_through_values_and_yaml(target: Any) -> None:
     last = {"to": 3, "by": "line"}

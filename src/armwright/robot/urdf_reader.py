@@ -166,14 +166,15 @@ def _zeros(tree: "_LinkTree", base: str, moving: Sequence[UrdfJoint], where: str
     """
     zeros = {joint.name: 0.0 for joint in moving}
 
-    def axis_of(joint: UrdfJoint) -> Array:
-        return tree.poses(base, zeros)[joint.child].rotation @ joint.axis
+    def axes() -> dict[str, Array]:
+        poses = tree.poses(base, zeros)
+        return {joint.name: poses[joint.child].rotation @ joint.axis for joint in moving}
 
     before: UrdfJoint | None = None  # the last joint that is not prismatic
     for joint in moving:
-        axis = axis_of(joint)
+        axis = axes()[joint.name]
         if _nearest_axis(axis)[2] > SNAP and before is not None:
-            index, sign, _ = _nearest_axis(axis_of(before))
+            index, sign, _ = _nearest_axis(axes()[before.name])
             about = sign * np.eye(3)[index]
             if abs(float(axis @ about)) < SNAP:
                 one = np.roll(np.abs(about), 1)
@@ -181,11 +182,11 @@ def _zeros(tree: "_LinkTree", base: str, moving: Sequence[UrdfJoint], where: str
                 zeros[before.name] += round(angle / (math.pi / 2)) * (math.pi / 2) - angle
         if joint.kind != "prismatic":
             before = joint
-    for joint in moving:
-        if _nearest_axis(axis_of(joint))[2] > SNAP:
-            vector = ", ".join(f"{value:.3f}" for value in axis_of(joint))
+    for name, axis in axes().items():
+        if _nearest_axis(axis)[2] > SNAP:
+            vector = ", ".join(f"{value:.3f}" for value in axis)
             raise ArmError(
-                f'{where}: joint "{joint.name}" has the axis ({vector}) with all joints at 0, along none of x, y and z '
+                f'{where}: joint "{name}" has the axis ({vector}) with all joints at 0, along none of x, y and z '
                 "and not at a right angle to the joint before; such an arm cannot be computed yet"
             )
     return zeros

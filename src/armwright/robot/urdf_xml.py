@@ -77,12 +77,8 @@ class UrdfDocument:
 
 def read_document(path: Path) -> UrdfDocument:
     """Read the links and joints of a URDF file; raise ArmError if it is not one."""
-    return parse_document(read_bytes(path, MAX_FILE, ArmError), str(path))
-
-
-def parse_document(data: bytes, where: str) -> UrdfDocument:
-    """Parse the bytes of a URDF file; `where` names it in messages."""
-    robot = _parsed(data, where)
+    where = str(path)
+    robot = _parsed(read_bytes(path, MAX_FILE, ArmError), where)
     if robot.tag != "robot":
         raise ArmError(f"{where} is not a URDF: expected the root <robot>, got <{_short(robot.tag)}>")
     links = [_link(element, where) for element in robot.findall("link")]
@@ -98,7 +94,7 @@ def parse_document(data: bytes, where: str) -> UrdfDocument:
         for end in (joint.parent, joint.child):
             if end not in known:
                 raise ArmError(f'{where}: joint "{_short(joint.name)}" joins the unknown link "{_short(end)}"')
-    return UrdfDocument(robot.get("name") or Path(where).stem, known, joints)
+    return UrdfDocument(robot.get("name") or path.stem, known, joints)
 
 
 def _parsed(data: bytes, where: str) -> ElementTree.Element:
