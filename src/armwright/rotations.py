@@ -32,6 +32,16 @@ def rotation_from_quaternion(x: float, y: float, z: float, w: float) -> Array:
     )
 
 
+def rotation_about(axis: Array, angle: Array | float) -> Array:
+    """Return the (..., 3, 3) rotations about unit vectors (..., 3) by angles (...) [rad], by Rodrigues' formula.
+
+    A vector of zeros stands for no rotation.
+    """
+    cross = np.cross(axis[..., None, :], np.eye(3)).swapaxes(-1, -2)  # v ↦ axis x v
+    sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
+    return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+
+
 def rpy_from_rotation(rotation: Array) -> tuple[float, float, float]:
     """Return roll, pitch and yaw [rad] of a (3, 3) rotation, the inverse of `rotation_from_rpy`.
 
@@ -50,13 +60,6 @@ def rotation_to_axis(axis: Sequence[float] | Array) -> Array:
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
-
-
-def rotation_about(axis: Array, angle: Array) -> Array:
-    """Return the (..., 3, 3) rotations by angles (...,) [rad] about a unit vector (3,), by Rodrigues' formula."""
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    s, c = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
-    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
 
 
 def cone_directions(axis: Sequence[float] | Array, half_angle: float, n: int) -> Array:

@@ -292,7 +292,7 @@ class _LinkTree:
         """Return the pose of every link in the base frame; values: joint angles by name [rad], by default 0."""
         poses = {base: Pose(np.eye(3), np.zeros(3))}
         for joint in self.below(base):
-            motion = Pose(rotation_about(joint.axis, np.array(values.get(joint.name, 0.0))), np.zeros(3))
+            motion = Pose(rotation_about(joint.axis, values.get(joint.name, 0.0)), np.zeros(3))
             poses[joint.child] = poses[joint.parent] @ joint.origin @ motion
         return poses
 
