@@ -1,7 +1,6 @@
 """Processes that commands start import nothing from the working folder."""
 
 import ast
-import json
 import signal
 import subprocess
 import sys
@@ -14,7 +13,6 @@ import pytest
 
 import armwright
 from tests.support.command_line import PATIENCE
-from tests.support.editor import ServedEditor
 
 # Modules that the processes import: Python's own, other packages' and ours.
 PLANTED = (
@@ -88,20 +86,6 @@ def test_modules_beside_an_evaluator_hide_none_of_pythons_own(in_folder: Path) -
         _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     assert not (in_folder / "note").exists()
-
-
-@pytest.mark.slow
-def test_search_of_the_editor_imports_no_planted_modules(planted: Path) -> None:
-    with started("edit", "cell.yaml") as editing:
-        assert editing.stdout is not None
-        editor = ServedEditor(editing.stdout.readline().strip(), planted / "cell.yaml")
-        opened = json.loads(editor.get("/opened")[1])
-        editor.post("/design", {"task": opened["task"], "space": opened["space"], "seconds": 600})
-        while not any("evaluations" in line for line in json.loads(editor.get("/job")[1])["lines"]):
-            assert json.loads(editor.get("/job")[1])["running"]
-        editing.send_signal(signal.SIGINT)
-        editing.communicate(timeout=PATIENCE)
-    assert not (planted / "note").exists()
 
 
 @contextmanager

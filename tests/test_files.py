@@ -123,19 +123,6 @@ def test_pipes_are_refused(tmp_path: Path) -> None:
         check_no_links(tmp_path)
 
 
-@pytest.mark.parametrize("command", WRITERS)
-def test_old_names_of_next_contents_lead_nowhere(run: Path, tmp_path: Path, command: str) -> None:
-    """An unpacked run holds `trials.csv.part -> ../.bashrc`, and the like for every file that a command may write."""
-    victim = tmp_path / "victim"
-    victim.write_text("export PATH", encoding="utf-8")
-    for path in [run, *run.rglob("*")]:
-        if path.is_file():
-            path.with_name(f"{path.name}.part").symlink_to(victim)
-    line = refused(1, *WRITERS[command], run)
-    assert ".part is a link; remove it" in line
-    assert victim.read_text(encoding="utf-8") == "export PATH"
-
-
 NAMES = (
     ".lock", ".control.lock", "config.yaml", "trials.jsonl", "transcripts.jsonl", "status.json", "summary.json",
     "trials.csv", "report.html", "figures", "designs", "datasheets", "study.db", "artifacts", "reach-maps",

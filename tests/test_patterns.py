@@ -41,23 +41,6 @@ def test_pattern_reads_long_repetitions_in_time(pattern: Pattern) -> None:
     assert reads_in_time(pattern)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "text", [r"([\w-]*)(?:\*{2,}|\.{3,}|…)([\w-]*)", r"\s*(\d+\.?\d*)\s*(\S.*?)?\s*x", r"(?:a+b?)+c", r'//[^"\n]*$']
-)
-def test_pattern_that_takes_quadratic_time_is_noticed(text: str) -> None:
-    pattern = Pattern("here", text, 0, True)
-    assert faults(pattern)
-    assert not reads_in_time(pattern, 3.0)
-
-
-@pytest.mark.parametrize(
-    "text", [r"\w+", r"[ \t]*+\n?", r"(?<!\d)\d+x", r"\bword\b", r"^\s*(\w{1,40})\s*[:=]", r"a(?:,a)*"]
-)
-def test_pattern_that_takes_linear_time_is_allowed(text: str) -> None:
-    assert not faults(Pattern("here", text, 0, True))
-
-
 def reads_in_time(pattern: Pattern, seconds: float = SECONDS) -> bool:
     """Whether a process of its own reads all that is hard for the pattern."""
     letters, near = classes(pattern), example(pattern)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass
 from functools import cache
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
@@ -12,21 +12,11 @@ from pydantic_core import ErrorDetails
 
 def members_of(annotation: Any) -> list[Any]:
     """Return the types of a union without annotations; of any other type, itself."""
-    bare = bare_type(annotation)
-    if get_origin(bare) in (tuple, Literal, None) or not _is_union(bare):
-        return [] if bare is None else [bare]
-    return [member for part in get_args(bare) for member in members_of(part)]
-
-
-def _is_union(annotation: Any) -> bool:
-    return get_origin(annotation) in (Union, UnionType)
-
-
-def bare_type(annotation: Any) -> Any:
-    """Return a type without its annotations."""
-    while get_origin(annotation) is Annotated:
-        annotation = get_args(annotation)[0]
-    return annotation
+    if get_origin(annotation) is Annotated:
+        return members_of(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType):
+        return [member for part in get_args(annotation) for member in members_of(part)]
+    return [] if annotation is None else [annotation]
 
 
 def type_at(schema: Any, path: Sequence[str | int]) -> Any:
@@ -50,14 +40,13 @@ def _entry_type(annotation: Any, index: int) -> Any:
     return entries[index] if index < len(entries) else None
 
 
-def owners_of(key: str, schema: type[BaseModel]) -> list[str]:
-    """Return the keys of a schema whose records have this key: `targets` for `axis`."""
-    records: Mapping[str, Any] = getattr(schema, "entry_records", {})
-    return [
-        name
-        for name, annotation in keys_of(schema).items()
-        if key in {known for kind in (annotation, records.get(name)) for known in all_keys_of(kind)}
-    ]
+def owners_of(key: str, path: Sequence[str | int], schema: Any) -> list[str]:
+    """Return the records around or within the one at a path that have this key: `targets` for `axis` in a task."""
+    for end in reversed(range(len(path))):
+        if key in all_keys_of(type_at(schema, path[:end])):
+            return [part for part in path[:end] if isinstance(part, str)][-1:] or ["the file itself"]
+    record = all_keys_of(type_at(schema, path))
+    return [name for name, annotation in record.items() if key in all_keys_of(annotation)]
 
 
 def all_keys_of(annotation: Any) -> dict[str, Any]:
@@ -85,10 +74,13 @@ def keys_of(annotation: Any) -> Mapping[str, Any]:
 
 
 def field_path(error: ErrorDetails, schema: Any) -> list[str | int]:
-    """Return where an error is, without the names of types that pydantic adds for unions."""
+    """Return where an error is, without the names of types that pydantic adds for unions.
+
+    A list that is too short is at fault itself, not the entry that is missing.
+    """
     path: list[str | int] = []
     for part in error["loc"]:
         is_unknown_key = error["type"] == "extra_forbidden" and part == error["loc"][-1]
         if isinstance(part, int) or not path or is_unknown_key or type_at(schema, [*path, part]) is not None:
             path.append(part)
-    return path
+    return path[:-1] if error["type"] == "missing" and path and isinstance(path[-1], int) else path

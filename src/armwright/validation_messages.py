@@ -1,5 +1,6 @@
 """Messages about values that a schema refuses: the key, what is expected with its unit, what was found, what to try."""
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from types import NoneType
@@ -9,20 +10,19 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from armwright.exceptions import did_you_mean
-from armwright.schema_types import all_keys_of, bare_type, field_path, keys_of, members_of, type_at
+from armwright.schema_types import all_keys_of, field_path, keys_of, members_of, owners_of, type_at
 from armwright.units import KEY_UNITS, read_quantity
 
 _COUNTS = {2: "two", 3: "three", 4: "four"}
-_DIRECTIONS = {
-    "down": "[0, 0, -1]", "up": "[0, 0, 1]", "x": "[1, 0, 0]", "y": "[0, 1, 0]", "z": "[0, 0, 1]",
-    "-x": "[-1, 0, 0]", "-y": "[0, -1, 0]", "-z": "[0, 0, -1]",
-}  # fmt: skip
+_DIRECTIONS = {"down": "[0, 0, -1]", "up": "[0, 0, 1]"}
 _BOUNDS = {
     "greater_than": "above",
     "greater_than_equal": "of at least",
     "less_than": "below",
     "less_than_equal": "of at most",
 }
+_TELLING = ("extra_forbidden", "value_error", *_BOUNDS)  # errors of a value of the right type
+_MOST_ALTERNATIVES = 20  # errors of one value that are looked at
 _LETTERS = re.compile(r"[^A-Za-z0-9._-]+")
 
 
@@ -34,30 +34,47 @@ def describe_fault(fault: ValidationError, schema: Any, data: Any) -> str:
         schema: The model that refused.
         data: The whole value.
     """
-    first = fault.errors(include_url=False)[0]
-    path = field_path(first, schema)
-    if first["type"] == "missing" and path and isinstance(path[-1], int):  # a list that is too short
-        path = path[:-1]
+    found = [(field_path(error, schema), error) for error in fault.errors(include_url=False)[:_MOST_ALTERNATIVES]]
+    start = found[0][0][:-1] if found[0][1]["type"] == "missing" else found[0][0]
+    # Each alternative of a union has errors of its own: report that of the one that the value fits best. A key that is
+    # missing may be misspelled.
+    alternatives = [(path, error) for path, error in found if path[: len(start)] == start]
+    path, error = max(alternatives, key=lambda one: (len(one[0]), one[1]["type"] in _TELLING))
+    if error["type"] == "extra_forbidden":
+        *path, key = path
+        message = describe_unknown_key(str(key), path, schema, str([*error["loc"][-2:-1], ""][0]))
+    else:
+        message = _describe(error, path, schema, data)
     at = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
-    message = _describe(first, path, schema, data)
     return f"{at}: {message}" if at else message
+
+
+def describe_unknown_key(key: str, path: Sequence[str | int], schema: Any, alternative: str = "") -> str:
+    """Return the keys that the record at a path has instead of an unknown one; alternative: of a union, as pydantic."""
+    members = members_of(type_at(schema, path))
+    named = [
+        one for one in members if alternative in (getattr(one, "__name__", None), *get_args(keys_of(one).get("kind")))
+    ]
+    known = dict.fromkeys(name for record in named or members for name in all_keys_of(record))
+    owners = owners_of(key, path, schema)
+    place = f" It is a key of {' and '.join(owners)}." if owners else ""
+    return f'unknown key "{key}".{did_you_mean(key, known)}{place} Allowed: {", ".join(known)}'
 
 
 def _describe(error: ErrorDetails, path: Sequence[str | int], schema: Any, data: Any) -> str:
     """Return what is expected and what was found."""
-    kind, given = error["type"], error["input"]
+    kind, given, limits = error["type"], error["input"], error.get("ctx", {})
     if kind in ("value_error", "assertion_error"):
         return error["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
     annotation = type_at(schema, path)
-    unit = next((KEY_UNITS[part] for part in reversed(path) if isinstance(part, str) and part in KEY_UNITS), "")
+    unit = KEY_UNITS.get(next((part for part in reversed(path) if isinstance(part, str)), ""), "")
     if kind == "missing" and isinstance(error["loc"][-1], str):
         return f"expected {_expected(annotation, unit)}, but the key is missing"
-    if kind == "extra_forbidden":
-        known, key = all_keys_of(type_at(schema, path[:-1])), str(path[-1])
-        return f"unknown key.{did_you_mean(key, known)}{_owner(key, path[:-1], schema)} Allowed: {', '.join(known)}"
-    if kind == "union_tag_invalid":
-        limits = error.get("ctx", {})
-        tags, key = re.findall(r"'([^']*)'", limits["expected_tags"]), limits["discriminator"].strip("'")
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        key = limits["discriminator"].strip("'")
+        tags = [tag for member in members_of(annotation) for tag in get_args(keys_of(member).get(key))]
+        if kind == "union_tag_not_found":
+            return f"{key}: expected {_choice(tags)}, but the key is missing"
         hint = did_you_mean(str(given[key]), tags)
         return f"{key}: expected {_choice(tags)}, got {show(given[key])}" + (f".{hint}" if hint else "")
     expected, hint = _limits(error, unit), ""
@@ -68,18 +85,8 @@ def _describe(error: ErrorDetails, path: Sequence[str | int], schema: Any, data:
         hint = show([around]) if is_point else _suggest(annotation, given, unit)
     if kind == "string_pattern_mismatch" and isinstance(given, str):
         hint = show(_LETTERS.sub("-", given).strip("-._")[:40]) if _LETTERS.search(given) else ""
-    length = error.get("ctx", {}).get("actual_length") if kind in ("too_short", "too_long") else None
-    got = show(given) if length is None else length
+    got = limits["actual_length"] if kind in ("too_short", "too_long") else show(given)
     return f"expected {expected}, got {got}" + (f"; try {hint}" if hint else "")
-
-
-def _owner(key: str, path: Sequence[str | int], schema: Any) -> str:
-    """Return which record around the one at a path has a key; empty if none has it."""
-    for end in reversed(range(len(path))):
-        if key in all_keys_of(type_at(schema, path[:end])):
-            names = [part for part in path[:end] if isinstance(part, str)]
-            return f" It is a key of {names[-1] if names else 'the file itself'}."
-    return ""
 
 
 def _limits(error: ErrorDetails, unit: str) -> str:
@@ -90,21 +97,17 @@ def _limits(error: ErrorDetails, unit: str) -> str:
         return f"a number {_BOUNDS[kind]} {bound:g} {unit}".rstrip()
     if kind == "finite_number":
         return f"a finite number{_in(unit)}"
-    if kind in ("too_short", "too_long"):
+    if kind.endswith(("too_short", "too_long")):
         number = limits.get("min_length", limits.get("max_length"))
-        return f"at {'least' if kind == 'too_short' else 'most'} {number} {'entry' if number == 1 else 'entries'}"
-    if kind in ("string_too_short", "string_too_long"):
-        number = limits.get("min_length", limits.get("max_length"))
-        return f"text of at {'least' if kind == 'string_too_short' else 'most'} {number} characters"
+        things = "characters" if kind.startswith("string") else "entry" if number == 1 else "entries"
+        return f"at {'least' if kind.endswith('short') else 'most'} {number} {things}"
     if kind == "string_pattern_mismatch":
         pattern = str(limits["pattern"])
         name = re.fullmatch(r"\^\[[^]]*\]\[(A-Z)?a-z0-9._-\]\{0,(\d+)\}\$", pattern)
-        if name is not None:
-            letters = "letters" if name[1] else "lowercase letters"
-            return (
-                f"a name of at most {int(name[2]) + 1} {letters}, digits and . _ - that begins with a letter or digit"
-            )
-        return f"text of the form {pattern}"
+        if name is None:
+            return f"text of the form {pattern}"
+        letters = "letters" if name[1] else "lowercase letters"
+        return f"a name of at most {int(name[2]) + 1} {letters}, digits and . _ - that begins with a letter or digit"
     return ""
 
 
@@ -133,7 +136,7 @@ def _one_expected(annotation: Any, unit: str) -> str:
         return _choice(entries)
     if get_origin(annotation) is tuple:
         many = {float: "numbers", int: "whole numbers", str: "texts"}
-        plain = many.get(bare_type(entries[0]), "entries")
+        plain = many.get(members_of(entries[0])[0], "entries")
         if entries[-1] is not Ellipsis:
             return f"{_COUNTS.get(len(entries), len(entries))} {plain}{_in(unit)}"
         return (
@@ -173,15 +176,15 @@ def _suggest(annotation: Any, given: Any, unit: str) -> str:
         if pairs and len(split) == len(pairs[0]) and None not in split:
             return show(split)
     is_number = isinstance(given, (int, float)) and not isinstance(given, bool)
-    if is_number and (str in members):
+    if isinstance(given, float) and int in members:
+        return str(round(given))
+    if is_number and str in members:
         return show(show(given))
-    if is_number and pairs and all(bare_type(entry) is float for entry in pairs[0]) and len(pairs[0]) == 2:
+    if is_number and pairs and all(members_of(entry) == [float] for entry in pairs[0]) and len(pairs[0]) == 2:
         return show([given, given])
     if isinstance(given, list) and len(cast("list[Any]", given)) == 1 and (float in members or int in members):
         return show(cast("list[Any]", given)[0])
-    if isinstance(given, float) and int in members:
-        return str(round(given))
-    if lists and not isinstance(given, (list, dict)) and (isinstance(given, str) == (bare_type(lists[0]) is str)):
+    if lists and not isinstance(given, (list, dict)) and isinstance(given, str) == (members_of(lists[0]) == [str]):
         return show([given])
     return ""
 
@@ -196,25 +199,12 @@ def _is_one_point(annotation: Any, around: Any) -> bool:
 
 
 def show(value: Any) -> str:
-    """Return a value as YAML writes it, shortened."""
+    """Return a value as YAML reads it, shortened."""
     try:
-        text = _flow(value)
+        text = json.dumps(value, ensure_ascii=False, skipkeys=True, default=str)
     except ValueError:  # an integer of more than 4300 digits
         text = "a huge number"
     return text if len(text) <= 80 else text[:77] + "..."
-
-
-def _flow(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_flow, cast('list[Any]', value)))}]"
-    if isinstance(value, dict):
-        pairs = cast("dict[Any, Any]", value).items()
-        return f"{{{', '.join(f'{key}: {_flow(entry)}' for key, entry in pairs)}}}"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if value is None:
-        return "nothing"
-    return '"' + value.replace("\n", " ") + '"' if isinstance(value, str) else str(value)
 
 
 def _value_at(data: Any, path: Sequence[str | int]) -> Any:

@@ -1,6 +1,6 @@
 """Untrusted YAML documents: read safely, checked against a schema, refused with a one-line error."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -8,15 +8,13 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from yaml.composer import Composer
 
-from armwright.exceptions import did_you_mean
 from armwright.files import read_text
-from armwright.schema_types import owners_of
-from armwright.validation_messages import describe_fault
+from armwright.text import one_line
+from armwright.validation_messages import describe_fault, describe_unknown_key
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
 MAX_BYTES = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has about 0.3 MB
-RENAMED = {"jitter": "target_noise", "link_radius": "link_section"}  # former keys of files
 MAX_NODES = 400_000  # values in a document; 10,000 targets with all their keys have 240,000
 
 
@@ -43,14 +41,9 @@ def load_document(text: str, error: type[Exception], where: str) -> Any:
 
 def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str) -> Schema:
     """Validate `data` as a value of `schema`; `where` names it in messages."""
-    keys = document_keys(schema)
     for key in data:
-        if key not in keys:
-            allowed = ", ".join(keys)
-            hint = did_you_mean(str(key), keys, RENAMED)
-            owners = owners_of(str(key), schema)
-            place = f" It is a key of {' and '.join(owners)}." if owners else ""
-            raise error(f'{where}: unknown key "{key}".{place} Allowed: {allowed}.{hint}')
+        if key not in document_keys(schema):
+            raise error(f"{where}: {describe_unknown_key(str(key), (), schema)}")
     try:
         return schema.model_validate(data)
     except ValidationError as fault:
@@ -107,7 +100,7 @@ class _DocumentLoader(_Loader):
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         seen: set[str] = set()
-        for key in _scalar_keys(node):
+        for key in (str(key.value) for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             if key in seen:
                 raise yaml.YAMLError(f'duplicate key "{key}"')
             seen.add(key)
@@ -117,26 +110,12 @@ class _DocumentLoader(_Loader):
 _NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
-def _scalar_keys(node: Any) -> Iterator[str]:
-    for key, _ in getattr(node, "value", ()):
-        if isinstance(key, yaml.ScalarNode):
-            yield str(key.value)
-
-
 def _yaml_fault(fault: Exception) -> str:
     mark = getattr(fault, "problem_mark", None)
     problem = getattr(fault, "problem", None)
     if mark is not None and problem:
         return f"{problem}, line {mark.line + 1}, column {mark.column + 1}"
-    return "nested too deeply" if isinstance(fault, RecursionError) else _shorten(fault)
-
-
-def _shorten(value: object) -> str:
-    try:
-        text = str(value).replace("\n", " ")
-    except ValueError:  # an integer of more than 4300 digits
-        text = "a huge number"
-    return text if len(text) <= 80 else text[:77] + "..."
+    return "nested too deeply" if isinstance(fault, RecursionError) else one_line(str(fault), 80)
 
 
 class _DocumentDumper(yaml.SafeDumper):

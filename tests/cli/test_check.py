@@ -149,7 +149,9 @@ def test_decimal_comma_is_warned_of_where_the_target_is_in_reach(in_folder: Path
 def test_decimal_comma_that_makes_four_numbers_is_refused(in_folder: Path) -> None:
     (in_folder / "task.yaml").write_text("name: mine\ntargets:\n  - [0,4, 0.1, 0.2]\n", encoding="utf-8")
     line = refused(2, "check", "task.yaml")
-    assert "target 1: expected three numbers x, y, z [m], got 4: [0, 4, 0.1, 0.2]; write decimals with a point" in line
+    assert (
+        "targets[0]: expected three numbers x, y, z [m], got 4: [0, 4, 0.1, 0.2]; write decimals with a point" in line
+    )
 
 
 def test_search_warns_of_a_payload_that_dwarfs_the_arm_and_goes_on(in_folder: Path) -> None:

@@ -506,8 +506,16 @@ def test_reasons_of_a_model_are_shown_as_they_enter() -> None:
 
 
 @pytest.mark.slow
-def test_help_imports_no_heavy_package() -> None:
-    heavy = {"warp", "optuna", "matplotlib", "moocore", "numpy", "pydantic", "pydantic_ai"}
-    code = f"import sys; import armwright.cli.app; sys.exit(', '.join({heavy!r} & set(sys.modules)) or 0)"
+@pytest.mark.parametrize(
+    ("command", "heavy"),
+    [
+        ("--help", {"warp", "optuna", "matplotlib", "moocore", "numpy", "pydantic", "pydantic_ai"}),
+        ("tasks", {"warp", "optuna", "pydantic_ai", "scipy", "armwright.llm", "armwright.proposers"}),
+        ("tasks target-1", {"warp", "optuna", "pydantic_ai", "armwright.llm", "armwright.proposers"}),
+    ],
+)
+def test_command_imports_no_heavy_package(command: str, heavy: set[str]) -> None:
+    run = f"import sys, atexit; sys.argv[1:] = {command.split()}; from armwright.cli.app import main"
+    code = f"{run}; atexit.register(lambda: print(*({heavy!r} & set(sys.modules)), file=sys.stderr)); main()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, encoding="utf-8")
-    assert done.returncode == 0, done.stderr
+    assert (done.returncode, done.stderr.split()) == (0, [])

@@ -18,7 +18,6 @@ from armwright.existing.base_placement import placed
 from armwright.existing.compare_arms import (
     EXISTING_ARMS,
     ArmComparison,
-    ComparedArm,
     compare_arms,
     dominance_counts,
     read_existing_arms,
@@ -90,27 +89,6 @@ def test_exported_design_compared_as_existing_arm_keeps_its_values(run: Path, hi
         assert (arm.value("position_error"), arm.value("torque")) == arm.values
     assert len({arm.name for arm in comparison.arms}) == 4  # all files are called arm.urdf
     assert comparison.places == 0
-
-
-def test_measures_match_formulas_at_the_found_base(compared: ArmComparison) -> None:
-    """Recompute the objectives from postures, the masses of the URDF and the payloads of the task."""
-    for arm, there in zip(compared.arms, compared.placed, strict=True):
-        evaluation = compared.problem.physics_of_arms(stack_arms([there]))
-        torque, error = evaluation.joint_torques[0], evaluation.position_error[0]
-        efforts = [joint.effort for joint in there.joints]
-        assert arm.values == (arm.value("position_error"), arm.value("torque"))
-        assert arm.value("position_error") == pytest.approx(error.sum())
-        assert arm.value("torque") == pytest.approx(40 * np.linalg.norm(torque, axis=1).sum())
-        assert arm.value("worst_error") == pytest.approx(error.max())
-        assert arm.value("unreached_targets") == (error >= 1e-3).sum()
-        assert arm.value("peak_torque") == pytest.approx(np.abs(torque).max())
-        assert arm.value("torque_utilisation") == pytest.approx((1.5 * np.abs(torque) / efforts).max())
-        without = replace(compared.problem, task=TASK.model_copy(update={"payload": 0.0}))
-        lighter = without.physics_of_arms(stack_arms([there])).joint_torques[0]
-        assert not np.allclose(lighter[:2], torque[:2])
-        assert np.array_equal(lighter[2], torque[2])
-    assert [arm.name for arm in compared.arms] == ["ur5_robot", "panda"]
-    assert [arm.joints for arm in compared.arms] == [6, 7]
 
 
 def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compared: ArmComparison) -> None:
@@ -460,12 +438,3 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
         assert done.returncode == 2
         (line,) = done.stderr.strip().splitlines()
         assert words in line
-
-
-def test_comparison_without_a_run_has_no_designs(compared: ArmComparison) -> None:
-    comparison = compare_arms(TASK, [UR5], space=SPACE, base=(0.0, 0.0, 0.0))
-    (arm,) = comparison.arms
-    assert isinstance(arm, ComparedArm)
-    assert (arm.dominates, arm.dominated_by, comparison.designs, comparison.run) == (None, None, (), None)
-    assert len(compared.designs) >= 2
-    assert all(design.name.startswith("#") for design in compared.designs)

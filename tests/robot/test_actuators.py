@@ -1,7 +1,6 @@
 """Actuators: their masses as loads and their torques as limits."""
 
-import json
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -9,12 +8,9 @@ import numpy as np
 import pinocchio
 import pytest
 import yaml
-from typer.testing import CliRunner
 
-from armwright.cli.app import app
 from armwright.exceptions import ArmError, SettingsError, SpaceError
-from armwright.kinematics.arms.actuation import Actuation
-from armwright.kinematics.arms.arm_arrays import FLOATS, stack_arms
+from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
@@ -22,10 +18,7 @@ from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue, catalogu
 from armwright.robot.arm import Actuator, Arm, Joint, Link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.folder import read_run
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, load_space
-from armwright.study.study import optimize
 from armwright.tasks.task import Task
 from tests import ROOT
 
@@ -53,18 +46,6 @@ def pinocchio_model(arm: Arm) -> tuple[pinocchio.Model, pinocchio.Data]:
     return model, model.createData()
 
 
-def test_stacked_designs_and_arms_have_equal_actuators() -> None:
-    designs = SPACE.sample(200, 1)
-    one, other = stack_designs(SPACE, SPACE.matrix(designs)), stack_arms([SPACE.arm(design) for design in designs])
-    for name in (*FLOATS, "motion", "base_mass"):
-        assert np.array_equal(getattr(one, name), getattr(other, name)), name
-    for field in fields(Actuation):
-        mine, theirs = (getattr(arms.actuation, field.name) for arms in (one, other))
-        assert np.array_equal(mine, theirs, equal_nan=True), field.name
-    part = one[3:9]
-    assert np.array_equal(part.actuation.peak, one.actuation.peak[3:9])
-
-
 def test_actuator_masses_agree_with_pinocchio_and_mujoco() -> None:
     rng = np.random.default_rng(0)
     problem = Problem(TASK.model_copy(update={"payload": 0.0}), SPACE)
@@ -85,16 +66,6 @@ def test_actuator_masses_agree_with_pinocchio_and_mujoco() -> None:
         state.qpos[:], state.qvel[:], state.qacc[:] = q, v, a
         mujoco.mj_inverse(simulated, state)
         assert state.qfrc_inverse == pytest.approx(expected, abs=1e-8)
-
-
-def test_first_actuator_adds_mass_but_no_torque() -> None:
-    design = SPACE.sample(1, 0)[0]
-    swapped = [SPACE.design({**design.params, "motor_1": name}) for name in ("big", "mid", "small")]
-    objectives = named_objectives(["peak_torque", "mass", "price"])
-    values = Problem(TASK, SPACE, objectives=objectives).evaluate(swapped).values
-    assert np.ptp(values[:, 0]) == 0.0
-    assert np.diff(values[:, 1]) == pytest.approx([0.082 - 0.165, 0.0572 - 0.082], abs=1e-6)
-    assert np.diff(values[:, 2]).tolist() == [-150.0, -200.0]
 
 
 def test_actuation_is_by_the_motion_of_the_joint() -> None:
@@ -137,14 +108,6 @@ def test_torque_utilisation_is_the_worst_share_of_peak_torque_with_the_safety_fa
         assert use == pytest.approx(max(shares))
 
 
-def test_single_actuator_is_not_a_parameter() -> None:
-    single = DesignSpace.model_validate({"actuators": [MID], "motor_bodies": False})
-    assert len(single.parameters) == 11
-    design = single.sample(1, 0)[0]
-    assert [joint.actuator.name for joint in single.arm(design).joints] == ["mid"] * 4
-    assert stack_designs(single, single.matrix([design])).actuation.peak.tolist() == [[4.1] * 4]
-
-
 @pytest.mark.parametrize(
     ("space", "words"),
     [
@@ -165,40 +128,17 @@ def test_unbuildable_actuator_settings_are_refused(tmp_path: Path, space: dict, 
         load_space(tmp_path / "space.yaml")
 
 
-def test_objectives_report_missing_actuators() -> None:
-    for name in ("torque_utilisation", "price"):
-        problem = Problem(TASK, objectives=named_objectives([name]))
-        with pytest.raises(SettingsError, match=f"objective {name} needs actuators"):
-            problem.evaluate(problem.space.sample(1, 0))
-    unpriced = DesignSpace.model_validate(
-        {"actuators": [{"name": "x", "mass": 0.1, "stall_torque": 1.0}], "motor_bodies": False}
-    )
-    with pytest.raises(SettingsError, match="needs the price of every actuator"):
-        Problem(TASK, unpriced, objectives=named_objectives(["price"])).evaluate(unpriced.sample(1, 0))
-
-
 @pytest.mark.parametrize("wrong", [{"mass": -0.1}, {"peak_torque": 0.0}, {"price": -1.0}, {"speed": float("inf")}])
 def test_invalid_actuator_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ArmError, match="an actuator needs"):
         Actuator(**{"name": "x", "mass": 0.1, "peak_torque": 1.0, **wrong})
 
 
-def test_catalogue_names_a_source_for_each_actuator() -> None:
-    records = catalogue()
-    assert len(records) >= 14
-    for name, record in records.items():
-        assert record.name == name
-        assert record.source.startswith("https://")
-        assert record.mass > 0.0
-        assert any((record.stall_torque, record.rated_torque, record.peak_torque)), name
-    assert records["XM430-W350"].stall_torque == 4.1
-    assert records["XM430-W350"].mass == 0.082
-
-
-def test_catalogue_states_a_source_for_each_value_of_its_drives() -> None:
+def test_catalogue_states_a_source_for_each_actuator_and_value_of_its_drives() -> None:
     own = ("gear_ratio", "rotor_inertia", "coulomb_friction", "viscous_friction", "corner_speed", "backlash",
            "position_gain", "damping_gain", "current")  # fmt: skip
     for name, record in catalogue().items():
+        assert record.source.startswith("https://")
         sources = catalogue_sources()[name]
         stated = {key for key in own if getattr(record, key) is not None}
         assert stated <= sources.keys(), name
@@ -239,52 +179,6 @@ def test_defaults_are_ratios_of_the_reference_torque() -> None:
     assert rated.completed().coulomb_friction == pytest.approx(0.07 * 8.0)
     assert rated.completed().rotor_inertia is None  # needs the speed
     assert "peak_torque" in rated.assumed
-
-
-def test_command_lists_the_sources_of_an_actuator() -> None:
-    runner = CliRunner()
-    shown = runner.invoke(app, ["actuators", "XL330-M288"], env={"COLUMNS": "300"}).output
-    assert "https://github.com/Rhoban/bam" in shown
-    assert "assumed: default of a servo" in shown
-    listed = json.loads(runner.invoke(app, ["actuators", "STS3215-12V", "--json"]).output)
-    assert "rotor_inertia" in listed[0]["assumed"]
-    assert listed[0]["rotor_inertia"] == 0.0284
-    with pytest.raises(SpaceError, match='Did you mean "XL330-M288"'):
-        runner.invoke(app, ["actuators", "XL330-M28"], catch_exceptions=False)
-
-
-def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:
-    """Follow actuators through space file, run, rules, prompt, page, URDF, data sheet and command."""
-    task = TASK.model_copy(update={"objectives": ("worst_error", "torque_utilisation", "price")})
-    run = optimize(Problem(task, SPACE), proposer="rules", n_init=6, n_step=3, n_total=18, out=tmp_path / "run")
-    config, history = read_run(tmp_path / "run")
-    assert config.space == SPACE
-    assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
-    assert {len(trial.design.motors) for trial in run.trials} == {4}
-    proposed = [trial.design for trial in run.trials if trial.source == "rules"]
-    assert proposed[0].motors == ("big", "big", "mid", "small")
-    member = run.front[0]
-    urdf = pinocchio.buildModelFromXML(to_urdf(member.arm))
-    assert urdf.effortLimit.tolist() == [joint.actuator.peak_torque for joint in member.arm.joints]
-    simulated = mujoco.MjModel.from_xml_string(to_mjcf(member.arm))
-    assert simulated.actuator_ctrlrange[:, 1].tolist() == [joint.actuator.peak_torque for joint in member.arm.joints]
-    runner = CliRunner()
-    prompt = runner.invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
-    assert "- mid: 0.082 kg, 4.1 N m, 250 USD" in prompt
-    assert f"MOTORS: ({', '.join(member.design.motors)})" in prompt or "MOTORS: (" in prompt
-    sheet = runner.invoke(app, ["datasheet", str(tmp_path / "run"), "--design", str(member.number), "--json"])
-    motors = [part for part in json.loads(sheet.output)["parts"] if ", peak " in part["detail"]]
-    assert sum(motor["count"] for motor in motors) == 4
-    assert sum(motor["price"] for motor in motors) == sum(joint.actuator.price for joint in member.arm.joints)
-    picked = runner.invoke(app, ["pick", str(tmp_path / "run"), "--by", "price", "--json"])
-    assert json.loads(picked.output)[0]["price"] == min(m.values[2] for m in run.front)
-    listed = runner.invoke(app, ["actuators"]).output
-    assert "XM430-W350" in listed
-
-
-def test_actuator_record_round_trips() -> None:
-    again = DesignSpace.model_validate(json.loads(SPACE.model_dump_json()))
-    assert again == SPACE
 
 
 def open_manipulator_x() -> Arm:

@@ -5,7 +5,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
-from armwright.exceptions import ArmError, UsageError
+from armwright.exceptions import ArmError
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 
 TURN = Joint("revolute", "y", -1.0, 1.0)
@@ -55,26 +55,10 @@ def test_invalid_arms_are_refused() -> None:
         Arm((0.0, math.nan, 0.0), (TURN,), (LINK,))
 
 
-def test_arm_errors_are_user_errors() -> None:
-    assert issubclass(ArmError, UsageError)
-    assert ArmError.exit_code == 2
-
-
-def test_uniform_link_has_its_mass_at_half_length() -> None:
-    """The centre of mass is halfway; the length is the distance between joints."""
-    assert LINK.com == (0.0, 0.15, 0.2)
-    assert LINK.length == pytest.approx(0.5)
-    assert uniform_link((0.0, 0.0, 0.0), 0.1, 0.01).length == 0.0
-
-
 def test_reach_is_the_stretched_length_and_longest_stroke() -> None:
     """All links are in line, with the longest stroke in either direction."""
     slide = Joint("prismatic", "z", -0.3, 0.1)
     assert Arm((5.0, 5.0, 5.0), (TURN, Joint("fixed", "x"), slide), (LINK,) * 3).reach == pytest.approx(1.8)
-
-
-def test_fixed_joint_needs_no_limits() -> None:
-    assert (Joint("fixed", "x").lower, Joint("fixed", "x").upper) == (0.0, 0.0)
 
 
 def test_arms_are_hashable_values() -> None:

@@ -8,10 +8,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.kinematics.ik.ik import solve_postures
-from armwright.robot.urdf_reader import UrdfArm, read_urdf
-from tests.support.robots import robot
+from armwright.robot.urdf_reader import read_urdf
+from tests.robot.test_urdf_reader import seen_by_kernels
 
 PAYLOAD = 2.0  # [kg]
 UR_POSTURES = {  # [°]
@@ -20,13 +18,6 @@ UR_POSTURES = {  # [°]
     "tool down": (0, -60, 90, -120, -90, 0),
     "low": (30, -20, 60, 20, 40, 10),
     "folded back": (-120, -150, -70, 80, -100, 45),
-}
-PANDA_POSTURES = {  # [°]
-    "stretched": (0, 90, 0, -4, 0, 90, 0),
-    "ready": (0, -45, 0, -135, 0, 90, 45),
-    "elbow at the side": (20, 40, -60, -90, 30, 120, 0),
-    "low": (-30, 80, 10, -60, -20, 100, 60),
-    "folded back": (90, -80, 30, -150, 60, 30, -45),
 }
 
 
@@ -52,21 +43,6 @@ UR5E = (
 )
 
 
-@pytest.mark.parametrize(("name", "postures"), [("panda", PANDA_POSTURES), ("ur5_robot", UR_POSTURES)])
-@pytest.mark.parametrize("payload", [0.0, PAYLOAD])
-def test_urdf_arms_are_held_as_by_pinocchio(name: str, postures: dict[str, Sequence[float]], payload: float) -> None:
-    path = robot(name)
-    read = read_urdf(path)
-    model = pinocchio.buildModelFromUrdf(str(path))
-    frame = model.frames[model.getFrameId(read.tip, pinocchio.FrameType.BODY)]
-    model.appendBodyToJoint(frame.parentJoint, point_mass(payload), frame.placement)
-    angles = np.radians(list(postures.values()))
-    places = [model.joints[model.getJointId(joint)].idx_q for joint in read.joints]
-    theirs = gravity(model, angles, places)
-    assert np.abs(theirs).max() > 10.0
-    assert np.allclose(holding_torques(read, angles, payload), theirs, atol=1e-9)
-
-
 @pytest.mark.parametrize("payload", [0.0, PAYLOAD])
 def test_ur5e_is_held_as_its_published_table_says(tmp_path: Path, payload: float) -> None:
     """The table as a URDF is read as the same arm that Pinocchio builds from the table itself."""
@@ -77,17 +53,8 @@ def test_ur5e_is_held_as_its_published_table_says(tmp_path: Path, payload: float
     angles = np.radians(list(UR_POSTURES.values()))
     theirs = gravity(model_of(UR5E, payload), angles, range(6))
     assert np.abs(theirs).max() > 50.0
-    assert np.allclose(holding_torques(read, angles, payload), theirs, atol=1e-9)
-
-
-def holding_torques(read: UrdfArm, values: np.ndarray, payload: float) -> np.ndarray:
-    """Return ours (T, J) [N m] at values (T, J) of the URDF's joints [rad]."""
-    q = (values - read.zeros) * read.signs
-    loads, nowhere = np.full(len(q), payload), np.zeros((len(q), 3))
-    arms = stack_arms([read.arm], "float64")
-    return (
-        solve_postures(arms, nowhere, 0, initial_q=q[None], payload=loads, precision="float64").torque[0] * read.signs
-    )
+    _, ours = seen_by_kernels(read.arm, read.values_in_arm(angles), payload)
+    assert np.allclose(ours * read.signs, theirs, atol=1e-9)
 
 
 def gravity(model: pinocchio.Model, values: np.ndarray, places: Sequence[int]) -> np.ndarray:

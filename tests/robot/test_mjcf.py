@@ -2,31 +2,19 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.arms.forward import joint_positions
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from tests.support import reference_kinematics as reference
 from tests.support.arms import general_arms, paper_arms
+from tests.support.exported_arms import BARE, moving, postures
 from tests.support.reference_kinematics import Array
-
-MIXED = Arm(
-    (0.1, -0.2, 0.3),
-    (Joint("fixed", "x"), Joint("prismatic", "z", 0.1, 0.4), Joint("revolute", "y", -1.0, 2.0), Joint("fixed", "z")),
-    (
-        Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.02),  # no mass
-        uniform_link((0.1, 0.0, 0.0), 0.4, 0.02),
-        Link((0.0, 0.0, 0.0), 0.3, (0.0, 0.0, 0.0), 0.02),  # no length
-        uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),  # downward
-    ),
-)
 
 
 def sliding_arms(n: int, dof: int, seed: int) -> list[Arm]:
@@ -44,7 +32,7 @@ def slides(joint: Joint, rng: np.random.Generator) -> bool:
 
 TURNING = [*paper_arms(10, 4, 31), *(arm for dof in range(1, 9) for arm in general_arms(8, dof, 32))]
 SLIDING = [arm for dof in range(1, 9) for arm in sliding_arms(8, dof, 33)]
-ARMS = [*TURNING, *SLIDING, MIXED]
+ARMS = [*TURNING, *SLIDING, BARE]
 
 
 class Simulated:
@@ -58,23 +46,6 @@ class Simulated:
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:], self.data.ctrl[:] = q, speed, ctrl
         mujoco.mj_forward(self.model, self.data)
-
-
-def moving(arm: Arm) -> list[tuple[int, Joint]]:
-    """(number from 1, joint) of the joints that move."""
-    return [(number, joint) for number, joint in enumerate(arm.joints, start=1) if joint.kind != "fixed"]
-
-
-def postures(arm: Arm, n: int = 5) -> Array:
-    """(n, D) random values of the joints that move, within their limits [rad] or [m]."""
-    joints = [joint for _, joint in moving(arm)]
-    lower, upper = ([getattr(joint, end) for joint in joints] for end in ("lower", "upper"))
-    return np.random.default_rng(34).uniform(lower, upper, (n, len(joints)))
-
-
-def load(arm: Arm) -> float:
-    """The arm's weight at its reach [N m], the size of its torques; more than the least mass that MuJoCo takes."""
-    return reference.GRAVITY * (sum(link.mass for link in arm.links) + 1e-3) * max(1.0, arm.reach)
 
 
 def test_names_limits_and_masses() -> None:
@@ -99,39 +70,6 @@ def test_names_limits_and_masses() -> None:
         assert np.allclose(model.body_mass, [0.0, 0.0, *stated], rtol=1e-9, atol=1e-11)  # nor has the base any
 
 
-def test_mjcf_tip_matches_the_arm() -> None:
-    """And each link's frame at its joint."""
-    for arm in ARMS:
-        simulated = Simulated(arm)
-        for q in postures(arm):
-            simulated.put(q)
-            every = np.zeros(len(arm.joints))
-            every[[number - 1 for number, _ in moving(arm)]] = q
-            places = joint_positions(arm, every)
-            assert np.abs(simulated.data.site("tip").xpos - places[-1]).max() < 1e-9
-            assert np.abs(simulated.data.xpos[2:] - places[:-1]).max() < 1e-9
-
-
-def test_mjcf_gravity_torque_matches_the_urdf() -> None:
-    """Compare qfrc_bias at rest; both files have the same ten digits."""
-    for arm in ARMS:
-        simulated = Simulated(arm)
-        peer = pinocchio.buildModelFromXML(to_urdf(arm))
-        for q in postures(arm):
-            simulated.put(q)
-            torque = pinocchio.computeGeneralizedGravity(peer, peer.createData(), q)
-            assert np.abs(simulated.data.qfrc_bias - torque).max() < 1e-12 * load(arm)
-
-
-def test_mjcf_gravity_torque_matches_the_reference() -> None:
-    for arm in TURNING:
-        simulated, chain = Simulated(arm), reference.chains([arm])
-        for q in postures(arm):
-            simulated.put(q)
-            torque = reference.gravity_torque(chain, q[None, None])[0, 0]
-            assert np.abs(simulated.data.qfrc_bias - torque).max() < 1e-9 * load(arm)
-
-
 def test_mjcf_motion_matches_the_urdf() -> None:
     """Any torques on joints that move anyhow: Pinocchio's inverse dynamics of MuJoCo's accelerations gives them back.
 
@@ -146,24 +84,6 @@ def test_mjcf_motion_matches_the_urdf() -> None:
             simulated.put(q, speed, ctrl)
             needed = pinocchio.rnea(peer, peer.createData(), q, speed, simulated.data.qacc)
             assert np.abs(needed - ctrl).max() < 1e-8
-
-
-def test_gravity_torques_hold_the_posture() -> None:
-    """Apply them for ten steps; without them nearly every arm falls."""
-    falls: list[bool] = []
-    for arm in ARMS:
-        simulated = Simulated(arm)
-        for q in postures(arm):
-            simulated.put(q)
-            torque = simulated.data.qfrc_bias.copy()
-            simulated.put(q, ctrl=torque)
-            mujoco.mj_step(simulated.model, simulated.data, 10)
-            assert np.abs(simulated.data.qvel).max() < 1e-6
-            assert np.abs(simulated.data.qpos - q).max() < 1e-8
-            simulated.put(q)
-            mujoco.mj_step(simulated.model, simulated.data, 10)
-            falls.append(np.abs(simulated.data.qvel).max() > 1e-3)
-    assert np.mean(falls) > 0.8  # not one whose only joint slides or turns level
 
 
 def test_mjcf_geometry_has_no_contacts() -> None:
@@ -193,17 +113,6 @@ def test_cylinders_reach_from_joint_to_joint() -> None:
             assert model.geom_size[i, 0] == pytest.approx(link.radius)
 
 
-def test_joints_have_the_colours_of_the_urdf() -> None:
-    model = Simulated(MIXED).model
-    colours = {m.get("name"): m.find("color") for m in ElementTree.fromstring(to_urdf(MIXED)).findall("material")}
-    for name, colour in colours.items():
-        assert name is not None
-        assert colour is not None
-        assert np.allclose(model.material(name).rgba, [float(c) for c in colour.attrib["rgba"].split()])
-    materials = [model.material(i).name for i in model.geom_matid if model.material(i).name != "link"]
-    assert materials == [f"joint_{joint.axis}" for joint in MIXED.joints]
-
-
 @pytest.mark.parametrize("offset", [(0.0, 0.0, 0.2), (0.0, 0.0, 0.0), (1e-15, 0.0, 0.0)])
 @pytest.mark.parametrize("mass", [0.0, 1e-13])
 def test_massless_arm_compiles(offset: tuple[float, float, float], mass: float) -> None:
@@ -215,30 +124,3 @@ def test_massless_arm_compiles(offset: tuple[float, float, float], mass: float) 
         assert np.abs(simulated.data.qfrc_bias).max() < 1e-10
         mujoco.mj_step(simulated.model, simulated.data, 10)
         assert np.all(np.isfinite(simulated.data.qpos))
-
-
-def test_immobile_arm_compiles() -> None:
-    simulated = Simulated(Arm((0.0, 0.0, 1.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.1, 0.2), 1.0, 0.02),)))
-    simulated.put(np.zeros(0))
-    assert (simulated.model.nq, simulated.model.nu) == (0, 0)
-    assert np.allclose(simulated.data.site("tip").xpos, [0.0, 0.1, 1.2])
-
-
-def test_links_without_length_load() -> None:
-    """The inertia of a disc is at the limit of validity; rounding must not exceed it."""
-    joint = Joint("revolute", "y", -1.0, 1.0)
-    for mass, radius in np.random.default_rng(36).uniform([0.001, 0.001], [5.0, 0.1], (200, 2)).tolist():
-        link = Link((0.0, 0.0, 0.0), mass, (0.0, 0.0, 0.0), radius)
-        assert Simulated(Arm((0.0, 0.0, 0.0), (joint,), (link,))).model.nv == 1
-
-
-@pytest.mark.parametrize("name", ['<arm> & "friends"', "it's", "Ärmchen", "a]]>b", "", "two\nlines", "x" * 5000])
-def test_names_are_escaped(name: str) -> None:
-    assert ElementTree.fromstring(to_mjcf(MIXED, name)).get("model") == name
-    assert bytes(Simulated(MIXED, name).model.names).split(b"\0")[0].decode() == name
-
-
-def test_export_is_deterministic() -> None:
-    """The text depends only on the arm and its name."""
-    assert to_mjcf(MIXED) == to_mjcf(MIXED)
-    assert to_mjcf(MIXED).startswith('<?xml version="1.0"?>\n<mujoco model="arm">')

@@ -69,8 +69,3 @@ def test_only_arms_whose_first_joint_makes_no_full_turn_need_turning() -> None:
 def test_other_numbers_are_no_mounting(numbers: tuple[float, ...]) -> None:
     with pytest.raises(SettingsError, match="three finite numbers for the base"):
         Mounting.of(numbers)
-
-
-def test_description_names_place_and_turn() -> None:
-    assert Mounting.of((0.1, 0.0, 0.25)).description == "base at (0.1, 0, 0.25) m"
-    assert Mounting.of((0.1, 0.0, 0.25, math.pi / 2)).description == "base at (0.1, 0, 0.25) m, turned by 90°"

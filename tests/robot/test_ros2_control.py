@@ -7,7 +7,7 @@ import mujoco
 import pytest
 import yourdfpy
 
-from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.robot.arm import Arm
 from armwright.robot.ros2_control import to_ros2_control
 from armwright.robot.urdf_writer import to_urdf
 from tests.support.exported_arms import ARMS, MIXED, Peer, moving
@@ -65,8 +65,3 @@ def test_plugin_is_configurable_and_escaped() -> None:
     for plugin in ("gz_ros2_control/GazeboSimSystem", "<&>"):
         robot = ElementTree.fromstring(to_ros2_control(MIXED, plugin=plugin))
         assert robot.findtext("ros2_control/hardware/plugin") == plugin
-
-
-def test_immobile_arm_has_no_interfaces() -> None:
-    arm = Arm((0.0, 0.0, 1.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.1, 0.2), 1.0, 0.02),))
-    assert ElementTree.fromstring(to_ros2_control(arm)).findall("ros2_control/joint") == []

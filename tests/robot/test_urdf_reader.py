@@ -99,14 +99,6 @@ def test_exported_urdf_is_read_back(file: Path, seed: int) -> None:
     assert set(read.zeros) == {0.0}
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_link_frames_may_have_any_orientation(file: Path, seed: int) -> None:
-    """The arm does not depend on the orientation of link frames and axes."""
-    arm = any_arm(seed, ("revolute", "prismatic"))
-    file.write_text(with_frames_anyhow(arm, seed), encoding="utf-8")
-    assert_equal_arms(read_urdf(file).arm, arm)
-
-
 @pytest.mark.parametrize("seed", range(12))
 def test_fixed_joints_are_merged(file: Path, seed: int) -> None:
     """Tip and gravity torques, with payload, agree with Pinocchio."""

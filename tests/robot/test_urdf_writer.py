@@ -1,36 +1,22 @@
 """URDF files in Pinocchio, MuJoCo, yourdfpy and scikit-robot."""
 
-import io
+from collections.abc import Callable
 from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 import pinocchio
 import pytest
-import yourdfpy
 
-from armwright.robot.arm import Arm, Joint, Link, uniform_link
+from armwright.robot.arm import Arm, Joint, Link
+from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from tests.support import reference_kinematics as reference
 from tests.support.arms import general_arms, paper_arms
+from tests.support.exported_arms import BARE, moving
 
 ARMS = [*paper_arms(2, 4, 21), *general_arms(2, 3, 22), *general_arms(2, 8, 23)]
-MIXED = Arm(
-    (0.1, -0.2, 0.3),
-    (Joint("fixed", "x"), Joint("prismatic", "z", -0.1, 0.4), Joint("revolute", "y", -1.0, 2.0), Joint("fixed", "z")),
-    (
-        Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.02),  # no mass
-        uniform_link((0.1, 0.0, 0.0), 0.4, 0.02),
-        Link((0.0, 0.0, 0.0), 0.3, (0.0, 0.0, 0.0), 0.02),  # no length
-        uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),  # downward
-    ),
-)
-EVERY_ARM = pytest.mark.parametrize("arm", [*ARMS, MIXED])
-
-
-def moving(arm: Arm) -> list[tuple[int, Joint]]:
-    """(number from 1, joint) of the joints that move."""
-    return [(number, joint) for number, joint in enumerate(arm.joints, start=1) if joint.kind != "fixed"]
+EVERY_ARM = pytest.mark.parametrize("arm", [*ARMS, BARE])
 
 
 def cylinder_inertia(link: Link) -> np.ndarray:
@@ -80,30 +66,6 @@ def test_urdf_in_mujoco_matches_the_arm(arm: Arm) -> None:
 
 
 @EVERY_ARM
-def test_urdf_in_yourdfpy_matches_the_arm(arm: Arm) -> None:
-    """Every inertia is that of a solid cylinder about its centre of mass, and one that a body can have."""
-    urdf = yourdfpy.URDF.load(io.BytesIO(to_urdf(arm).encode()))
-    assert urdf.validate()
-    joints = {joint.name: joint for joint in urdf.robot.joints}
-    for number, joint in enumerate(arm.joints, start=1):
-        assert joints[f"joint_{number}"].type == joint.kind
-    for number, joint in moving(arm):
-        seen = joints[f"joint_{number}"]
-        assert np.allclose(seen.axis, np.eye(3)["xyz".index(joint.axis)])
-        assert (seen.limit.lower, seen.limit.upper) == pytest.approx((joint.lower, joint.upper))
-    links = {link.name: link for link in urdf.robot.links}
-    for number, link in enumerate(arm.links, start=1):
-        inertial = links[f"link_{number}"].inertial
-        assert inertial.mass == pytest.approx(link.mass)
-        assert np.allclose(inertial.origin[:3, 3], link.com)
-        R = inertial.origin[:3, :3]
-        assert np.allclose(R @ inertial.inertia @ R.T, cylinder_inertia(link), rtol=1e-6, atol=1e-12)
-        least, middle, most = np.linalg.eigvalsh(inertial.inertia)
-        assert least + middle >= most * (1 - 1e-12)
-        assert least > 0.0 or link.mass == 0.0
-
-
-@EVERY_ARM
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_urdf_in_scikit_robot_matches_the_arm(arm: Arm) -> None:
     """Masses, limits and axes; and the tip stands at the straight arm's."""
@@ -138,15 +100,10 @@ def test_massless_arm_has_no_mass_in_any_parser() -> None:
     assert sum(inertia.mass for inertia in pinocchio.buildModelFromXML(to_urdf(arm)).inertias) == 0.0
 
 
-@pytest.mark.parametrize("name", ['<arm> & "friends"', "it's", "Ärmchen", "a]]>b"])
-def test_names_are_escaped(name: str) -> None:
-    text = to_urdf(ARMS[0], name)
-    assert ElementTree.fromstring(text).get("name") == name
-    assert pinocchio.buildModelFromXML(text).name == name
+@pytest.mark.parametrize("write", [to_urdf, to_mjcf])
+@pytest.mark.parametrize("name", ['<arm> & "friends"', "it's", "Ärmchen", "a]]>b", "", "two\nlines", "x" * 5000])
+def test_names_are_escaped(name: str, write: Callable[[Arm, str], str]) -> None:
+    text = write(ARMS[0], name)
+    root = ElementTree.fromstring(text)
+    assert root.get("name" if write is to_urdf else "model") == name
     assert mujoco.MjModel.from_xml_string(text).nv == 4
-
-
-def test_export_is_deterministic() -> None:
-    """The text holds no time and no arbitrary order."""
-    assert to_urdf(ARMS[0]) == to_urdf(ARMS[0])
-    assert to_urdf(ARMS[0]).startswith('<?xml version="1.0"?>\n<robot name="arm">')

@@ -80,7 +80,7 @@ def test_space_file_declares_parameters_after_the_built_in_ones(tmp_path: Path) 
         ({"kp": {"range": [2, 1], "unit": "N m"}}, r"kp: range = \[2, 1\] N m is reversed"),
         ({"kp": {"range": [0, 1], "scale": "log"}}, "expected values above 0 with scale: log"),
         ({"kp": {"range": [0.5, 1], "integer": True}}, "expected whole numbers"),
-        ({"kp": {"range": [0, 1], "scal": "log"}}, "kp: scal: "),
+        ({"kp": {"range": [0, 1], "scal": "log"}}, 'kp: unknown key "scal"'),
         ({"belt": {"choices": ["a", "A"]}}, "expected different names"),
         ({"belt": {"choices": ["a b"]}}, "choices: expected at most 40"),
         ({"belt": {"choices": ["a"], "unit": "m"}}, "expected no scale, integer or unit"),

@@ -151,7 +151,6 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
         ("column: {wall: 0.04}", "column: expected a wall of at most the radius, 0.03 m"),
         ("column: {}\nmount: wall+x", "column: expected mount: floor, got wall+x"),
         ("base_on: table\nmount: [floor, ceiling]", "base_on: expected mount: floor, got floor, ceiling"),
-        ("link_radius: 0.02", 'It is now called "link_section".'),
         ("origin_x: [-.inf, 1]", "finite"),
         ("origin_x: [-1.0e308, 1]", "exceeds ±1000"),
         ("- a\n- list", "keys and values"),

@@ -85,8 +85,8 @@ def line_errors(peer: Peer, task: Task, start: int, end: int, share: Array, q: A
 
     q: (S, D) of the joints that move.
     """
-    first, last = (task.target_specs[i] for i in (start, end))
-    points = np.array([task.targets[start], task.targets[end]])
+    first, last = (task.targets[i] for i in (start, end))
+    points = task.target_positions[[start, end]]
     poses = np.array([peer.tip(row) for row in q])
     distance = np.linalg.norm(poses[:, :3, 3] - points[0] - share[:, None] * (points[1] - points[0]), axis=1)
     if isinstance(first, tuple) or isinstance(last, tuple):

@@ -36,6 +36,18 @@ MIXED = Arm(
     base_mass=0.3,
 )
 
+# Likewise without actuators: a joint and a link that are fixed, no mass, no length, downward
+BARE = Arm(
+    (0.1, -0.2, 0.3),
+    (Joint("fixed", "x"), Joint("prismatic", "z", -0.1, 0.4), Joint("revolute", "y", -1.0, 2.0), Joint("fixed", "z")),
+    (
+        Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.02),
+        uniform_link((0.1, 0.0, 0.0), 0.4, 0.02),
+        Link((0.0, 0.0, 0.0), 0.3, (0.0, 0.0, 0.0), 0.02),
+        uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),
+    ),
+)
+
 
 def a_body(rng: np.random.Generator) -> dict[str, Any]:
     """Mass, centre and inertia of three bars at right angles, turned anyhow."""

@@ -1,5 +1,6 @@
-"""Rigid payloads, off the tip and with inertia."""
+"""Rigid payloads, off the tip and with inertia, and tools, on designs and on existing arms."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,20 +8,25 @@ import pinocchio
 import pytest
 
 from armwright.kinematics.arms.arm_arrays import carrying, stack_arms
+from armwright.kinematics.arms.forward import joint_positions
 from armwright.kinematics.ik.ik import solve_postures
-from armwright.llm.prompt import load_prompt
-from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
+from armwright.robot.arm import MountedTool
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.history import History
-from armwright.spaces.design_space import DesignSpace
+from armwright.rotations import rotation_from_rpy
+from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.tool_mount import with_tool
 from armwright.tasks.payload import Payload
 from armwright.tasks.task import Task
+from armwright.tasks.tool import Tool
 from tests.support.dynamics import inverse_dynamics
-from tests.support.exported_arms import ARMS, Peer, full, load, moving, postures
+from tests.support.exported_arms import ARMS, Peer, full, load, moving, peer_of, postures
 
 BOX = Payload(mass=0.8, center=(0.02, -0.01, 0.05), size=(0.06, 0.04, 0.1))
 BODY = Payload(mass=1.3, center=(-0.03, 0.02, 0.04), inertia=(3e-3, 2e-3, 4e-3))
+HELD = Tool(
+    tip=(0.02, -0.03, 0.1), rpy=(0.4, -0.3, 2.0), mass=0.7, center=(0.03, 0.01, 0.06), inertia=(3e-4, 2e-4, 4e-4)
+)
 POINTS = [[0.3, 0.1, 0.2], [0.1, 0.3, 0.3]]
 TOOL = {"tip": [0.02, -0.03, 0.1], "rpy": [0.4, -0.3, 2.0], "mass": 0.7, "center": [0.0, 0.0, 0.05]}
 SPACE = DesignSpace.model_validate(
@@ -126,33 +132,42 @@ def test_shape_of_a_payload_does_not_change_other_arms_of_the_batch() -> None:
     assert np.array_equal(one[::2], other[::2])
 
 
-def test_number_is_a_point_mass_at_the_tip() -> None:
-    problem = Problem(task(payload=0.8), SPACE)
-    designs = SPACE.sample(5, 6)
-    alone = evaluate([problem.arm(design) for design in designs], POINTS, payload=0.8)
-    assert np.array_equal(problem.physics(designs).joint_torques, alone.joint_torques)
+@pytest.mark.parametrize("arm", ARMS)
+def test_tool_on_an_existing_arm_is_placed_in_its_tip_frame(arm: Any) -> None:
+    held = with_tool(arm, HELD)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation_from_rpy(*HELD.rpy), HELD.tip
+    for q in postures(arm, 3):
+        expected = peer_of(arm).tip(q) @ pose
+        assert np.allclose(peer_of(held).tip(q), expected, atol=1e-9)
+        assert np.allclose(joint_positions(held, full(arm, q))[-1], expected[:3, 3], atol=1e-9)
 
 
-def test_prompt_states_tool_and_payload() -> None:
-    problem = Problem(task(tool=TOOL, payload=BOX.model_dump()), SPACE)
-    prompt = load_prompt("plus").render(History(problem, [], 1, problem.reference_point), 0)
-    assert "The tip is 0.02, -0.03, 0.1 m from the end of the last link" in prompt
-    assert "the tool has 0.7 kg, with its centre of mass at (0, 0, 0.05) m" in prompt
-    assert "0.8 kg, centre at (0.02, -0.01, 0.05) m in the tip frame, a box of (0.06, 0.04, 0.1) m" in prompt
+def test_arms_of_a_problem_carry_the_tool_of_its_task() -> None:
+    bare, tooled = (Problem(task(**more)) for more in ({}, {"tool": HELD.model_dump()}))
+    design = paper_space().sample(1, 0)[0]
+    assert bare.arm(design) == paper_space().arm(design)
+    assert tooled.arm(design) == paper_space().arm(design, HELD) == with_tool(bare.arm(design), HELD)
+    assert tooled.max_reach == pytest.approx(bare.max_reach + np.linalg.norm(HELD.tip))
+    assert np.allclose(tooled.physics([design]).arms.tool.tip, HELD.tip)
+    assert tooled.arm(design).mass == pytest.approx(bare.arm(design).mass + HELD.mass)
 
 
-@pytest.mark.parametrize(
-    ("payload", "words"),
-    [
-        ({"mas": 0.5}, r'Did you mean "mass"\?'),
-        ({"center": [0.0, 0.0, 0.1]}, r"payload: mass: expected a number \[kg\], but the key is missing"),
-        ({"mass": 0.0}, "payload: mass"),
-        ({"mass": 0.5, "size": [0.1, 0.1]}, "payload: size"),
-        ({"mass": 0.5, "size": [0.1, 0.1, 0.0]}, "payload: size"),
-        ({"mass": 0.5, "size": [0.1, 0.1, 0.1], "inertia": [1e-3, 1e-3, 1e-3]}, "expected size or inertia, got both"),
-        ({"mass": 0.5, "inertia": [1e-3, 1e-3, 3e-3]}, "at most the sum of the other two"),
-    ],
-)
-def test_invalid_payload_is_refused(payload: object, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        task(payload=payload)
+@pytest.mark.parametrize("arm", ARMS)
+def test_mass_of_a_tool_counts_as_in_pinocchio(arm: Any) -> None:
+    """Add the tool to Pinocchio's model by its own means; compare gravity, inverse dynamics and the mass matrix."""
+    bare = replace(arm, tool=replace(arm.tool, mass=0.0, com=(0.0, 0.0, 0.0), inertia=MountedTool().inertia))
+    body = pinocchio.Inertia(HELD.mass, np.array(HELD.center), np.diag(HELD.inertia))
+    peer, held = carrying_peer(to_urdf(bare), body), with_tool(bare, HELD)
+    arrays, rng = stack_arms([held], "float64"), np.random.default_rng(1)
+    own = [number - 1 for number, _ in moving(arm)]
+    for q in postures(arm, 3):
+        v, a = rng.uniform(-2.0, 2.0, (2, len(q)))
+        expected = pinocchio.rnea(peer.model, peer.data, q, v, a)
+        rows = [full(arm, values)[None, None] for values in (q, v, a)]
+        found = inverse_dynamics(arrays, *rows, np.zeros(1))[0, 0, own]
+        assert found == pytest.approx(expected, rel=1e-8, abs=1e-8 * load(held))
+        solved = solve_postures(arrays, np.zeros((1, 3)), 0, initial_q=rows[0], precision="float64")
+        assert solved.torque[0, 0, own] == pytest.approx(peer.gravity(q), rel=1e-8, abs=1e-8 * load(held))
+        assert peer_of(held).gravity(q) == pytest.approx(peer.gravity(q), rel=1e-8, abs=1e-8 * load(held))
+        assert peer_of(held).mass_matrix(q) == pytest.approx(peer.mass_matrix(q), rel=1e-8, abs=1e-8 * load(held))

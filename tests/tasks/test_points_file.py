@@ -162,13 +162,13 @@ REFUSED = {
     "x,y,z,qx,qy,qz\n1,2,3,0,0,0\n": "got no qw",
     "x,y,z,ax\n1,2,3,0\n": "got no ay, az",
     "x,y,z,ax,ay,az,qx,qy,qz,qw\n1,2,3,0,0,1,0,0,0,1\n": "expected one kind of tool direction",
-    "x,y,z,roll,pitch,yaw\n1,2,3,0,0,0\n": '"roll": expected a unit, roll [deg] or roll [rad]',
+    "x,y,z,roll,pitch,yaw\n1,2,3,0,0,0\n": '"roll": expected roll [rad] or roll [deg]',
     "x,y,z,ax [m/s²],ay,az\n1,2,3,0,0,1\n": '"ax [m/s²]": expected no unit',
     "x,y,z,ax,ay,az\n1,2,3,0,0,0\n": "line 2: axis",
     "x,y,z,qx,qy,qz,qw\n1,2,3,0,1,0,1\n": "expected a quaternion of length 1",
     "x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,0\n": "expected a quaternion of length 1",
     "x,y,z,roll [deg],pitch [deg],yaw [deg]\n1,2,3,0,720,0\n": "line 2: orientation",
-    "x [inch],y [inch],z [inch]\n1,2,3\n": '"x [inch]": expected the unit m or mm',
+    "x [inch],y [inch],z [inch]\n1,2,3\n": '"x [inch]": expected x [m] or x [mm]',
     "x [mm],y [mm],z\n1,2,3\n": "expected a unit in each of 'x [mm]', 'y [mm]', 'z' or in none",
     "name,x,y,z\na,1,2,3\nb,1,2,3\na,1,2,4\n": 'line 4: the name "a" is also in line 2',
     "name,x,y,z\n1,1,2,3\n": "line 2: name: expected a letter",
@@ -219,5 +219,5 @@ targets = st.builds(
 def test_template_holds_the_targets(target: Target | Point) -> None:
     text = task_template(Path("mine.yaml"), [target])
     task = parse_document(text, Task, TaskError, "mine.yaml")
-    assert task.target_specs == (target,)
+    assert task.targets == (target,)
     assert len(yaml.safe_load(text)["targets"]) == 1

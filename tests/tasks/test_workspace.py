@@ -1,21 +1,15 @@
 """Workspaces against scipy and closed forms."""
 
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from scipy.stats import qmc
-from typer.testing import CliRunner
 
-from armwright.cli.app import app
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.ik.solve import solve
-from armwright.problem.evaluation import Evaluation, evaluate
+from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import DEXTEROUS_VOLUME, OBJECTIVES, UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION
-from armwright.problem.problem import Outcomes, Problem
+from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.rotations import cone_directions
 from armwright.spaces.design_space import paper_space
@@ -25,7 +19,6 @@ from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region, sample_regions
 from armwright.yaml_documents import parse_document
 
-Array = NDArray[np.float64]
 CUBE = {"low": (0.0, 0.0, 0.0), "high": (1.0, 1.0, 1.0)}
 
 
@@ -40,18 +33,6 @@ def task(**more: Any) -> Task:
 
 
 # The points
-
-
-def radical_inverse(number: int, base: int) -> float:
-    """Return the digits of a number in reverse order behind the point (Halton 1960)."""
-    return 0.0 if number == 0 else (number % base + radical_inverse(number // base, base)) / base
-
-
-def test_workspace_points_are_halton_points() -> None:
-    expected = [[radical_inverse(i, base) for base in (2, 3, 5)] for i in range(1, 3001)]
-    assert sample_regions((region(points=3000),)) == pytest.approx(np.array(expected))
-    by_chance = np.mean([qmc.discrepancy(np.random.default_rng(i).random((200, 3))) for i in range(10)])
-    assert qmc.discrepancy(sample_regions((region(points=200),))) < 0.2 * by_chance
 
 
 def test_workspace_points_lie_in_their_region() -> None:
@@ -97,30 +78,6 @@ def test_workspace_points_are_solved_like_targets() -> None:
     assert problem.evaluate(designs).values[:, 0] == pytest.approx((as_targets.position_error >= 1e-3).mean(axis=1))
 
 
-def test_longer_arms_cover_at_least_as_much() -> None:
-    """Scaling arm and workspace together changes nothing."""
-    space = paper_space(5)
-    small = [space.arm(design) for design in space.sample(40, 1)]
-    large = [
-        Arm(
-            tuple(2 * x for x in arm.base),
-            arm.joints,
-            tuple(uniform_link((0, 0, 2 * link.length), 0.1, 0.01) for link in arm.links),
-        )
-        for arm in small
-    ]
-    boxes = [region(low=(-k * 0.4,) * 3, high=(k * 0.4,) * 3) for k in (1, 2)]
-    one, other = (
-        evaluate(arms, [[0.1, 0.2, 0.3]], workspace=[box]) for box, arms in zip(boxes, (small, large), strict=True)
-    )
-    points = sample_regions((boxes[0],))
-    reach = np.array([arm.reach for arm in small])
-    beyond = np.linalg.norm(points - np.array([arm.base for arm in small])[:, None], axis=-1) > reach[:, None] + 1e-3
-    for evaluation in (one, other):
-        assert np.all(evaluation.workspace_error[beyond] >= 1e-3)
-    assert UNCOVERED_FRACTION(one).mean() == pytest.approx(UNCOVERED_FRACTION(other).mean(), abs=0.02)
-
-
 def test_workspace_is_computed_on_demand() -> None:
     designs = paper_space().sample(10, 0)
     target_1 = load_task("target-1")
@@ -137,23 +94,6 @@ def test_no_workspace_means_nothing_uncovered() -> None:
         Problem(
             random_task(1).model_copy(update={"reference_point": None}), objectives=(OBJECTIVES["uncovered_fraction"],)
         ).evaluate(paper_space().sample(1, 0))
-
-
-def test_large_batches_equal_small_ones(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = Problem(task(objectives=["uncovered_fraction", "torque"]))
-    designs = problem.space.sample(30, 5)
-    values = problem.evaluate(designs).values
-    sizes: list[int] = []
-    outcomes_of = Problem.outcomes
-
-    def counted(self: Problem, evaluation: Evaluation, *measured: Mapping[str, Array]) -> Outcomes:
-        sizes.append(len(evaluation))
-        return outcomes_of(self, evaluation, *measured)
-
-    monkeypatch.setattr("armwright.problem.problem.POSTURES_AT_ONCE", {"cpu": 1000})
-    monkeypatch.setattr(Problem, "outcomes", counted)
-    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)).values, values)
-    assert max(sizes) * (200 + 8) <= 1000
 
 
 # From the file on
@@ -177,6 +117,10 @@ FAULTS = {
     "[[0, 0, 0], [1, 1, 1]]": "workspace",
     "everything": r"workspace: expected \{low: \[x, y, z\], high",
     "[]": "targets",
+    "{low: [0, 0, 0], high: [1, 1, 1], directions: {axis: [0, 0, 0]}}": r"directions: axis = \[0.0, 0.0, 0.0\] is no",
+    "{low: [0, 0, 0], high: [1, 1, 1], directions: {half_angle: 45}}": "directions.half_angle: .* at most 3.14159 rad",
+    "{low: [0, 0, 0], high: [1, 1, 1], directions: {cone: 1}}": 'directions: unknown key "cone"',
+    "{low: [0, 0, 0], high: [1, 1, 1], points: 600, directions: {count: 100}}": "at most 50000 points x directions",
     "[{low: [0, 0, 0], high: [1, 1, 1], points: 6000}, {low: [0, 0, 0], high: [1, 1, 1], points: 6000}]": "10000",
 }
 
@@ -187,33 +131,6 @@ def test_invalid_workspaces_are_refused_in_one_line(written: str) -> None:
     with pytest.raises(TaskError, match=FAULTS[written]) as refused:
         parse_document(text, Task, TaskError, "it.yaml")
     assert "\n" not in str(refused.value)
-
-
-def test_targets_allow_an_empty_workspace() -> None:
-    text = "name: x\ntargets: [[0.1, 0.2, 0.3]]\nworkspace: []"
-    assert parse_document(text, Task, TaskError, "it").workspace == ()
-
-
-def test_too_many_boxes_are_refused() -> None:
-    with pytest.raises(ValueError, match="should have at most 20 items after validation, not 21"):
-        task(workspace=[CUBE] * 21)
-
-
-@pytest.mark.slow
-def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
-    (in_folder / "cover.yaml").write_text(
-        "name: cover\nworkspace: {low: [0.2, -0.3, 0.1], high: [0.5, 0.3, 0.4], points: 60}\n"
-        "objectives: [uncovered_fraction, torque]\n",
-        encoding="utf-8",
-    )
-    told = CliRunner().invoke(app, ["optimize", "cover.yaml", "--n-total", "20", "--out", "run"])
-    assert told.exit_code == 0, told.output
-    shown = CliRunner().invoke(app, ["tasks", "cover.yaml"]).output
-    assert "workspace: box from (0.2, -0.3, 0.1) to (0.5, 0.3, 0.4), 60 points" in shown
-    told = CliRunner().invoke(
-        app, ["optimize", "cover.yaml", "--objectives", "torque", "--n-total", "2", "--no-figures", "--out", "other"]
-    )
-    assert "no objective or constraint uses the task's workspace; quantities for it: uncovered_fraction" in told.output
 
 
 # Directions of the tool
@@ -241,14 +158,6 @@ def test_dexterous_volume_is_that_of_many_restarts() -> None:
         assert value == pytest.approx((peer.mean(axis=1) >= 0.5).mean(), abs=0.05)
 
 
-def test_dexterous_volume_of_padded_arms_is_their_own() -> None:
-    box = region(low=(-0.4, -0.4, 0.0), high=(0.4, 0.4, 0.4), points=20, directions=CONE)
-    short, long = paper_space(5).arm(paper_space(5).sample(1, 2)[0]), paper_space(7).arm(paper_space(7).sample(1, 2)[0])
-    both = evaluate([short, long], [[0.1, 0.2, 0.3]], workspace=[box])
-    alone = evaluate(short, [[0.1, 0.2, 0.3]], workspace=[box])
-    assert DEXTEROUS_VOLUME(both)[0] == DEXTEROUS_VOLUME(alone)[0]
-
-
 def test_points_behind_an_obstacle_are_not_dexterous() -> None:
     """A rod on three slides reaches all points of a box, those above a plate only where the plate is not in its way."""
     joints = tuple(Joint("prismatic", axis, -0.5, 0.5) for axis in ("x", "y", "z"))
@@ -267,15 +176,6 @@ def test_points_behind_an_obstacle_are_not_dexterous() -> None:
     assert DEXTEROUS_VOLUME(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[around]))[0] == 0.0
 
 
-def test_regions_without_directions_do_not_count() -> None:
-    (arm,) = (paper_space(6).arm(design) for design in paper_space(6).sample(1, 1))
-    asked = region(points=20, directions=CONE)
-    first, second = (evaluate(arm, [[0.1, 0.2, 0.3]], workspace=boxes) for boxes in ([asked], [asked, region()]))
-    assert np.array_equal(DEXTEROUS_VOLUME(first), DEXTEROUS_VOLUME(second))
-    with pytest.raises(SettingsError, match="need a workspace with directions in the task; try workspace: "):
-        DEXTEROUS_VOLUME(evaluate(arm, [[0.1, 0.2, 0.3]], workspace=[region()]))
-
-
 def test_tasks_bound_and_minimise_directions_of_the_tool() -> None:
     box = {"low": (-0.3, -0.3, 0.1), "high": (0.3, 0.3, 0.4), "points": 10, "directions": CONE}
     asked = task(workspace=box, objectives=["undexterous_fraction", "length"], constraints=["dexterous_volume >= 0.5"])
@@ -285,27 +185,3 @@ def test_tasks_bound_and_minimise_directions_of_the_tool() -> None:
     fraction = outcomes.values[:, 0]
     assert np.all((fraction >= 0.0) & (fraction <= 1.0))
     assert np.array_equal(outcomes.violations[:, 0] > 0.0, 1.0 - fraction < 0.5)
-
-
-def test_unstated_directions_leave_a_region_as_it_was() -> None:
-    assert region().describe() == "box from (0, 0, 0) to (1, 1, 1), 200 points"
-    assert region(directions={}).describe().endswith("200 points, 12 tool directions within 180° of (0, 0, -1)")
-
-
-@pytest.mark.parametrize(
-    ("directions", "message"),
-    [
-        ("{axis: [0, 0, 0]}", r"axis = \[0.0, 0.0, 0.0\] is no direction; try \[0, 0, -1\]"),
-        ("{axis: down}", "axis"),
-        ("{half_angle: 45}", "half_angle"),
-        ("{count: 0}", "count"),
-        ("{share: 0}", "share"),
-        ("{cone: 1}", "cone"),
-        ("{count: 100}", "workspace: expected at most 50000 points x directions in all boxes together, got 60000"),
-    ],
-)
-def test_invalid_directions_are_refused_in_one_line(directions: str, message: str) -> None:
-    text = f"name: x\nworkspace: {{low: [0, 0, 0], high: [1, 1, 1], points: 600, directions: {directions}}}"
-    with pytest.raises(TaskError, match=message) as refused:
-        parse_document(text, Task, TaskError, "it.yaml")
-    assert "\n" not in str(refused.value)

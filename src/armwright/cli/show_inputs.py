@@ -4,7 +4,7 @@ import math
 import shlex
 import textwrap
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -12,7 +12,6 @@ from rich.console import Console
 from armwright.cli.streams import format_point, print_command, print_named
 from armwright.cli.tables import NO_BREAK, Column, Table, numbers, print_table
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
-from armwright.llm.draft import Draft
 from armwright.problem.checks.reach import distance_to_bases
 from armwright.problem.constraints import implied_constraints
 from armwright.problem.problem import Problem
@@ -21,6 +20,9 @@ from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
+
+if TYPE_CHECKING:
+    from armwright.llm.draft import Draft
 
 MAX_ROWS = 40  # of a table of targets
 
@@ -130,9 +132,9 @@ def show_task(
     reference = task.reference_point
     print_named(console, task.name, f": {task.description}" if task.description else "")
     if not is_brief:
-        points = " ".join(format_point(target) for target in task.targets)
+        points = " ".join(format_point(point) for point in task.target_positions.tolist())
         console.print(f"  {len(task.targets)} targets [m]: {points}")
-        for line in describe_targets(task.target_specs):
+        for line in describe_targets(task.targets):
             console.print(f"  {line}")
     if task.restarts:
         console.print(f"  {task.restarts + 1} initial postures of the inverse kinematics per target")
@@ -169,7 +171,7 @@ def show_target_table(console: Console, problem: Problem) -> None:
     heads = ("x [m]", "y [m]", "z [m]", "tolerance [mm]", "payload [kg]", f"nearest{NO_BREAK}base [m]")
     distances = distance_to_bases(problem.space, task.target_positions)
     rows: list[list[str]] = []
-    for i, point in enumerate(task.targets[:MAX_ROWS]):
+    for i, point in enumerate(task.target_positions[:MAX_ROWS].tolist()):
         values = (*point, 1e3 * arrays.tolerance[i], task.payloads[i], distances[i])
         rows.append([task.target_names[i], *(f"{value:.4g}" for value in values), _tool_direction(arrays, i)])
     console.print(f"  {len(task.targets)} targets:")
@@ -227,7 +229,7 @@ def _describe_payload(task: DesignTask) -> str:
     return ", ".join(f"{kg:g}" for kg in np.atleast_1d(task.payload)) + " kg" if task.payloads.any() else ""
 
 
-def show_draft(console: Console, draft: Draft) -> None:
+def show_draft(console: Console, draft: "Draft") -> None:
     """Print a drafted task and space, the assumptions and the next commands."""
     show_task(console, draft.task)
     if draft.space is None:

@@ -88,7 +88,7 @@ def _scene(task: Task, problem: Problem | None) -> dict[str, Any]:
         pairs = [(motion.start, motion.end) for motion in plan.motions if motion.by == "line"]
         lines = [plan.poses.position[list(pair)].tolist() for pair in pairs]
     return {
-        "targets": task.targets,
+        "targets": task.target_positions.tolist(),
         "names": task.target_names,
         "n_angular": arrays.n_angular.tolist(),
         "rotation": arrays.rotation.tolist(),

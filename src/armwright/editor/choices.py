@@ -6,7 +6,7 @@ from armwright.problem.objectives import OBJECTIVES, QUANTITIES
 from armwright.robot.actuators import ActuatorRecord, catalogue
 from armwright.robot.tubes import MATERIALS
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
-from armwright.tasks.points_columns import UNITS
+from armwright.tasks.points_file import UNITS
 
 
 def choices() -> dict[str, Any]:

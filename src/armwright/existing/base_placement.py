@@ -46,17 +46,11 @@ def with_travel(arm: Arm, travel: float) -> Arm:
 
 @dataclass(frozen=True)
 class Placement:
-    """An existing arm in its place on a task.
+    """An existing arm in its place on a task."""
 
-    Attributes:
-        described: The arm there, with its tool.
-        mounting: Where its base link stands.
-        tried: The number of places that were tried; 0 if the place was given.
-    """
-
-    described: UrdfArm
-    mounting: Mounting
-    tried: int = 0
+    described: UrdfArm  # arm there, with its tool
+    mounting: Mounting  # where its base link stands
+    tried: int = 0  # number of places that were tried; 0 if the place was given
 
     @property
     def description(self) -> str:

@@ -31,17 +31,11 @@ def known_values(quantity: Objective, evaluation: Evaluation, minimised: bool = 
 
 @dataclass(frozen=True)
 class ExistingArm:
-    """An existing arm on a task.
+    """An existing arm on a task."""
 
-    Attributes:
-        problem: The task, its objectives and constraints.
-        evaluation: Physics of this arm alone.
-        price: Its price as stated, in place of that of its parts [USD]; None if not stated.
-    """
-
-    problem: Problem
-    evaluation: Evaluation
-    price: float | None = None
+    problem: Problem  # task, its objectives and constraints
+    evaluation: Evaluation  # physics of this arm alone
+    price: float | None = None  # price as stated, in place of that of its parts [USD]; None if not stated
 
     def value(self, quantity: Objective, minimised: bool = False) -> float | None:
         """Return a quantity; None if it is not known."""

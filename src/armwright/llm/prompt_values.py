@@ -305,7 +305,7 @@ def shown_values(
     own = [trial.number for trial in history if trial.source == feedback.name]
     return {
         "targets": points(task.target_positions[shown], decimals),
-        "target_requirements": describe_targets([task.target_specs[i] for i in shown]),
+        "target_requirements": describe_targets([task.targets[i] for i in shown]),
         "target_low": vector(task.target_positions.min(axis=0), decimals),
         "target_high": vector(task.target_positions.max(axis=0), decimals),
         "n_targets_shown": len(shown),

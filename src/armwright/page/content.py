@@ -287,7 +287,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "folder": folder.resolve().name,
         "config": config.model_dump(mode="json"),
         "is_study": not isinstance(method, FrontMethod),
-        "targets": task.targets,
+        "targets": task.target_positions,
         "payloads": task.payloads,
         "cases": task.cases_description,
         "ignored_errors": describe_ignored_errors(config.problem),

@@ -12,31 +12,19 @@ ActuatorKind = Literal["servo", "coreless servo", "geared drive", "quasi-direct-
 
 @dataclass(frozen=True)
 class KindDefaults:
-    """Ratios of one kind of actuator: τ is its reference torque, ω its no-load speed, V its voltage.
+    """Ratios of one kind of actuator: τ is its reference torque, ω its no-load speed, V its voltage."""
 
-    Attributes:
-        time_constant: Rotor inertia x ω / τ [s].
-        coulomb: Coulomb friction / τ.
-        viscous: Viscous friction x ω / τ.
-        corner: Corner speed / ω.
-        backlash: Backlash [rad].
-        joint_stiffness: Joint stiffness / τ [1/rad].
-        gain: Position gain / τ [1/rad].
-        damping: Damping gain / position gain [s]; None for τ / ω, the back-EMF of a motor driven by a voltage.
-        current: Supply current at the peak torque x V / (τ ω).
-        continuous: Continuous torque / τ.
-    """
-
-    time_constant: float
-    coulomb: float
-    viscous: float
-    corner: float
-    backlash: float
-    joint_stiffness: float
-    gain: float
+    time_constant: float  # rotor inertia x ω / τ [s]
+    coulomb: float  # coulomb friction / τ
+    viscous: float  # viscous friction x ω / τ
+    corner: float  # corner speed / ω
+    backlash: float  # backlash [rad]
+    joint_stiffness: float  # joint stiffness / τ [1/rad]
+    gain: float  # position gain / τ [1/rad]
+    # Damping gain / position gain [s]; None for τ / ω, the back-EMF of a motor driven by a voltage
     damping: float | None
-    current: float
-    continuous: float = 0.25
+    current: float  # supply current at the peak torque x V / (τ ω)
+    continuous: float = 0.25  # continuous torque / τ
 
 
 _GEARED = KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.1), 100.0, 4.0, 0.05, 2.5)
@@ -86,20 +74,13 @@ def default_values(
     return values
 
 
-@dataclass(frozen=True)
-class DefaultShape:
-    """Shape of an actuator, and which of its edges is along its shaft."""
-
-    shape: BodyShape
-    shaft_edge: Literal["width", "height", "depth"]
-
-
-def default_shape(kind: ActuatorKind, width: float, height: float, depth: float) -> DefaultShape:
-    """Return the default shape of a kind with these edges [m].
+def default_shape(
+    kind: ActuatorKind, width: float, height: float, depth: float
+) -> tuple[BodyShape, Literal["width", "height", "depth"]]:
+    """Return the default shape of a kind with these edges [m], and which of them is along its shaft.
 
     Two equal edges are those of a square or round section about the shaft. Otherwise makers of servos state the depth
     along it. Servos and geared drives are boxes, flat drives are cylinders.
     """
-    round_kinds = ("quasi-direct-drive", "harmonic")
     edge = "width" if height == depth != width else "height" if width == depth != height else "depth"
-    return DefaultShape("cylinder" if kind in round_kinds else "box", edge)
+    return "cylinder" if kind in ("quasi-direct-drive", "harmonic") else "box", edge

@@ -6,10 +6,10 @@ and get the default of the actuator's kind.
 
 import csv
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import resources
-from typing import Any, Literal, cast
+from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -17,21 +17,15 @@ from armwright.exceptions import SpaceError, did_you_mean
 from armwright.robot.actuator_defaults import ActuatorKind, default_shape, default_values
 from armwright.robot.arm import Actuator
 from armwright.robot.motor_body import ActuatorShape, BodyShape
+from armwright.schema_types import members_of
+from armwright.units import KEY_UNITS
 
 CATALOGUE = "actuators.csv"
 SOURCES = "actuator_sources.csv"
 ESTIMATE = "~"  # before the code of a source from which a value is estimated
-UNITS: Mapping[str, str] = {
-    "voltage": "V", "mass": "kg", "stall_torque": "N m", "rated_torque": "N m", "peak_torque": "N m", "speed": "rad/s",
-    "corner_speed": "rad/s", "gear_ratio": "", "rotor_inertia": "kg m²", "coulomb_friction": "N m",
-    "viscous_friction": "N m s/rad", "backlash": "rad", "joint_stiffness": "N m/rad", "position_gain": "N m/rad",
-    "damping_gain": "N m s/rad", "current": "A", "width": "m", "height": "m", "depth": "m",
-    "shaft_offset": "m", "price": "USD",
-}  # fmt: skip
-
 Edge = Literal["width", "height", "depth"]
 
-DIMENSIONS: tuple[Edge, ...] = ("width", "height", "depth")
+DIMENSIONS: tuple[Edge, ...] = get_args(Edge)
 
 
 class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -100,10 +94,10 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         if self.width is None or self.height is None or self.depth is None:
             return None
         edges = {"width": self.width, "height": self.height, "depth": self.depth}
-        default = default_shape(self.kind, **edges)
-        length = edges.pop(self.shaft_edge or default.shaft_edge)
+        shape, shaft_edge = default_shape(self.kind, **edges)
+        length = edges.pop(self.shaft_edge or shaft_edge)
         short, long = sorted(edges.values())
-        if (self.shape or default.shape) == "cylinder":
+        if (self.shape or shape) == "cylinder":
             return ActuatorShape("cylinder", length, long, long)
         return ActuatorShape("box", length, long, short, (long - short) / 2)
 
@@ -164,26 +158,17 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
     def actuator(self) -> Actuator:
         """Return the actuator of an arm, with the values of `completed`."""
-        values = self.completed()
-        return Actuator(
-            name=self.name,
-            mass=self.mass,
-            peak_torque=cast("float", values.peak_torque),
-            speed=self.speed,
-            price=self.price,
-            continuous_torque=values.rated_torque,
-            corner_speed=values.corner_speed,
-            rotor_inertia=values.rotor_inertia,
-            coulomb_friction=values.coulomb_friction,
-            viscous_friction=values.viscous_friction,
-            backlash=values.backlash,
-            joint_stiffness=values.joint_stiffness,
-            position_gain=values.position_gain,
-            damping_gain=values.damping_gain,
-            voltage=self.voltage,
-            current=values.current,
-            shape=self.body_shape,
-        )
+        values = dict(self.completed())
+        values |= {"continuous_torque": values["rated_torque"], "shape": self.body_shape}
+        return Actuator(**{field.name: values[field.name] for field in fields(Actuator)})
+
+
+# Of all values that a record may state; empty for a number without a unit
+UNITS: Mapping[str, str] = {
+    name: KEY_UNITS.get(name, "")
+    for name, field in ActuatorRecord.model_fields.items()
+    if float in members_of(field.annotation)
+}
 
 
 def value_of(record: ActuatorRecord, name: str) -> float | None:
@@ -194,15 +179,10 @@ def value_of(record: ActuatorRecord, name: str) -> float | None:
 
 @dataclass(frozen=True)
 class Source:
-    """The source of a value.
+    """The source of a value."""
 
-    Attributes:
-        address: Where it is published.
-        statement: What is stated there, and how the value follows from it.
-    """
-
-    address: str
-    statement: str
+    address: str  # where it is published
+    statement: str  # what is stated there, and how the value follows from it
 
 
 @cache

@@ -16,54 +16,31 @@ UNIT = 1e-6  # tolerance on the length of a unit vector
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
-    """The actuator of a joint, carried by the link before it. All values are at its output; None if unknown.
+    """The actuator of a joint, carried by the link before it. All values are at its output; None if unknown."""
 
-    Attributes:
-        name: Its name in the catalogue or the space file.
-        mass: Its mass [kg].
-        peak_torque: Its largest torque, at rest and up to the corner speed [N m].
-        speed: Its speed without load [rad/s].
-        price: Its price [USD].
-        continuous_torque: The torque that it can hold forever [N m].
-        corner_speed: The speed from which on the available torque falls linearly, to 0 at `speed` [rad/s].
-        rotor_inertia: Inertia of rotor and gear [kg m²].
-        coulomb_friction: Friction at any speed [N m].
-        viscous_friction: Friction that is proportional to the speed [N m s/rad].
-        backlash: Backlash of its gear [rad].
-        joint_stiffness: Torsional stiffness from its motor to its output [N m/rad].
-        position_gain: Gain of its position control [N m/rad].
-        damping_gain: Damping of its position control [N m s/rad].
-        voltage: Its supply voltage [V].
-        current: Supply current at the peak torque [A].
-        shape: Its shape.
-    """
-
-    name: str
-    mass: float
-    peak_torque: float
-    speed: float | None = None
-    price: float | None = None
-    continuous_torque: float | None = None
+    name: str  # name in the catalogue or the space file
+    mass: float  # mass [kg]
+    peak_torque: float  # largest torque, at rest and up to the corner speed [N m]
+    speed: float | None = None  # speed without load [rad/s]
+    price: float | None = None  # price [USD]
+    continuous_torque: float | None = None  # torque that it can hold forever [N m]
+    # Speed from which on the available torque falls linearly, to 0 at `speed` [rad/s]
     corner_speed: float | None = None
-    rotor_inertia: float | None = None
-    coulomb_friction: float | None = None
-    viscous_friction: float | None = None
-    backlash: float | None = None
-    joint_stiffness: float | None = None
-    position_gain: float | None = None
-    damping_gain: float | None = None
-    voltage: float | None = None
-    current: float | None = None
+    rotor_inertia: float | None = None  # inertia of rotor and gear [kg m²]
+    coulomb_friction: float | None = None  # friction at any speed [N m]
+    viscous_friction: float | None = None  # friction that is proportional to the speed [N m s/rad]
+    backlash: float | None = None  # backlash of its gear [rad]
+    joint_stiffness: float | None = None  # torsional stiffness from its motor to its output [N m/rad]
+    position_gain: float | None = None  # gain of its position control [N m/rad]
+    damping_gain: float | None = None  # damping of its position control [N m s/rad]
+    voltage: float | None = None  # supply voltage [V]
+    current: float | None = None  # supply current at the peak torque [A]
     shape: ActuatorShape | None = None
 
     def __post_init__(self) -> None:
-        values = (getattr(self, field.name) for field in fields(self) if field.name not in ("name", "shape"))
-        numbers = [value for value in values if value is not None]
-        if not all(0.0 <= value < math.inf for value in numbers) or 0.0 in (
-            self.peak_torque,
-            self.speed,
-            self.joint_stiffness,
-        ):
+        numbers = [getattr(self, field.name) for field in fields(self) if field.name not in ("name", "shape")]
+        positive = (self.peak_torque, self.speed, self.joint_stiffness)
+        if 0.0 in positive or not all(value is None or 0.0 <= value < math.inf for value in numbers):
             raise ArmError(
                 "an actuator needs peak_torque, speed and joint_stiffness > 0, and no value below 0, all finite: "
                 f"{self}"
@@ -72,25 +49,15 @@ class Actuator:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint about (revolute) or along (prismatic) a local axis.
+    """A joint about (revolute) or along (prismatic) a local axis."""
 
-    Attributes:
-        kind: Its type; a fixed joint has no limits and does not move.
-        axis: Its local axis.
-        lower: The lower limit [rad] or [m].
-        upper: The upper limit [rad] or [m].
-        actuator: Its actuator; None if not chosen.
-        travel: Travel of a prismatic joint per radian of its actuator [m/rad]; 1 for other joints.
-        body: The body of its actuator, if it counts.
-    """
-
-    kind: JointKind
-    axis: Axis
-    lower: float = 0.0
-    upper: float = 0.0
-    actuator: Actuator | None = None
-    travel: float = 1.0
-    body: MotorBody | None = None
+    kind: JointKind  # type; a fixed joint has no limits and does not move
+    axis: Axis  # local axis
+    lower: float = 0.0  # lower limit [rad] or [m]
+    upper: float = 0.0  # upper limit [rad] or [m]
+    actuator: Actuator | None = None  # actuator; None if not chosen
+    travel: float = 1.0  # travel of a prismatic joint per radian of its actuator [m/rad]; 1 for other joints
+    body: MotorBody | None = None  # body of its actuator, if it counts
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(JointKind):
@@ -126,32 +93,20 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """The rigid body after a joint, in the frame that the joint moves.
+    """The rigid body after a joint, in the frame that the joint moves."""
 
-    Attributes:
-        offset: Vector from this joint to the next, or to the end of the arm [m].
-        mass: Its mass without the end mass [kg].
-        com: Its centre of mass, from this joint [m].
-        radius: The radius of its round section [m].
-        end_mass: A point mass that it carries at its end, such as the next joint's actuator [kg].
-        end_shift: Vector from its end to that point [m].
-        bending_stiffness: Young's modulus times the second moment of area of its section, EI [N m²]; infinite if rigid,
-            None if unknown.
-        torsional_stiffness: Shear modulus times the polar second moment of area, GJ [N m²]; likewise.
-        wall: Wall thickness of its tube [m], at most the radius; None if unknown.
-        price: Price of its tube [USD].
-    """
-
-    offset: Vector
-    mass: float
-    com: Vector
-    radius: float
-    end_mass: float = 0.0
-    end_shift: Vector = (0.0, 0.0, 0.0)
+    offset: Vector  # vector from this joint to the next, or to the end of the arm [m]
+    mass: float  # mass without the end mass [kg]
+    com: Vector  # centre of mass, from this joint [m]
+    radius: float  # radius of its round section [m]
+    end_mass: float = 0.0  # point mass that it carries at its end, such as the next joint's actuator [kg]
+    end_shift: Vector = (0.0, 0.0, 0.0)  # vector from its end to that point [m]
+    # Young's modulus times the second moment of area of its section, EI [N m²]; infinite if rigid, None if
+    # unknown
     bending_stiffness: float | None = None
-    torsional_stiffness: float | None = None
-    wall: float | None = None
-    price: float = 0.0
+    torsional_stiffness: float | None = None  # shear modulus times the polar second moment of area, GJ [N m²]; likewise
+    wall: float | None = None  # wall thickness of its tube [m], at most the radius; None if unknown
+    price: float = 0.0  # price of its tube [USD]
 
     def __post_init__(self) -> None:
         values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass, *self.end_shift, self.price)
@@ -200,21 +155,13 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """An upright round tube below the base, which carries the arm and does not move.
+    """An upright round tube below the base, which carries the arm and does not move."""
 
-    Attributes:
-        length: From its foot to the first joint [m].
-        outer_diameter: [m].
-        wall: Wall thickness [m].
-        mass: [kg].
-        price: [USD].
-    """
-
-    length: float
-    outer_diameter: float
-    wall: float
-    mass: float
-    price: float = 0.0
+    length: float  # from its foot to the first joint [m]
+    outer_diameter: float  # [m]
+    wall: float  # wall thickness [m]
+    mass: float  # [kg]
+    price: float = 0.0  # [USD]
 
     def __post_init__(self) -> None:
         if not 0.0 < self.length < math.inf or not 0.0 < self.wall <= self.outer_diameter / 2 < math.inf:
@@ -235,22 +182,14 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class MountedTool:
-    """A tool, in a frame at the end of the last link that is parallel to the world frame with all joints at 0.
+    """A tool, in a frame at the end of the last link that is parallel to the world frame with all joints at 0."""
 
-    Attributes:
-        tip: Position of the tip [m].
-        axis: Direction of the z axis of the tip frame.
-        side: Direction of the x axis of the tip frame.
-        mass: [kg].
-        com: Centre of mass [m].
-        inertia: (3, 3) about the centre of mass [kg m²].
-    """
-
-    tip: Vector = (0.0, 0.0, 0.0)
-    axis: Vector = (0.0, 0.0, 1.0)
-    side: Vector = (1.0, 0.0, 0.0)
-    mass: float = 0.0
-    com: Vector = (0.0, 0.0, 0.0)
+    tip: Vector = (0.0, 0.0, 0.0)  # position of the tip [m]
+    axis: Vector = (0.0, 0.0, 1.0)  # direction of the z axis of the tip frame
+    side: Vector = (1.0, 0.0, 0.0)  # direction of the x axis of the tip frame
+    mass: float = 0.0  # [kg]
+    com: Vector = (0.0, 0.0, 0.0)  # centre of mass [m]
+    # (3, 3) about the centre of mass [kg m²]
     inertia: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def __post_init__(self) -> None:
@@ -268,15 +207,6 @@ class MountedTool:
 class Arm:
     """A serial arm. With all joints at 0, every local frame is parallel to the world frame.
 
-    Attributes:
-        base: The position of the first joint in the world [m].
-        joints: Joint j moves link j and everything after it.
-        links: The links, one after each joint.
-        tool: The tool on the end of the last link.
-        base_mass: Mass that does not move, such as the first joint's actuator [kg].
-        safety_factor: Factor of the torque that its actuators have to deliver.
-        column: What the base stands on; None if it stands on the ground or a surface.
-
     Examples:
         >>> import armwright as aw
         >>> joints = aw.Joint("revolute", "z", -2.4, 2.4), aw.Joint("revolute", "y", -2.4, 2.4)
@@ -286,13 +216,13 @@ class Arm:
         (0.5, 0.2)
     """
 
-    base: Vector
-    joints: tuple[Joint, ...]
-    links: tuple[Link, ...]
-    tool: MountedTool = MountedTool()
-    base_mass: float = 0.0
-    safety_factor: float = 1.0
-    column: Column | None = None
+    base: Vector  # position of the first joint in the world [m]
+    joints: tuple[Joint, ...]  # joint j moves link j and everything after it
+    links: tuple[Link, ...]  # links, one after each joint
+    tool: MountedTool = MountedTool()  # tool on the end of the last link
+    base_mass: float = 0.0  # mass that does not move, such as the first joint's actuator [kg]
+    safety_factor: float = 1.0  # factor of the torque that its actuators have to deliver
+    column: Column | None = None  # what the base stands on; None if it stands on the ground or a surface
 
     def __post_init__(self) -> None:
         if not self.joints or len(self.joints) != len(self.links):

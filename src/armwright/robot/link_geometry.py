@@ -8,7 +8,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.robot.arm import AXES, Arm, Column, Joint, Link, Vector
+from armwright.robot.arm import Arm, Joint, Link
+from armwright.robot.axes import Vector, unit_vector
 from armwright.robot.motor_body import MotorBody
 from armwright.rotations import rpy_from_rotation
 
@@ -32,21 +33,13 @@ DEFAULT_VELOCITY = 10.0  # [rad/s] or [m/s]
 
 @dataclass(frozen=True)
 class Segment:
-    """A joint and the link after it, as formats list them.
+    """A joint and the link after it, as formats list them."""
 
-    Attributes:
-        number: Counted from 1.
-        joint: The joint.
-        link: The link that it moves.
-        parent: The name of the link before.
-        position: The position of the joint in the frame of that link [m].
-    """
-
-    number: int
+    number: int  # counted from 1
     joint: Joint
-    link: Link
-    parent: str
-    position: Vector
+    link: Link  # link that it moves
+    parent: str  # name of the link before
+    position: Vector  # position of the joint in the frame of that link [m]
 
     @property
     def name(self) -> str:
@@ -161,20 +154,7 @@ def body_rpy(body: MotorBody) -> Vector:
     """Return roll, pitch and yaw [rad] of the shape of a motor body: a cylinder of these formats is along z."""
     if body.shape == "box":
         return (0.0, 0.0, 0.0)
-    along = AXES.index(body.axis)
-    return rpy_along((float(along == 0), float(along == 1), float(along == 2)))
-
-
-def body_dimensions(body: MotorBody) -> dict[str, str]:
-    """Return the dimensions of a motor body [m], by their URDF names."""
-    if body.shape == "box":
-        return {"size": numbers(body.size)}
-    return {"radius": number(body.radius), "length": number(body.length)}
-
-
-def column_dimensions(column: Column) -> dict[str, str]:
-    """Return the dimensions of the cylinder of a column [m], by their URDF names."""
-    return {"radius": number(column.radius), "length": number(column.length)}
+    return rpy_along(unit_vector(body.axis))
 
 
 def number(value: float) -> str:

@@ -57,7 +57,8 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
         if segment.joint.body is not None:
             add_motor(body, segment, segment.joint.body, segment.motor_name)
         body = SubElement(body, "body", name=segment.name, pos=numbers(segment.position))
-        _add_joint(body, f"joint_{segment.number}", segment.joint)
+        if segment.joint.kind != "fixed":
+            SubElement(body, "joint", joint_attributes(f"joint_{segment.number}", segment.joint))
         _add_link(body, segment.joint, segment.link)
     add_tip(body, arm)
     add_tool(body, arm)
@@ -83,11 +84,6 @@ def add_scene(root: Element, arm: Arm) -> Element:
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos=numbers((x - size, y - size, z + 2.0 * size)), dir="1 1 -2")
     return world
-
-
-def _add_joint(body: Element, name: str, joint: Joint) -> None:
-    if joint.kind != "fixed":
-        SubElement(body, "joint", joint_attributes(name, joint))
 
 
 def joint_attributes(name: str, joint: Joint) -> dict[str, str]:

@@ -5,29 +5,20 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from armwright.exceptions import ArmError
-from armwright.robot.axes import AXES, Axis, Vector
+from armwright.robot.axes import AXES, Axis, Vector, unit_vector
 
 BodyShape = Literal["box", "cylinder"]
-BODY_SHAPES: tuple[BodyShape, ...] = ("box", "cylinder")
 
 
 @dataclass(frozen=True, slots=True)
 class ActuatorShape:
-    """The shape of an actuator, about its shaft.
+    """The shape of an actuator, about its shaft."""
 
-    Attributes:
-        shape: A box, or a cylinder about its shaft.
-        length: The edge along the shaft [m].
-        long: The longer edge across the shaft; the diameter of a cylinder [m].
-        short: The shorter edge across the shaft; the diameter of a cylinder [m].
-        shaft_offset: Distance of the shaft from the middle of the body, along the longer edge [m].
-    """
-
-    shape: BodyShape
-    length: float
-    long: float
-    short: float
-    shaft_offset: float = 0.0
+    shape: BodyShape  # box, or a cylinder about its shaft
+    length: float  # edge along the shaft [m]
+    long: float  # longer edge across the shaft; the diameter of a cylinder [m]
+    short: float  # shorter edge across the shaft; the diameter of a cylinder [m]
+    shaft_offset: float = 0.0  # distance of the shaft from the middle of the body, along the longer edge [m]
 
     @property
     def reach(self) -> float:
@@ -40,18 +31,12 @@ class MotorBody:
     """The body of a joint's actuator, fixed to the link before, or to the base.
 
     Its edges are parallel to the axes of that link's frame.
-
-    Attributes:
-        shape: A box, or a cylinder along `axis`.
-        axis: The axis of its shaft, which is the axis of the joint.
-        size: Its edges along x, y and z; a cylinder has its diameter across its axis [m].
-        centre: Its middle, from the position of the joint at displacement 0 [m].
     """
 
-    shape: BodyShape
-    axis: Axis
-    size: Vector
-    centre: Vector = (0.0, 0.0, 0.0)
+    shape: BodyShape  # box, or a cylinder along `axis`
+    axis: Axis  # axis of its shaft, which is the axis of the joint
+    size: Vector  # edges along x, y and z; a cylinder has its diameter across its axis [m]
+    centre: Vector = (0.0, 0.0, 0.0)  # middle, from the position of the joint at displacement 0 [m]
 
     def __post_init__(self) -> None:
         if self.shape not in get_args(BodyShape) or self.axis not in AXES:
@@ -94,7 +79,7 @@ def placed_body(shape: ActuatorShape, axis: Axis, carrier: Vector) -> MotorBody:
     """
     along = AXES.index(axis)
     if carrier[along] != 0.0:
-        carrier = _unit((along + 1) % 3)
+        carrier = unit_vector(AXES[(along + 1) % 3])
     longer = next(i for i, value in enumerate(carrier) if value != 0.0)
     edges = [shape.short] * 3
     edges[along], edges[longer] = shape.length, shape.long
@@ -103,7 +88,3 @@ def placed_body(shape: ActuatorShape, axis: Axis, carrier: Vector) -> MotorBody:
     return MotorBody(
         shape.shape, axis, (edges[0], edges[1], edges[2]), (0.0 - offset * x, 0.0 - offset * y, 0.0 - offset * z)
     )
-
-
-def _unit(index: int) -> Vector:
-    return (float(index == 0), float(index == 1), float(index == 2))

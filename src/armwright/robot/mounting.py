@@ -17,15 +17,10 @@ from armwright.robot.urdf_reader import MAX_ANGLE, UrdfArm
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """The pose of a base link.
+    """The pose of a base link."""
 
-    Attributes:
-        position: Its origin [m].
-        yaw: Its turn about the vertical axis through its origin [rad].
-    """
-
-    position: Vector = (0.0, 0.0, 0.0)
-    yaw: float = 0.0
+    position: Vector = (0.0, 0.0, 0.0)  # origin [m]
+    yaw: float = 0.0  # turn about the vertical axis through its origin [rad]
 
     @classmethod
     def of(cls, numbers: Sequence[float]) -> Self:

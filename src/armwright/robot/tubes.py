@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 from pydantic import BaseModel, Field, field_validator
@@ -16,15 +15,10 @@ MODULI = 1e6, 2e12  # [Pa], from rubber to diamond; values below are probably in
 
 @dataclass(frozen=True, slots=True)
 class Tube:
-    """The section of a round tube; a solid bar if the wall is half the diameter.
+    """The section of a round tube; a solid bar if the wall is half the diameter."""
 
-    Attributes:
-        outer_diameter: [m].
-        wall: Wall thickness [m], at most half the diameter.
-    """
-
-    outer_diameter: float
-    wall: float
+    outer_diameter: float  # [m]
+    wall: float  # wall thickness [m], at most half the diameter
 
     @property
     def name(self) -> str:
@@ -81,24 +75,22 @@ class Material(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
 
 # Prices depend on the shop: none here.
-MATERIALS: Mapping[str, Material] = MappingProxyType(
-    {
-        material.name: material
-        for material in (
-            # EN 1999-1-1:2007, 3.2.5: all alloys of the standard, 6060 and 6061 among them.
-            Material(name="aluminium", density=2700, youngs=70e9, shear=27e9),
-            # EN 1993-1-1:2005, 3.2.6; density: EN 1991-1-1, table A.4.
-            Material(name="steel", density=7850, youngs=210e9, shear=81e9),
-            # performance-composites.com, "Mechanical Properties of Carbon Fibre Composite Materials": standard fabric
-            # at 0°/90° in epoxy, as in roll-wrapped tubes; density: substech.com. Pultruded tubes bend half as much.
-            Material(name="carbon", density=1600, youngs=70e9, shear=5e9),
-            # Printed solid, in the plane of the layers: the lower ends of the moduli and the middle of the densities of
-            # additive.tools/materials; shear moduli by Poisson's ratios of 0.36 (PLA) and 0.38 (PETG).
-            Material(name="pla", density=1240, youngs=3.0e9, shear=1.1e9),
-            Material(name="petg", density=1270, youngs=2.0e9, shear=0.72e9),
-        )
-    }
-)
+MATERIALS: Mapping[str, Material] = {
+    material.name: material
+    for material in (
+        # EN 1999-1-1:2007, 3.2.5: all alloys of the standard, 6060 and 6061 among them.
+        Material(name="aluminium", density=2700, youngs=70e9, shear=27e9),
+        # EN 1993-1-1:2005, 3.2.6; density: EN 1991-1-1, table A.4.
+        Material(name="steel", density=7850, youngs=210e9, shear=81e9),
+        # performance-composites.com, "Mechanical Properties of Carbon Fibre Composite Materials": standard fabric
+        # at 0°/90° in epoxy, as in roll-wrapped tubes; density: substech.com. Pultruded tubes bend half as much.
+        Material(name="carbon", density=1600, youngs=70e9, shear=5e9),
+        # Printed solid, in the plane of the layers: the lower ends of the moduli and the middle of the densities of
+        # additive.tools/materials; shear moduli by Poisson's ratios of 0.36 (PLA) and 0.38 (PETG).
+        Material(name="pla", density=1240, youngs=3.0e9, shear=1.1e9),
+        Material(name="petg", density=1270, youngs=2.0e9, shear=0.72e9),
+    )
+}
 
 
 def resolve_material(entry: Any) -> Any:

@@ -17,7 +17,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
 from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Vector
-from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document, rotation_about
+from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document
+from armwright.rotations import rotation_about
 
 SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
 MAX_ANGLE = 2 * math.pi  # [rad]
@@ -28,27 +29,16 @@ GRIPPER = re.compile("grip|jaw|finger", re.IGNORECASE)  # names of a last joint 
 
 @dataclass(frozen=True, slots=True)
 class UrdfArm:
-    """An arm read from a URDF, with its base link at the world's origin.
+    """An arm read from a URDF, with its base link at the world's origin."""
 
-    Attributes:
-        name: The name of the robot.
-        arm: The arm.
-        base_link: The link at the origin of the world.
-        tip: The link whose origin is the tip.
-        joints: The names of the moving joints, from base to tip.
-        signs: Sign of each joint: value q of the arm is signs * q + zeros in the URDF.
-        zeros: Value of each joint in the URDF at 0 of the arm [rad] or [m].
-        notes: Choices, changes and missing data, as sentences for the user.
-    """
-
-    name: str
+    name: str  # of the robot
     arm: Arm
     base_link: str
-    tip: str
-    joints: tuple[str, ...]
-    signs: tuple[float, ...]
-    zeros: tuple[float, ...]
-    notes: tuple[str, ...] = ()
+    tip: str  # the link whose origin is the tip
+    joints: tuple[str, ...]  # names of the moving joints, from base to tip
+    signs: tuple[float, ...]  # value q of a joint of the arm is signs * q + zeros in the URDF
+    zeros: tuple[float, ...]  # value of each joint in the URDF at 0 of the arm [rad] or [m]
+    notes: tuple[str, ...] = ()  # choices, changes and missing data, as sentences for the user
 
     def values_in_urdf(self, q: Sequence[float] | Array) -> Array:
         """Return the values (..., J) of the URDF's joints for those of the arm (..., J) [rad] or [m]."""
@@ -80,7 +70,7 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
         raise ArmError(f'{path}: between the links "{base}" and "{last}" no joint moves')
     for joint in moving:
         _check_joint(joint, str(path))
-    zeros = _zeros(chain, str(path))
+    zeros = _zeros(tree, base, moving, str(path))
     return _arm(tree, base, last, moving, zeros, _chain_notes(tree, base, tip, last, moving))
 
 
@@ -168,45 +158,38 @@ def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list
     return Joint("revolute", AXES[axis], lower, upper, actuator)
 
 
-def _zeros(chain: Sequence[UrdfJoint], where: str) -> dict[str, float]:
+def _zeros(tree: "_LinkTree", base: str, moving: Sequence[UrdfJoint], where: str) -> dict[str, float]:
     """Return a posture [rad] with all joint axes along axes of the world, 0 for as many joints as possible.
 
     Raises:
         ArmError: If none is found.
     """
-    moving = [joint for joint in chain if joint.kind != "fixed"]
     zeros = {joint.name: 0.0 for joint in moving}
+
+    def axes() -> dict[str, Array]:
+        poses = tree.poses(base, zeros)
+        return {joint.name: poses[joint.child].rotation @ joint.axis for joint in moving}
+
     before: UrdfJoint | None = None  # the last joint that is not prismatic
     for joint in moving:
-        axis = _axes(chain, zeros)[joint.name]
+        axis = axes()[joint.name]
         if _nearest_axis(axis)[2] > SNAP and before is not None:
-            about = _along_world(_axes(chain, zeros)[before.name])
+            index, sign, _ = _nearest_axis(axes()[before.name])
+            about = sign * np.eye(3)[index]
             if abs(float(axis @ about)) < SNAP:
                 one = np.roll(np.abs(about), 1)
                 angle = math.atan2(float(axis @ np.cross(about, one)), float(axis @ one))
                 zeros[before.name] += round(angle / (math.pi / 2)) * (math.pi / 2) - angle
         if joint.kind != "prismatic":
             before = joint
-    for name, axis in _axes(chain, zeros).items():
+    for name, axis in axes().items():
         if _nearest_axis(axis)[2] > SNAP:
             vector = ", ".join(f"{value:.3f}" for value in axis)
             raise ArmError(
-                f'{where}: joint "{name}" has the axis ({vector}) with all joints at 0, along none of x, y and z and '
-                "not at a right angle to the joint before; such an arm cannot be computed yet"
+                f'{where}: joint "{name}" has the axis ({vector}) with all joints at 0, along none of x, y and z '
+                "and not at a right angle to the joint before; such an arm cannot be computed yet"
             )
     return zeros
-
-
-def _axes(chain: Sequence[UrdfJoint], zeros: Mapping[str, float]) -> dict[str, Array]:
-    """Return the axes (3,) of the moving joints in the world, by name."""
-    axes: dict[str, Array] = {}
-    rotation = np.eye(3)
-    for joint in chain:
-        rotation = rotation @ joint.origin.rotation
-        if joint.kind != "fixed":
-            axes[joint.name] = rotation @ joint.axis
-            rotation = rotation @ rotation_about(joint.axis, 0.0 if joint.kind == "prismatic" else zeros[joint.name])
-    return axes
 
 
 def _nearest_axis(direction: Array) -> tuple[int, float, float]:
@@ -215,11 +198,6 @@ def _nearest_axis(direction: Array) -> tuple[int, float, float]:
     sign = math.copysign(1.0, direction[axis])
     across = float(np.linalg.norm(np.delete(direction, axis)))
     return axis, sign, math.atan2(across, abs(float(direction[axis])))
-
-
-def _along_world(direction: Array) -> Array:
-    axis, sign, _ = _nearest_axis(direction)
-    return sign * np.eye(3)[axis]
 
 
 def _vector(values: Array) -> Vector:

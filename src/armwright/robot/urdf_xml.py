@@ -4,6 +4,7 @@ Meshes, colours and everything else in a URDF are ignored.
 """
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError
 from armwright.files import read_bytes
+from armwright.rotations import rotation_from_rpy
 
 MAX_FILE = 4 * 1024 * 1024  # [bytes]; the largest of 60 common robots has 0.2 MB
 DEEPEST = 50  # nested elements; a URDF needs 6
@@ -34,50 +36,29 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class UrdfLink:
-    """A link of a URDF.
-
-    Attributes:
-        name: Its name.
-        mass: Its mass [kg].
-        com: (3,) its centre of mass in the link frame [m].
-        radius: The radius of its thickest cylinder [m]; None if it has none.
-    """
+    """A link of a URDF."""
 
     name: str
-    mass: float
-    com: Array
-    radius: float | None
+    mass: float  # [kg]
+    com: Array  # (3,) its centre of mass in the link frame [m]
+    radius: float | None  # of its thickest cylinder [m]; None if it has none
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """A joint of a URDF.
-
-    Attributes:
-        name: Its name.
-        kind: Its type in the file.
-        parent: The name of the link before it.
-        child: The name of the link after it.
-        origin: The pose of the child in the parent at a joint value of 0.
-        axis: (3,) unit vector in the child frame.
-        lower: Lower limit [rad] or [m]; None if missing, as for the next three.
-        upper: Upper limit [rad] or [m].
-        effort: Largest torque [N m] or force [N].
-        speed: Largest speed [rad/s] or [m/s].
-        mimics: The name of the joint that it mimics, if any.
-    """
+    """A joint of a URDF; None for what is missing."""
 
     name: str
     kind: str
-    parent: str
+    parent: str  # name of the link before it
     child: str
-    origin: Pose
-    axis: Array
-    lower: float | None
+    origin: Pose  # of the child in the parent at a joint value of 0
+    axis: Array  # (3,) unit vector in the child frame
+    lower: float | None  # limit [rad] or [m]
     upper: float | None
-    effort: float | None
-    speed: float | None
-    mimics: str | None
+    effort: float | None  # largest torque [N m] or force [N]
+    speed: float | None  # largest speed [rad/s] or [m/s]
+    mimics: str | None  # name of the joint that it mimics
 
     @property
     def moves(self) -> bool:
@@ -96,22 +77,16 @@ class UrdfDocument:
 
 def read_document(path: Path) -> UrdfDocument:
     """Read the links and joints of a URDF file; raise ArmError if it is not one."""
-    return parse_document(read_bytes(path, MAX_FILE, ArmError), str(path))
-
-
-def parse_document(data: bytes, where: str) -> UrdfDocument:
-    """Parse the bytes of a URDF file; `where` names it in messages."""
-    robot = _parsed(data, where)
+    where = str(path)
+    robot = _parsed(read_bytes(path, MAX_FILE, ArmError), where)
     if robot.tag != "robot":
         raise ArmError(f"{where} is not a URDF: expected the root <robot>, got <{_short(robot.tag)}>")
     links = [_link(element, where) for element in robot.findall("link")]
     joints = tuple(_joint(element, where) for element in robot.findall("joint"))
     for kind, names in (("link", [link.name for link in links]), ("joint", [joint.name for joint in joints])):
-        seen: set[str] = set()
-        for name in names:
-            if name in seen:
+        for name, count in Counter(names).items():
+            if count > 1:
                 raise ArmError(f'{where}: duplicate {kind} "{_short(name)}"')
-            seen.add(name)
     if not links:
         raise ArmError(f"{where} has no link")
     known = {link.name: link for link in links}
@@ -119,7 +94,7 @@ def parse_document(data: bytes, where: str) -> UrdfDocument:
         for end in (joint.parent, joint.child):
             if end not in known:
                 raise ArmError(f'{where}: joint "{_short(joint.name)}" joins the unknown link "{_short(end)}"')
-    return UrdfDocument(robot.get("name") or Path(where).stem, known, joints)
+    return UrdfDocument(robot.get("name") or path.stem, known, joints)
 
 
 def _parsed(data: bytes, where: str) -> ElementTree.Element:
@@ -211,15 +186,7 @@ def _pose(element: ElementTree.Element | None, of: str) -> Pose:
         return Pose(np.eye(3), np.zeros(3))
     position = np.array(_numbers(element, "xyz", 3, of)) if element.get("xyz") is not None else np.zeros(3)
     angles = _numbers(element, "rpy", 3, of) if element.get("rpy") is not None else [0.0, 0.0, 0.0]
-    about_x, about_y, about_z = (rotation_about(axis, angle) for axis, angle in zip(np.eye(3), angles, strict=True))
-    return Pose(about_z @ about_y @ about_x, position)
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Return the (3, 3) rotation about a unit vector (3,) by an angle [rad] (Rodrigues' formula)."""
-    x, y, z = axis.tolist()
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
+    return Pose(rotation_from_rpy(*angles), position)
 
 
 def _numbers(element: ElementTree.Element | None, key: str, n: int, of: str) -> list[float]:

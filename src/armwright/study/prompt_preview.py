@@ -71,7 +71,7 @@ def preview_after(
         number: trial whose past prompt is returned; None for the next one.
     """
     config, history = read_run(run)
-    if task is not None and task.target_specs != config.task.target_specs:
+    if task is not None and task.targets != config.task.targets:
         raise SettingsError(f"{run} is a run of another task: {config.task.name}")
     if space is not None and space != config.space:
         raise SettingsError(f"{run} is a run of another space: {config.space.name}")

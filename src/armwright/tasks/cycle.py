@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Literal, Self, cast
 
-from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, StrictInt, StrictStr, field_validator, model_validator
 
 from armwright.exceptions import did_you_mean
 from armwright.tasks.targets import MIN_TOLERANCE
@@ -21,23 +21,7 @@ NEAR_DIRECTION = 0.02  # [rad] likewise
 _BY: Mapping[By, str] = {"line": "a line", "joint": "a joint motion"}
 
 
-def _check_duration(value: Any) -> Any:
-    is_time = isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 < value <= MAX_DURATION
-    if value != FASTEST and not is_time:
-        raise ValueError(f"expected seconds above 0, or {FASTEST}, got {value!r:.80}")
-    return value
-
-
-def _check_reference(value: Any) -> Any:
-    if isinstance(value, bool) or not isinstance(value, (int, str)):
-        raise ValueError(f"expected the name of a target or its number, from 1, got {value!r:.80}")
-    return value
-
-
-Duration = Annotated[
-    Literal["fastest"] | Annotated[float, Field(gt=0.0, le=MAX_DURATION)], BeforeValidator(_check_duration)
-]  # [s]
-Reference = Annotated[str | int, BeforeValidator(_check_reference)]
+Duration = Literal["fastest"] | Annotated[float, Field(gt=0.0, le=MAX_DURATION)]  # [s]
 
 
 class Strict(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -45,30 +29,21 @@ class Strict(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
 
 class Step(Strict, frozen=True):
-    """A motion to a target, and what happens there.
+    """A motion to a target, and what happens there."""
 
-    Attributes:
-        to: Name or number of the target; numbers count from 1.
-        by: A straight line of the tool, or a straight line in joint space.
-        do: Pick or place the payload on arrival.
-        time: Duration from the previous target to this one [s], or fastest; by default the cycle's.
-    """
-
-    to: Reference
-    by: By = "joint"
-    do: Action | None = None
+    to: StrictStr | StrictInt  # name or number of the target; numbers count from 1
+    by: By = "joint"  # straight line of the tool, or a straight line in joint space
+    do: Action | None = None  # pick or place the payload on arrival
+    # Duration from the previous target to this one [s], or fastest; by default the cycle's
     time: Duration | None = None
 
 
 class PathTolerance(Strict, frozen=True):
-    """Largest deviations of the tool along lines.
+    """Largest deviations of the tool along lines."""
 
-    Attributes:
-        path: Distance of the tip from the line [m]; None for NEAR_LINE.
-        angle: Angle of the tool from its direction or orientation [rad]; None for NEAR_DIRECTION.
-    """
-
+    # Distance of the tip from the line [m]; None for NEAR_LINE
     path: float | None = Field(default=None, ge=MIN_TOLERANCE, le=1000.0)
+    # Angle of the tool from its direction or orientation [rad]; None for NEAR_DIRECTION
     angle: float | None = Field(default=None, ge=MIN_TOLERANCE, le=3.2)
 
     @property
@@ -87,22 +62,15 @@ class Cycle(Strict, frozen=True):
 
     The cycle starts at rest at the target of its first step. If it is closed, the `by` and `time` of that step describe
     the way back to it, and its `do` happens on arrival.
-
-    Attributes:
-        steps: The steps.
-        closed: Return to the first target at the end.
-        time: Duration of each step that does not state its own [s], or fastest.
-        dwell: Time at rest after each pick and place [s].
-        approach: Length of the lines before and after each pick and place, along the tool's z axis [m].
-        tolerance: Largest deviations along lines.
     """
 
     steps: tuple[Step, ...] = Field(max_length=MAX_STEPS)
-    closed: bool = True
-    time: Duration = FASTEST
-    dwell: float = Field(default=0.0, ge=0.0, le=MAX_DURATION)
+    closed: bool = True  # return to the first target at the end
+    time: Duration = FASTEST  # duration of each step that does not state its own [s], or fastest
+    dwell: float = Field(default=0.0, ge=0.0, le=MAX_DURATION)  # time at rest after each pick and place [s]
+    # Length of the lines before and after each pick and place, along the tool's z axis [m]
     approach: float | None = Field(default=None, gt=0.0, le=1000.0)
-    tolerance: PathTolerance = PathTolerance()
+    tolerance: PathTolerance = PathTolerance()  # largest deviations along lines
 
     @field_validator("steps")
     @classmethod
@@ -162,13 +130,6 @@ class Cycle(Strict, frozen=True):
             loaded.append(holds)
             holds = holds if step.do is None else step.do == "pick"
         return tuple(loaded)
-
-
-def read_cycle(value: Any, n_targets: int) -> Any:
-    """Return the steps that `in_order` stands for, and anything else unchanged, for pydantic to validate."""
-    if value != IN_ORDER:
-        return value
-    return {"closed": False, "steps": [{"to": number, "by": "line"} for number in range(1, n_targets + 1)]}
 
 
 def target_indices(steps: Sequence[Step], names: Mapping[str, int], n_targets: int) -> tuple[int, ...]:

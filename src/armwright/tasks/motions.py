@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.tasks.cycle import Action, By, Cycle
+from armwright.rotations import rotation_about
+from armwright.tasks.cycle import By, Cycle
 from armwright.tasks.targets import ORIENTATION, TargetArrays
 
 LINE_STEP = 0.02  # [m] largest distance of two samples of a line
@@ -26,21 +27,13 @@ OPPOSITE = 1e-3  # [rad] from half a turn; the shortest rotation is not unique t
 
 @dataclass(frozen=True)
 class Poses:
-    """P poses of the tool.
+    """P poses of the tool."""
 
-    Attributes:
-        position: (P, 3) [m].
-        rotation: (P, 3, 3) the tool's own x, y and z in the world as columns; unused axes are arbitrary.
-        n_angular: (P,) number of angles that count: 0, AXIS or ORIENTATION.
-        tolerance: (P,) allowed distance of the tip [m].
-        angle_tolerance: (P,) allowed angle of the tool [rad].
-    """
-
-    position: Array
-    rotation: Array
-    n_angular: NDArray[np.intp]
-    tolerance: Array
-    angle_tolerance: Array
+    position: Array  # (P, 3) [m]
+    rotation: Array  # (P, 3, 3) the tool's own x, y and z in the world as columns; unused axes are arbitrary
+    n_angular: NDArray[np.intp]  # (P,) number of angles that count: 0, AXIS or ORIENTATION
+    tolerance: Array  # (P,) allowed distance of the tip [m]
+    angle_tolerance: Array  # (P,) allowed angle of the tool [rad]
 
     def __len__(self) -> int:
         return len(self.position)
@@ -64,70 +57,43 @@ def stack_poses(parts: Sequence[Poses]) -> Poses:
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion from rest to rest.
+    """A motion from rest to rest."""
 
-    Attributes:
-        step: Index of its step in the task.
-        by: Line or joint motion.
-        start: Index of its first pose.
-        end: Index of its last pose.
-        carries: Whether the payload is carried.
-        arrives: Whether it ends at the target of its step.
-    """
-
-    step: int
-    by: By
-    start: int
-    end: int
-    carries: bool
-    arrives: bool
+    step: int  # index of its step in the task
+    by: By  # line or joint motion
+    start: int  # index of its first pose
+    end: int  # index of its last pose
+    carries: bool  # whether the payload is carried
+    arrives: bool  # whether it ends at the target of its step
 
 
 @dataclass(frozen=True)
 class Block:
-    """A pose that a joint motion ends at, or an open cycle starts at, and the lines after it.
+    """A pose that a joint motion ends at, or an open cycle starts at, and the lines after it."""
 
-    Attributes:
-        entry: Index of the pose.
-        lines: Indices of the motions.
-    """
-
-    entry: int
-    lines: tuple[int, ...]
+    entry: int  # index of the pose
+    lines: tuple[int, ...]  # indices of the motions
 
 
 @dataclass(frozen=True)
 class LineSamples:
-    """S samples of the tool's pose, block after block; consecutive lines share a sample.
+    """S samples of the tool's pose, block after block; consecutive lines share a sample."""
 
-    Attributes:
-        poses: The S poses.
-        first: (B + 1,) index of each block's first sample, and S.
-        of_motion: Indices of the first and the last sample of each motion; equal for joint motions.
-    """
-
-    poses: Poses
-    first: NDArray[np.intp]
+    poses: Poses  # S poses
+    first: NDArray[np.intp]  # (B + 1,) index of each block's first sample, and S
+    # Indices of the first and the last sample of each motion; equal for joint motions
     of_motion: tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
 class CyclePlan:
-    """Where the tool goes, independent of any arm.
+    """Where the tool goes, independent of any arm."""
 
-    Attributes:
-        cycle: The cycle as the task states it.
-        poses: The T targets of the task, then points of approach.
-        motions: The motions in their order, from rest at the target of the first step.
-        targets: Index of each step's target.
-        times: Duration of each step [s]; None for the fastest.
-    """
-
-    cycle: Cycle
-    poses: Poses
-    motions: tuple[Motion, ...]
-    targets: tuple[int, ...]
-    times: tuple[float | None, ...]
+    cycle: Cycle  # cycle as the task states it
+    poses: Poses  # T targets of the task, then points of approach
+    motions: tuple[Motion, ...]  # motions in their order, from rest at the target of the first step
+    targets: tuple[int, ...]  # index of each step's target
+    times: tuple[float | None, ...]  # duration of each step [s]; None for the fastest
 
     def holds_payload(self, n_targets: int) -> NDArray[np.bool_]:
         """Return (T,) whether the payload is carried to or from each of T targets; True where the cycle never is."""
@@ -258,7 +224,7 @@ def _motions(cycle: Cycle, targets: Sequence[int], points: dict[int, int]) -> tu
     for step in order:
         carries, do = carried[step], cycle.steps[step].do
         here, there = targets[step - 1], targets[step]
-        out, into = _approached(cycle.steps[step - 1].do, points), _approached(do, points)
+        out, into = (bool(points) and action is not None for action in (cycle.steps[step - 1].do, do))
         if out:
             motions.append(Motion(step, "line", here, points[here], carries, arrives=False))
             here = points[here]
@@ -268,10 +234,6 @@ def _motions(cycle: Cycle, targets: Sequence[int], points: dict[int, int]) -> tu
         else:
             motions.append(Motion(step, cycle.steps[step].by, here, there, carries, arrives=True))
     return tuple(motions)
-
-
-def _approached(do: Action | None, points: dict[int, int]) -> bool:
-    return do is not None and bool(points)
 
 
 def line_steps(poses: Poses, start: int, end: int) -> int:
@@ -294,13 +256,6 @@ def along_line(poses: Poses, start: int, end: int, share: Array) -> Poses:
         tolerance=np.full(n, poses.tolerance[end]),
         angle_tolerance=np.full(n, poses.angle_tolerance[end]),
     )
-
-
-def rotation_about(axis: Array, angle: Array) -> Array:
-    """Return the (S, 3, 3) rotations by angles (S,) [rad] about a unit vector (3,), by Rodrigues' formula."""
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
 
 
 def _turn(poses: Poses, start: int, end: int) -> tuple[Array, float]:

@@ -1,22 +1,19 @@
 """Solid convex obstacles that the arm should keep away from, as in task files."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
-from armwright.exceptions import did_you_mean
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
 from armwright.tasks.targets import MAX_COORDINATE, Coordinate, Point, Position
-from armwright.yaml_documents import check_document
 
 Shape = Literal["box", "sphere", "cylinder", "ground"]
 
-SHAPES: tuple[Shape, ...] = ("box", "sphere", "cylinder", "ground")
+SHAPES: tuple[Shape, ...] = get_args(Shape)
 MAX_OBSTACLES = 100
 
 Size = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
@@ -26,19 +23,13 @@ Name = Annotated[str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9 ._-]{0,39})?$")]
 
 @dataclass(frozen=True)
 class Solid:
-    """The shape of an obstacle in its own frame, for kernels and drawings.
+    """The shape of an obstacle in its own frame, for kernels and drawings."""
 
-    Attributes:
-        shape: The kind of the shape.
-        centre: The origin of the frame in the world [m]; a point of the surface for the ground.
-        rotation: (3, 3) the axes of the frame in the world as columns.
-        half: Half the sides of a box; radius, radius and half the height of a cylinder; three radii of a sphere [m].
-            Zeros for the ground, which fills everything below its x and y axes.
-    """
-
-    shape: Shape
-    centre: Point
-    rotation: NDArray[np.float64]
+    shape: Shape  # kind of the shape
+    centre: Point  # origin of the frame in the world [m]; a point of the surface for the ground
+    rotation: NDArray[np.float64]  # (3, 3) the axes of the frame in the world as columns
+    # Half the sides of a box; radius, radius and half the height of a cylinder; three radii of a sphere [m].
+    # Zeros for the ground, which fills everything below its x and y axes.
     half: Point
 
     def contains(self, points: NDArray[np.float64], depth: float = 0.0) -> NDArray[np.bool_]:
@@ -160,27 +151,6 @@ class Ground(Record, frozen=True):
 
 
 Obstacle = Annotated[Box | Sphere | Cylinder | Ground, Field(discriminator="kind")]
-_MODELS: Mapping[str, type[BaseModel]] = {"box": Box, "sphere": Sphere, "cylinder": Cylinder, "ground": Ground}
-
-
-def read_obstacle(record: Any, number: int) -> Any:
-    """Return the obstacle of a record; anything that is not a mapping unchanged, for pydantic to refuse.
-
-    Args:
-        record: The record of a task file.
-        number: The number of the obstacle in its list, counted from 1, for messages.
-
-    Raises:
-        ValueError: If the kind is unknown, or the record does not describe an obstacle of its kind.
-    """
-    if not isinstance(record, dict):
-        return record
-    content = cast("dict[Any, Any]", record)
-    kind = str(content.get("kind"))
-    if kind not in _MODELS:
-        fault = f'unknown kind "{kind}".{did_you_mean(kind, _MODELS)}' if "kind" in content else "kind is missing."
-        raise ValueError(f"obstacle {number}: {fault} Kinds: {', '.join(_MODELS)}")
-    return check_document(content, _MODELS[kind], ValueError, f"obstacle {number}")
 
 
 def _point(values: Point) -> str:

@@ -1,13 +1,12 @@
 """Payloads that the tip carries."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Self
 
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.tasks.moments import MAX_MASS, Moments, check_moments, describe_vector
 from armwright.tasks.targets import MAX_COORDINATE, Position
-from armwright.yaml_documents import check_document
 
 Side = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
 Vector = tuple[float, float, float]
@@ -15,34 +14,22 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class LoadShape:
-    """How the mass of a payload is distributed, whatever that mass, in the tip frame.
+    """How the mass of a payload is distributed, whatever that mass, in the tip frame."""
 
-    Attributes:
-        center: Centre of mass [m].
-        gyration: Moments of inertia about the centre, around x, y and z, per mass [m²].
-    """
-
-    center: Vector = (0.0, 0.0, 0.0)
-    gyration: Vector = (0.0, 0.0, 0.0)
+    center: Vector = (0.0, 0.0, 0.0)  # centre of mass [m]
+    gyration: Vector = (0.0, 0.0, 0.0)  # moments of inertia about the centre, around x, y and z, per mass [m²]
 
 
 POINT_LOAD = LoadShape()
 
 
 class Payload(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """A rigid payload, in the tip frame.
+    """A rigid payload, in the tip frame."""
 
-    Attributes:
-        mass: [kg].
-        center: Centre of mass [m].
-        size: Sides of a box of uniform density along x, y and z [m].
-        inertia: Instead of a size, moments about the centre of mass, around x, y and z [kg m²].
-    """
-
-    mass: float = Field(gt=0.0, le=MAX_MASS)
-    center: Position = (0.0, 0.0, 0.0)
-    size: tuple[Side, Side, Side] | None = None
-    inertia: Moments | None = None
+    mass: float = Field(gt=0.0, le=MAX_MASS)  # [kg]
+    center: Position = (0.0, 0.0, 0.0)  # centre of mass [m]
+    size: tuple[Side, Side, Side] | None = None  # sides of a box of uniform density along x, y and z [m]
+    inertia: Moments | None = None  # instead of a size, moments about the centre of mass, around x, y and z [kg m²]
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -66,10 +53,3 @@ class Payload(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         parts += [] if self.size is None else [f"a box of {describe_vector(self.size)} m"]
         parts += [] if self.inertia is None else [f"moments of inertia {describe_vector(self.inertia)} kg m²"]
         return ", ".join(parts)
-
-
-def read_payload(value: Any) -> Any:
-    """Return the payload of a record in a task file, and anything else as it is."""
-    if not isinstance(value, dict):
-        return value
-    return check_document(cast("dict[Any, Any]", value), Payload, ValueError, "payload")

@@ -36,28 +36,17 @@ AXIS, ORIENTATION = 2, 3  # number of angles that count at a target; 0 for a poi
 
 @dataclass(frozen=True)
 class TargetArrays:
-    """Tool directions, tolerances and weights of T targets.
+    """Tool directions, tolerances and weights of T targets."""
 
-    Attributes:
-        n_angular: (T,) number of angles that count: 0 for a point, AXIS if the tool's z counts, ORIENTATION if its x
-            does, too.
-        rotation: (T, 3, 3) the tool's own x, y and z in the world as columns; axes that do not count are arbitrary.
-        tolerance: (T,) distance from which on a target counts as unreached [m].
-        angle_tolerance: (T,) angle likewise [rad].
-        weight: (T,) factor of a target's share of a sum of errors.
-        stated_tolerance: (T,) tolerance if the task states it, else 0: what an error objective ignores [m].
-        stated_angle_tolerance: (T,) angle likewise [rad].
-        restarts: number of further starts of the inverse kinematics.
-    """
-
+    # (T,) number of angles that count: 0 for a point, AXIS if the tool's z counts, ORIENTATION if its x does, too
     n_angular: NDArray[np.intp]
-    rotation: Array
-    tolerance: Array
-    angle_tolerance: Array
-    weight: Array
-    stated_tolerance: Array
-    stated_angle_tolerance: Array
-    restarts: int = 0
+    rotation: Array  # (T, 3, 3) the tool's own x, y and z in the world as columns; axes that do not count are arbitrary
+    tolerance: Array  # (T,) distance from which on a target counts as unreached [m]
+    angle_tolerance: Array  # (T,) angle likewise [rad]
+    weight: Array  # (T,) factor of a target's share of a sum of errors
+    stated_tolerance: Array  # (T,) tolerance if the task states it, else 0: what an error objective ignores [m]
+    stated_angle_tolerance: Array  # (T,) angle likewise [rad]
+    restarts: int = 0  # number of further starts of the inverse kinematics
 
     def __len__(self) -> int:
         return len(self.n_angular)
@@ -74,25 +63,18 @@ class TargetArrays:
 
 
 class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """A point that the tip should reach, and the tool's direction there.
+    """A point that the tip should reach, and the tool's direction there."""
 
-    Attributes:
-        name: Its name in the steps of a cycle and in tables; empty for none.
-        position: Position of the tip [m].
-        axis: World direction of the tool's z axis, of any length; the tool may rotate about it.
-        orientation: Instead of an axis, roll, pitch and yaw of the tool about the fixed x, then y, then z [rad].
-        tolerance: Distance from which on the target counts as unreached [m]; None for REACHED.
-        angle_tolerance: Angle likewise, for a target with an axis or an orientation [rad]; None for ALIGNED.
-        weight: Factor of its share of a sum of errors.
-    """
-
-    name: str = Field(default="", pattern=TARGET_NAME)
-    position: Point
-    axis: Point | None = None
+    name: str = Field(default="", pattern=TARGET_NAME)  # name in the steps of a cycle and in tables; empty for none
+    position: Point  # position of the tip [m]
+    axis: Point | None = None  # world direction of the tool's z axis, of any length; the tool may rotate about it
+    # Instead of an axis, roll, pitch and yaw of the tool about the fixed x, then y, then z [rad]
     orientation: Point | None = None
+    # Distance from which on the target counts as unreached [m]; None for REACHED
     tolerance: float | None = Field(default=None, ge=MIN_TOLERANCE, le=MAX_COORDINATE)
+    # Angle likewise, for a target with an axis or an orientation [rad]; None for ALIGNED
     angle_tolerance: float | None = Field(default=None, ge=MIN_TOLERANCE, le=math.pi)
-    weight: float = Field(default=1.0, gt=0.0, le=MAX_WEIGHT)
+    weight: float = Field(default=1.0, gt=0.0, le=MAX_WEIGHT)  # factor of its share of a sum of errors
 
     @field_validator("position", mode="before")
     @classmethod

@@ -1,32 +1,25 @@
 """The tool that an arm carries at the end of its last link."""
 
 import math
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Self
 
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.tasks.moments import MAX_MASS, Moments, check_moments, describe_vector
 from armwright.tasks.targets import Position
-from armwright.yaml_documents import check_document
 
 Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]  # [rad]
 
 
 class Tool(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """A tool, in a frame at the end of the last link and parallel to the frame of that link.
+    """A tool, in a frame at the end of the last link and parallel to the frame of that link."""
 
-    Attributes:
-        tip: Position of the tip [m].
-        rpy: Roll, pitch and yaw of the tip frame about the fixed x, then y, then z [rad].
-        mass: [kg].
-        center: Centre of mass [m].
-        inertia: Moments about the centre of mass, around x, y and z [kg m²]; those of a point mass by default.
-    """
-
-    tip: Position = (0.0, 0.0, 0.0)
+    tip: Position = (0.0, 0.0, 0.0)  # position of the tip [m]
+    # Roll, pitch and yaw of the tip frame about the fixed x, then y, then z [rad]
     rpy: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
-    mass: float = Field(default=0.0, ge=0.0, le=MAX_MASS)
-    center: Position = (0.0, 0.0, 0.0)
+    mass: float = Field(default=0.0, ge=0.0, le=MAX_MASS)  # [kg]
+    center: Position = (0.0, 0.0, 0.0)  # centre of mass [m]
+    # Moments about the centre of mass, around x, y and z [kg m²]; those of a point mass by default
     inertia: Moments = (0.0, 0.0, 0.0)
 
     @model_validator(mode="after")
@@ -52,12 +45,3 @@ class Tool(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
 
 NO_TOOL = Tool()
-
-
-def read_tool(value: Any) -> Tool:
-    """Return the tool of a record in a task file; raise ValueError for anything else."""
-    if isinstance(value, Tool):
-        return value
-    if not isinstance(value, dict):
-        raise ValueError(f"tool: expected a record such as {{tip: [0, 0, 0.1], mass: 0.35}}, got {value!r:.80}")
-    return check_document(cast("dict[Any, Any]", value), Tool, ValueError, "tool")

@@ -104,7 +104,7 @@ def _initial_matrix(
         return nothing, {"proposer": {"name": initial_designs.name, **initial_designs.settings()}}
     _, run = read_run(initial_designs)
     space = run.problem.space.model_copy(update={"name": problem.space.name})
-    if space != problem.space or run.problem.task.target_specs != problem.task.target_specs:
+    if space != problem.space or run.problem.task.targets != problem.task.targets:
         raise SettingsError(
             f"{initial_designs} holds a run of another task or design space ({run.problem.task.name}, "
             f"{run.problem.space.name})"
