@@ -1,8 +1,9 @@
 """Kill commands at random moments and repeat them until they end, checking invariants.
 
-A scenario is a command; the same command never killed is its reference. A kill falls, by chance, into the start of the
-process, into its search (at a random amount of work) or into what comes after (results, page, figures; at a random
-time). When a command ends by itself, what it left is compared with the reference, and the next one begins anew.
+A scenario is a command; the same command never killed is its reference. A kill falls at a random time after the command
+has begun, up to the time that the reference took, so into its search or into what comes after (results, page, figures);
+some fall into the start of the process. When a command ends by itself, what it left is compared with the reference, and
+the next one begins anew.
 """
 
 import os
@@ -20,10 +21,11 @@ from pathlib import Path
 
 import psutil
 
+from armwright.runs.folder import is_held
+
 LOOK_SECONDS = 0.003
-SHARES = {"start": 0.15, "search": 0.45, "results": 0.4}  # of the kills
+AT_START = 0.15  # of the kills
 MAX_KILLS = 12  # of one run
-STRIDE = 0.25  # of the whole search, the most between two kills in it
 SIGNALS = {"INT": [signal.SIGINT], "INT INT": [signal.SIGINT] * 2, "TERM": [signal.SIGTERM]}
 
 
@@ -33,8 +35,6 @@ class Scenario:
 
     arguments: Callable[[Path], Sequence[str]]
     """Of the command, for a folder."""
-    progress: Callable[[Path], float]
-    """The share of the search that lies in a folder, 0 to 1."""
     check: Callable[[Path, Path], None]
     """Must hold after each kill."""
     same: Callable[[Path, Path], None]
@@ -42,31 +42,31 @@ class Scenario:
     program: Sequence[str] = ("-m", "armwright")
     victims: Sequence[str] = ("process",)
     """Who is killed: the process, one of its workers, or all at once; or what SIGNALS the process gets."""
-    is_begun: Callable[["Command"], bool] = lambda command: command.words.stat().st_size > 0
-    """Whether Python and its modules are loaded, and the work begins."""
 
 
 class Command:
     """A command under way, its words in a file."""
 
     def __init__(self, scenario: Scenario, folder: Path) -> None:
-        self.scenario, self.folder = scenario, folder
-        self.words = folder.with_name(f"{folder.name}.words")
+        self.folder, self.words = folder, folder.with_name(f"{folder.name}.words")
         with self.words.open("wb") as words:
             arguments = [sys.executable, *scenario.program, *scenario.arguments(folder)]
             self.process = subprocess.Popen(
                 arguments, stdin=subprocess.DEVNULL, stdout=words, stderr=words, start_new_session=True
             )
 
-    def wait_for(self, reached: Callable[[], bool]) -> bool:
-        """Wait until then, or until the command ends; whether it still goes on."""
+    def is_begun(self) -> bool:
+        """Whether Python and its modules are loaded, and the work begins."""
+        return self.words.stat().st_size > 0 or is_held(self.folder)
+
+    def wait_for(self, reached: Callable[[], bool]) -> None:
+        """Wait until then, or until the command ends."""
         while self.process.poll() is None and not reached():
             threading.Event().wait(LOOK_SECONDS)
-        return self.process.poll() is None
 
-    def wait_seconds(self, seconds: float) -> bool:
+    def wait_seconds(self, seconds: float) -> None:
         until = time.monotonic() + seconds
-        return self.wait_for(lambda: time.monotonic() >= until)
+        self.wait_for(lambda: time.monotonic() >= until)
 
     def kill(self, victim: str) -> bool:
         """Kill one who lives; whether there was one. A worker's command goes on."""
@@ -89,6 +89,7 @@ class Command:
             workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
             if workers:
                 random.choice(workers).kill()
+                self.ends_well()  # it gives the cell to another worker
                 return True
         return False
 
@@ -97,28 +98,32 @@ class Command:
 
 
 def kill_often(scenario: Scenario, place: Path, kills: int, seed: str) -> Counter[str]:
-    """So many kills in folders below `place`; how many fell into which part, and how many runs came to their end."""
+    """So many kills in folders below `place`; how many of each victim, and how many runs came to their end."""
     chance = random.Random(seed)
     whole = place / "whole"
-    began = time.monotonic()
     command = Command(scenario, whole)  # never killed
-    command.wait_for(lambda: scenario.progress(whole) > 0.0)
-    first = time.monotonic()
-    command.wait_for(lambda: scenario.progress(whole) >= 1.0)
-    done = time.monotonic()
+    started = time.monotonic()
+    command.wait_for(command.is_begun)
+    begun = time.monotonic()
     command.ends_well()
-    times = {"start": first - began, "results": time.monotonic() - done}
+    start, work = begun - started, time.monotonic() - begun
     fell: Counter[str] = Counter()
     while fell.total() - fell["ended"] < kills:
         folder = place / f"run{fell['ended']}"
         left = min(chance.randint(1, MAX_KILLS), kills - fell.total() + fell["ended"])
-        landed = "none yet"
-        while landed:
+        is_killed = True
+        while is_killed:
             command = Command(scenario, folder)
-            landed = _kill_once(command, chance, times) if left else ""
+            victim = chance.choice(scenario.victims)
+            if left and victim not in SIGNALS and chance.random() < AT_START:
+                command.wait_seconds(chance.uniform(0.0, start))
+            elif left:  # Python tells of signals in its own way while it begins
+                command.wait_for(command.is_begun)
+                command.wait_seconds(chance.uniform(0.0, work))
+            is_killed = left > 0 and command.kill(victim)
             left -= 1
-            if landed:
-                fell[landed] += 1
+            if is_killed:
+                fell[victim] += 1
                 scenario.check(folder, whole)
             else:
                 command.ends_well()
@@ -126,23 +131,3 @@ def kill_often(scenario: Scenario, place: Path, kills: int, seed: str) -> Counte
         scenario.same(folder, whole)
         fell["ended"] += 1
     return fell
-
-
-def _kill_once(command: Command, chance: random.Random, times: dict[str, float]) -> str:
-    """Kill at a random moment; into which part it fell, empty if the command was faster."""
-    scenario, folder = command.scenario, command.folder
-    part = chance.choices(list(SHARES), list(SHARES.values()))[0]
-    victim = chance.choice(scenario.victims)
-    if part == "start" and victim not in SIGNALS:  # of which Python itself tells in its own way while it begins
-        goes_on = command.wait_seconds(chance.uniform(0.0, times["start"]))
-    else:
-        step = {"start": 0.0, "search": chance.uniform(0.0, STRIDE), "results": 1.0}[part]
-        goal = min(1.0, scenario.progress(folder) + step)
-        goes_on = command.wait_for(lambda: scenario.is_begun(command) and scenario.progress(folder) >= goal)
-        goes_on = goes_on and command.wait_seconds(chance.uniform(0.0, times.get(part, 0.02)))
-    if not goes_on or not command.kill(victim):
-        return ""
-    if victim == "worker":
-        command.ends_well()  # it gives the cell to another worker
-        return "worker"
-    return part

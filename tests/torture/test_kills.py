@@ -6,15 +6,12 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
-from armwright.runs.folder import is_held
 from tests.support import command_line
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
 from tests.support.wire_formats import model_options
@@ -29,7 +26,6 @@ def study(n_total: int, *settings: str) -> Scenario:
     method = ["--n-init", "5", "--n-step", "4", "--n-total", str(n_total), "--seed", "3", *settings]
     return Scenario(
         arguments=lambda folder: ["optimize", "target-1", *method, "--out", str(folder)],
-        progress=lambda folder: n_lines(folder / "trials.jsonl") / (5 + n_total),
         check=is_beginning,
         same=is_same_run,
     )
@@ -49,7 +45,7 @@ def extension(_: Path, __: ChatServer) -> Scenario:
             done_here(study(20, "--proposer", "rules", "--no-figures").arguments(folder))
         return longer.arguments(folder)
 
-    return replace(longer, arguments=begin, progress=lambda folder: max(0.0, longer.progress(folder) * 55 - 25) / 30)
+    return replace(longer, arguments=begin)
 
 
 def thoughtful(request: Request) -> Answer:
@@ -107,22 +103,9 @@ def model_in_flight(_: Path, server: ChatServer) -> Scenario:
     return replace(asked, check=numbered, same=same)
 
 
-BUDGET = 30_000
-
-
-@cache
-def _share(state: Path, _mtime: int) -> float:
-    with np.load(state) as content:
-        return float(content["evaluations"]) / BUDGET
-
-
 def search(_: Path, __: ChatServer) -> Scenario:
     """Its state is written every 5 s; here more often, so that short searches go on, too."""
     often = "import armwright.study.front.direct_search as f; f.SAVE_SECONDS = 0.1"
-
-    def progress(folder: Path) -> float:
-        state = folder / "search.npz"
-        return _share(state, state.stat().st_mtime_ns) if state.exists() else 0.0
 
     def is_front(folder: Path, whole: Path) -> None:
         assert trials(folder) in ([], trials(whole))
@@ -133,11 +116,10 @@ def search(_: Path, __: ChatServer) -> Scenario:
         assert files(folder) == files(whole)
         assert summary(folder) == summary(whole)
 
-    settings = ["--evaluations", str(BUDGET), "--no-stall", "--seed", "3", "--no-figures"]
+    settings = ["--evaluations", "30000", "--no-stall", "--seed", "3", "--no-figures"]
     return Scenario(
-        lambda folder: ["design", "target-1", *settings, "--out", str(folder)], progress, is_front, same,
+        lambda folder: ["design", "target-1", *settings, "--out", str(folder)], is_front, same,
         program=("-c", f"{often}; from armwright.cli.app import main; main()"),
-        is_begun=lambda command: is_held(command.folder),
     )  # fmt: skip
 
 
@@ -156,9 +138,6 @@ def experiment(place: Path, _: ChatServer) -> Scenario:
     file.write_text(yaml.safe_dump(EXPERIMENT), encoding="utf-8")
     cells = [Path("runs") / method / "target-1" / f"seed{seed}" for method in ("bbo", "rules") for seed in (0, 1)]
 
-    def progress(folder: Path) -> float:
-        return sum(n_lines(folder / cell / "trials.jsonl") for cell in cells) / (34 * len(cells))
-
     def table(folder: Path) -> list[dict[str, str]]:
         rows = csv.DictReader((folder / "table.csv").read_text(encoding="utf-8").splitlines())
         return [{name: value for name, value in row.items() if "seconds" not in name} for row in rows]
@@ -175,7 +154,7 @@ def experiment(place: Path, _: ChatServer) -> Scenario:
 
     return Scenario(
         lambda folder: ["experiment", str(file), "--workers", "2", "--no-figures", "--out", str(folder)],
-        progress, check, same, victims=("process", "worker", "all"),
+        check, same, victims=("process", "worker", "all"),
     )  # fmt: skip
 
 
@@ -222,6 +201,5 @@ def test_killed_command_resumes_to_the_same_result(
     if own == 0:
         pytest.skip("killed in `make torture` alone")
     fell = kill_often(make(tmp_path, chat_server), tmp_path, own, name)
-    parts = ", ".join(f"{fell[part]} in its {part}" for part in ("start", "search", "results") if fell[part])
-    worker = f", {fell['worker']} of a worker" if fell["worker"] else ""
-    record_property(name, f"{fell.total() - fell['ended']} kills ({parts}{worker}), {fell['ended']} runs to their end")
+    who = ", ".join(f"{fell[victim]} of {victim}" for victim in fell if victim != "ended")
+    record_property(name, f"{own} kills ({who}), {fell['ended']} runs to their end")
