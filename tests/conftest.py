@@ -40,7 +40,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--kills", type=int, default=10, help="how often runs are killed in tests/torture")
+    parser.addoption("--kills", type=int, default=6, help="how often runs are killed in tests/torture")
 
 
 @pytest.fixture(autouse=True)

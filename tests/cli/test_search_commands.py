@@ -116,6 +116,7 @@ def test_optimize_and_prompt_reject_a_design_run(in_folder: Path) -> None:
     assert "to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:run", "--out", "other")
 
 
+@pytest.mark.slow
 def test_optimize_names_design_for_tasks_with_constraints(in_folder: Path) -> None:
     task = ("name: near", "targets: [[0.3, 0.0, 0.3], [0.2, 0.1, 0.4]]", "reference_point: [1, 1]")
     (in_folder / "free.yaml").write_text("\n".join(task), encoding="utf-8")

@@ -15,7 +15,7 @@ from armwright.cli.signals import interruptible
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request
 from tests.support.command_line import PATIENCE, armwright
 from tests.support.wire_formats import model_options
-from tests.torture.lives import is_same_run
+from tests.torture.short import is_same_run
 
 STUDY = ("optimize", "target-1", "--n-init", "3", "--n-step", "3", "--n-total", "6", "--no-figures", "--out")
 

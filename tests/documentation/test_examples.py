@@ -26,10 +26,13 @@ from armwright.study.optuna_export import export_study
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request
+from tests.support.documentation import PAGES, commands
 from tests.support.examples import EXAMPLES, example_tasks
 from tests.support.frame_program import frame_displacement
 
-TASKS = example_tasks()
+# The other tasks are run by the pages that show them (test_pages.py).
+SHOWN = {word for page in PAGES for command in commands(page) for word in command.text.split()}
+TASKS = {task: given for task, given in example_tasks().items() if f"examples/{task.name}" not in SHOWN}
 
 
 def run(example: str, *options: str) -> str:
@@ -43,7 +46,7 @@ def told(server: ChatServer) -> tuple[str, ...]:
 
 @pytest.mark.parametrize("task", TASKS, ids=lambda task: task.stem)
 @pytest.mark.slow
-def test_example_tasks_and_spaces_run(task: Path, tmp_path: Path) -> None:
+def test_example_tasks_that_no_page_shows_run(task: Path, tmp_path: Path) -> None:
     space, evaluator = TASKS[task]
     spaces = ["--space", str(space)] if space else []
     spaces += ["--evaluator", evaluator] if evaluator else []

@@ -18,6 +18,7 @@ from armwright.existing.base_placement import placed
 from armwright.existing.compare_arms import (
     EXISTING_ARMS,
     ArmComparison,
+    ComparedArm,
     compare_arms,
     dominance_counts,
     read_existing_arms,

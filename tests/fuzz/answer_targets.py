@@ -55,11 +55,8 @@ def run_answer(data: bytes) -> None:
 
 def draft_seeds() -> list[bytes]:
     rich = {"task": yaml.safe_load(RICH_TASK), "space": yaml.safe_load(RICH_SPACE)}
-    names = ("task", "space")
-    plain = {
-        name: yaml.safe_load((ROOT / "examples" / f"2-assembly-{name}.yaml").read_text(encoding="utf-8"))
-        for name in names
-    }
+    examples = {name: ROOT / "examples" / f"2-assembly-{name}.yaml" for name in ("task", "space")}
+    plain = {name: yaml.safe_load(file.read_text(encoding="utf-8")) for name, file in examples.items()}
     small = {"name": "drafted", "targets": [[0.4, 0, 0.1], [0.4, 0.2, 0.1]], "provenance": "made up"}
     answers = [
         {**rich, "assumptions": ["one", "two"], "questions": ["three"]},
@@ -73,10 +70,7 @@ def draft_seeds() -> list[bytes]:
 class _Answered:
     """A model that gives one answer."""
 
-    model, origin = "stand-in", "scripted"
-
-    def __init__(self) -> None:
-        self.text = ""
+    model, origin, text = "stand-in", "scripted", ""
 
     def begin(self) -> None: ...
 

@@ -11,7 +11,7 @@ from typing import Any
 from armwright.exceptions import ArmwrightError, RunFolderError
 from tests.fuzz.run_targets import a_run
 from tests.fuzz.target import DefectError, folder
-from tests.fuzz.text_targets import point_seeds, urdf_seeds
+from tests.fuzz.text_targets import POINTS, urdf_seeds
 
 
 def argument_seeds() -> list[bytes]:
@@ -42,6 +42,11 @@ def argument_seeds() -> list[bytes]:
     return [json.dumps(line).encode() for line in lines]
 
 
+SHORT = {
+    "optimize": ["--n-init=1", "--n-total=2"],
+    "design": ["--evaluations=50"],
+    "experiment": ["--print-commands"],
+}
 NEVER = ("live", "--live", "--call", "--scheduler", "--workers")  # these wait for others or start processes
 
 
@@ -61,21 +66,12 @@ def run_arguments(data: bytes) -> None:
         return
     if given and given[0] in ("optimize", "design", "experiment", "compare", "compare-arms"):
         given[1:1] = ["--no-figures"]
-    if given and given[0] in ("optimize", "design", "experiment"):
-        given += (
-            {
-                "optimize": ["--n-init=1", "--n-total=2"],
-                "design": ["--evaluations=50"],
-                "experiment": ["--print-commands"],
-            }[given[0]]
-            if len(data) % 4
-            else ["--out=/dev/null/x"]
-        )
+    if given and given[0] in SHORT:
+        given += SHORT[given[0]] if len(data) % 4 else ["--out=/dev/null/x"]
     place = folder() / "cli"
     place.mkdir(exist_ok=True)
-    if not (place / "arm.urdf").exists():
-        (place / "arm.urdf").write_bytes(urdf_seeds()[0])
-    (place / "points.csv").write_bytes(point_seeds()[0])
+    (place / "arm.urdf").write_bytes(urdf_seeds()[0])
+    (place / "points.csv").write_bytes(POINTS[0])
     before = Path.cwd()
     os.chdir(place)
     try:
@@ -97,13 +93,13 @@ def run_arguments(data: bytes) -> None:
         if set(others) - EXPECTED:
             raise DefectError(f"files beside its folder: {others}")
         for entry in place.iterdir():
-            if entry.name not in ("arm.urdf",):
-                shutil.rmtree(entry) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
+            shutil.rmtree(entry) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
 
 
-EXPECTED = {"cli", "run", "rich-space.yaml", "damaged", "served", "drafts", "record", "trials", "task.yaml",
-    "space.yaml",
-            "kept.yaml", "experiment.yaml", "design.json", "arm.urdf", "points.csv", "mine.md.j2"}  # fmt: skip
+EXPECTED = {
+    "cli", "run", "rich-space.yaml", "damaged", "served", "drafts", "record", "trials", "task.yaml", "space.yaml",
+    "kept.yaml", "experiment.yaml", "design.json", "arm.urdf", "points.csv", "mine.md.j2",
+}  # fmt: skip
 
 
 def _argument(value: Any) -> str:

@@ -2,7 +2,7 @@
 
 import copy
 import json
-from collections.abc import Callable
+from collections.abc import Iterator
 from functools import lru_cache
 from random import Random
 from typing import Any
@@ -18,28 +18,24 @@ NUMBERS: tuple[Any, ...] = (
 )  # fmt: skip
 TEXTS = (
     "", " ", "\n", "a\nb", "\0", "\x1b[2J", "\u202e", "\ufeff", "é\u0301", "\U0001f9be", "😀" * 50, "x" * 70,
-    "x" * 5000,
-    "\ud800", "\udc80", "../../x", "/etc/passwd", "C:\\x", "CON", "nul.yaml", "..", ".", "~", "a/b", "x\ny.yaml",
-    "<script>alert(1)</script>", "</script>", "&lt;", '"', "'", "`id`", "$(id)", "; rm -rf x", "%s%n", "{0.__class__}",
-    "{{ 7 * 7 }}", "{% for i in range(10**9) %}{% endfor %}", "${1+1}", "$(eval 1)", "__import__('os').system('id')",
-    "nan", "inf", "-inf", "1e309", "1e999999", "0x10", "1_0", "1:30", "1:1:1.0", "12e", "１２", "true", "no", "null",
-    "~",
-    "2001-01-01", "2001-02-30", "=", "<<", "!!python/object/apply:os.system [id]", "&a", "*a", "mass <= 3",
-    "mass<=1e999",
-    "replay:x", "manual:..", "http://127.0.0.1:1/", "openai-chat:x", "llm-0001", "llm-", "-", "--", "-1", "R", "YPRP",
+    "x" * 5000, "\ud800", "\udc80", "../../x", "/etc/passwd", "C:\\x", "CON", "nul.yaml", "..", ".", "~", "a/b",
+    "x\ny.yaml", "<script>alert(1)</script>", "</script>", "&lt;", '"', "'", "`id`", "$(id)", "; rm -rf x", "%s%n",
+    "{0.__class__}", "{{ 7 * 7 }}", "{% for i in range(10**9) %}{% endfor %}", "${1+1}", "$(eval 1)",
+    "__import__('os').system('id')", "nan", "inf", "-inf", "1e309", "1e999999", "0x10", "1_0", "1:30", "1:1:1.0", "12e",
+    "１２", "true", "no", "null", "2001-01-01", "2001-02-30", "=", "<<", "!!python/object/apply:os.system [id]", "&a",
+    "*a", "mass <= 3", "mass<=1e999", "replay:x", "manual:..", "http://127.0.0.1:1/", "openai-chat:x", "llm-0001",
+    "llm-", "-", "--", "-1", "R", "YPRP",
 )  # fmt: skip
 # Spliced into the bytes of a document.
 TOKENS = (
     b"\0", b"\xff", b"\xfe\xff", b"\xed\xa0\x80", b"\xef\xbb\xbf", b"\r", b"\n", b"\t", b"\x1b", b"{", b"}", b"[",
-    b"]",
-    b":", b",", b"-", b"- ", b"? ", b"&a ", b"*a", b"!!int ", b"!!float ", b"!!bool ", b"!!timestamp ", b"!!binary ",
-    b"!!set ", b"!!omap ", b"!!pairs ", b"!!null ", b"!!str ", b"!!python/tuple ", b"! ", b"!x ", b"%YAML 1.1\n",
-    b"%TAG ! x\n",
-    b"---\n", b"...\n", b"<<: ", b"| ", b"> ", b"'", b'"', b"\\", b"\\u0000", b"\\ud800", b"#", b"=", b"0x", b"1e999",
-    b"NaN", b"Infinity", b"-Infinity", b"null", b"true", b"9" * 400, b"9" * 5000, b"1:" * 300 + b"1.0", b"[" * 300,
-    b"{" * 300, b"- " * 300, b'{"a":' * 300, b"a" * 2000, b"<", b">", b"&amp;", b"&#0;", b"&#xd800;", b"&x;",
-    b"<!DOCTYPE a [<!ENTITY x 'y'>]>", b"<!DOCTYPE a SYSTEM 'file:///etc/passwd'>", b"<![CDATA[", b"]]>", b"<!--",
-    b"-->",
+    b"]", b":", b",", b"-", b"- ", b"? ", b"&a ", b"*a", b"!!int ", b"!!float ", b"!!bool ", b"!!timestamp ",
+    b"!!binary ", b"!!set ", b"!!omap ", b"!!pairs ", b"!!null ", b"!!str ", b"!!python/tuple ", b"! ", b"!x ",
+    b"%YAML 1.1\n", b"%TAG ! x\n", b"---\n", b"...\n", b"<<: ", b"| ", b"> ", b"'", b'"', b"\\", b"\\u0000",
+    b"\\ud800", b"#", b"=", b"0x", b"1e999", b"NaN", b"Infinity", b"-Infinity", b"null", b"true", b"9" * 400,
+    b"9" * 5000, b"1:" * 300 + b"1.0", b"[" * 300, b"{" * 300, b"- " * 300, b'{"a":' * 300, b"a" * 2000, b"<", b">",
+    b"&amp;", b"&#0;", b"&#xd800;", b"&x;", b"<!DOCTYPE a [<!ENTITY x 'y'>]>",
+    b"<!DOCTYPE a SYSTEM 'file:///etc/passwd'>", b"<![CDATA[", b"]]>", b"<!--", b"-->",
     b"<?xml version='1.0' encoding='utf-7'?>", b"<?xml version='1.1' encoding='x'?>", b"<a>" * 60, b"${", b"}", b"$(",
     b"{{", b"}}", b"{%", b"%}", b"```\n", b"TASK\n", b"SPACE\n", b"ORIGIN: ", b"JOINTS: ", b"LINKS: ", b"<think>",
     b"</think>",
@@ -114,7 +110,7 @@ def _near(value: Any, rng: Random) -> Any:
     return [value]
 
 
-def _places(content: Any) -> Any:
+def _places(content: Any) -> Iterator[tuple[Any, Any]]:
     """Every place of a tree that can be written to; trees are walked without recursion, as they may be deep."""
     waiting = [content]
     while waiting:
@@ -148,48 +144,34 @@ def garbled(data: bytes, rng: Random) -> bytes:
     return data[:LARGEST]
 
 
-def _as_yaml(content: Any) -> bytes:
-    try:
-        return yaml.dump(content, Dumper=yaml.CSafeDumper, allow_unicode=True, sort_keys=False, encoding="utf-8")
-    except (RecursionError, ValueError):  # such as a lone surrogate, which JSON has a form for
-        return _as_json(content)
+@lru_cache(maxsize=100)
+def _content(data: bytes, form: str) -> Any:
+    return json.loads(data) if form == "json" else yaml.load(data, Loader=yaml.CSafeLoader)
 
 
-def _as_json(content: Any) -> bytes:
+def _written(content: Any, form: str) -> bytes:
+    if form == "yaml":
+        try:
+            return yaml.dump(content, Dumper=yaml.CSafeDumper, allow_unicode=True, sort_keys=False, encoding="utf-8")
+        except (RecursionError, ValueError):  # such as a lone surrogate, which JSON has a form for
+            pass
     try:
         return json.dumps(content).encode()
     except (RecursionError, ValueError):  # a number of too many digits
         return b"[" * 500
 
 
-@lru_cache(maxsize=100)
-def _from_yaml(data: bytes) -> Any:
-    return yaml.load(data, Loader=yaml.CSafeLoader)
-
-
-@lru_cache(maxsize=100)
-def _from_json(data: bytes) -> Any:
-    return json.loads(data)
-
-
-_FORMS: dict[str, tuple[Callable[[bytes], Any], Callable[[Any], bytes]]] = {
-    "yaml": (_from_yaml, _as_yaml),
-    "json": (_from_json, _as_json),
-}
-
-
 def changed(data: bytes, form: str, rng: Random) -> bytes:
     """A document changed in its structure, where it has one that can be read, or in its bytes."""
     if form == "jsonl":
         return _changed_lines(data, rng)
-    if form in _FORMS and rng.randrange(4):
-        read, write = _FORMS[form]
-        try:
-            data = write(mutated(read(data), rng))[:LARGEST]
-        except Exception:  # noqa: BLE001 (whatever an earlier change has made of it)
-            return garbled(data, rng)
-        return data if rng.randrange(4) else garbled(data, rng)
-    return garbled(data, rng)
+    if form == "text" or not rng.randrange(4):
+        return garbled(data, rng)
+    try:
+        data = _written(mutated(_content(data, form), rng), form)[:LARGEST]
+    except Exception:  # noqa: BLE001 (whatever an earlier change has made of it)
+        return garbled(data, rng)
+    return data if rng.randrange(4) else garbled(data, rng)
 
 
 def _changed_lines(data: bytes, rng: Random) -> bytes:

@@ -4,6 +4,7 @@ A target is given bytes. It may raise ArmwrightError and nothing else. Accepted 
 use them.
 """
 
+import atexit
 import os
 import shutil
 import tempfile
@@ -27,19 +28,16 @@ class DefectError(AssertionError):
 
 @dataclass(frozen=True)
 class Target:
-    """An entry point for documents.
+    """An entry point for documents."""
 
-    Attributes:
-        form: Format of the documents: yaml, json, jsonl or text.
-        seeds: Returns valid documents.
-        run: Reads and uses a document.
-        heavy: Whether an accepted document takes milliseconds rather than a fraction of one.
-    """
-
+    inputs: int
+    """Of a whole run, by what one takes."""
     form: str
+    """Format of the documents: yaml, json, jsonl or text."""
     seeds: Callable[[], list[bytes]]
+    """Returns valid documents."""
     run: Callable[[bytes], None]
-    heavy: bool = False
+    """Reads and uses a document."""
 
     def make(self, rng: Random) -> bytes:
         """Return a mutated valid document."""
@@ -58,10 +56,8 @@ def check(target: Target, data: bytes) -> bool:
 
 def check_words(refusal: ArmwrightError) -> None:
     words = str(refusal)
-    if len(words) > MAX_REFUSAL_LENGTH:
-        raise DefectError(f"a refusal of {len(words)} characters: {words[:200]!r}") from refusal
-    if not words or not words.isprintable():
-        raise DefectError(f"a refusal that is no line: {words[:500]!r}") from refusal
+    if len(words) > MAX_REFUSAL_LENGTH or not words or not words.isprintable():
+        raise DefectError(f"a refusal of {len(words)} characters that is no line: {words[:500]!r}") from refusal
 
 
 @cache
@@ -75,8 +71,6 @@ def folder() -> Path:
     """Return this process's folder for input files, in memory if possible."""
     place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
     made = Path(tempfile.mkdtemp(prefix="armwright-fuzz-", dir=place))
-    import atexit
-
     atexit.register(shutil.rmtree, made, ignore_errors=True)
     return made
 

@@ -13,34 +13,31 @@ from tests.fuzz.problem_targets import (
     run_task,
     start_seeds,
 )
-from tests.fuzz.request_targets import request_seeds, run_request
-from tests.fuzz.run_targets import a_run, of_run, replay_seeds, run_replay, run_trials
+from tests.fuzz.run_targets import of_run, request_seeds, run_replay, run_request, run_trials, seed_of_run
 from tests.fuzz.target import Target, of_examples, shipped
-from tests.fuzz.text_targets import point_seeds, run_points, run_urdf, run_words, urdf_seeds, word_seeds
-
-
-def task_seeds() -> list[bytes]:
-    return [RICH_TASK, BODY_TASK, *shipped("tasks"), *of_examples("task")]
-
+from tests.fuzz.text_targets import POINTS, WORDS, run_points, run_urdf, run_words, urdf_seeds
 
 TARGETS: dict[str, Target] = {
-    "task": Target("yaml", task_seeds, run_task, heavy=True),
-    "space": Target("yaml", lambda: [RICH_SPACE, *shipped("spaces"), *of_examples("space")], run_space, heavy=True),
-    "actuators": Target("yaml", actuator_seeds, run_space, heavy=True),
-    "experiment": Target("yaml", lambda: [*shipped("experiments"), *of_examples("rules")], run_experiment, heavy=True),
-    "start": Target("json", start_seeds, run_start),
-    "answer": Target("json", answer_seeds, run_answer),
-    "draft": Target("text", draft_seeds, run_draft, heavy=True),
-    "replay": Target("jsonl", replay_seeds, run_replay),
-    "trials": Target("jsonl", lambda: [(a_run() / "trials.jsonl").read_bytes()], run_trials),
+    "words": Target(200_000, "text", lambda: WORDS, run_words),
+    "points": Target(200_000, "text", lambda: POINTS, run_points),
+    "start": Target(200_000, "json", start_seeds, run_start),
+    "answer": Target(120_000, "json", answer_seeds, run_answer),
+    "urdf": Target(120_000, "text", urdf_seeds, run_urdf),
+    "request": Target(50_000, "json", request_seeds, run_request),
+    "trials": Target(30_000, "jsonl", seed_of_run("trials.jsonl"), run_trials),
+    "actuators": Target(30_000, "yaml", actuator_seeds, run_space),
+    "space": Target(20_000, "yaml", lambda: [RICH_SPACE, *shipped("spaces"), *of_examples("space")], run_space),
+    "task": Target(20_000, "yaml", lambda: [RICH_TASK, BODY_TASK, *shipped("tasks"), *of_examples("task")], run_task),
+    "experiment": Target(10_000, "yaml", lambda: [*shipped("experiments"), *of_examples("rules")], run_experiment),
+    "replay": Target(10_000, "jsonl", seed_of_run("transcripts.jsonl"), run_replay),
+    "arguments": Target(6_000, "json", argument_seeds, run_arguments),
+    "draft": Target(1_500, "text", draft_seeds, run_draft),
     **{
-        f"run {name}": of_run(name)
-        for name in ("config.yaml", "trials.jsonl", "transcripts.jsonl", "summary.json", "existing_arms.json",
-                     "control.json", "status.json")
+        f"run {name}": Target(inputs, name.rpartition(".")[2], seed_of_run(name), of_run(name))
+        for inputs, names in (
+            (1_000, ("config.yaml", "trials.jsonl", "transcripts.jsonl", "summary.json")),
+            (500, ("existing_arms.json", "control.json", "status.json")),
+        )
+        for name in names
     },
-    "urdf": Target("text", urdf_seeds, run_urdf),
-    "points": Target("text", point_seeds, run_points),
-    "words": Target("text", word_seeds, run_words),
-    "request": Target("json", request_seeds, run_request),
-    "arguments": Target("json", argument_seeds, run_arguments, heavy=True),
-}  # fmt: skip
+}

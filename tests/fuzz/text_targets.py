@@ -45,13 +45,12 @@ def run_points(data: bytes) -> None:
     parse_document(task_template(Path("x y.yaml"), found.targets), Task, TaskError, "x y.yaml")
 
 
-def point_seeds() -> list[bytes]:
-    return [
-        b"x,y,z\n100,200,300\n# so\n\n1,2,3\n", b"1;2;3\r\n4;5;6\r\n", b"\tx\ty\tz\n0\t0.1\t2\t3\n",
-        b"\xef\xbb\xbf1 2 3\n", b"# timestamp tx ty tz qx qy qz qw\n0.5 0.3 0.0 0.2 0 0 0 1\n",
-        b"name;x [mm];y [mm];z [mm];roll [deg];pitch [deg];yaw [deg]\n\"left one\";100,5;0;0,5;180;0;90\n",
-        b"ax,ay,az,x,y,z\n0,0,-1,1,2,3\n",
-    ]  # fmt: skip
+POINTS = [
+    b"x,y,z\n100,200,300\n# so\n\n1,2,3\n", b"1;2;3\r\n4;5;6\r\n", b"\tx\ty\tz\n0\t0.1\t2\t3\n",
+    b"\xef\xbb\xbf1 2 3\n", b"# timestamp tx ty tz qx qy qz qw\n0.5 0.3 0.0 0.2 0 0 0 1\n",
+    b"name;x [mm];y [mm];z [mm];roll [deg];pitch [deg];yaw [deg]\n\"left one\";100,5;0;0,5;180;0;90\n",
+    b"ax,ay,az,x,y,z\n0,0,-1,1,2,3\n",
+]  # fmt: skip
 
 
 def run_words(data: bytes) -> None:
@@ -65,6 +64,7 @@ def run_words(data: bytes) -> None:
     any_of((lambda read=read: read(text)) for read in reads)
 
 
-def word_seeds() -> list[bytes]:
-    return [b"position_error<=0.05", b"torque>1e3", b"position_error=2,torque=1", b"5s", b"2.5min", b"1e6", b"100_000",
-            b"mass <= 3\nlength >= 0.2"]  # fmt: skip
+WORDS = [
+    b"position_error<=0.05", b"torque>1e3", b"position_error=2,torque=1", b"5s", b"2.5min", b"1e6", b"100_000",
+    b"mass <= 3\nlength >= 0.2",
+]  # fmt: skip

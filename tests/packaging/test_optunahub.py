@@ -14,7 +14,6 @@ import yaml
 import armwright as aw
 from tests import ROOT
 from tests.proposers.for_optuna.test_callback import quiet as quiet
-from tests.support.chat_server import ChatServer
 
 REGISTRY = ROOT / "optunahub" / "package"
 NAME = "callbacks/armwright_proposals"
@@ -34,21 +33,6 @@ def test_optunahub_loads_the_package(module: ModuleType) -> None:
     callback = module.ProposalCallback(module.StudyRulesProposer(), every=5)
     study.optimize(lambda trial: trial.suggest_float("x", -9, 9) ** 2, n_trials=10, callbacks=[callback])
     assert [trial.number for trial in study.trials if "proposal" in trial.user_attrs] == [4, 9]
-
-
-def test_package_calls_the_model(module: ModuleType, chat_server: ChatServer) -> None:
-    chat_server.answer = lambda request: '{"reasoning": "so", "parameters": {"x": 0.5}, "reason": "a half"}'
-    proposer = module.StudyLlmProposer(
-        module.ModelOptions(model="m", base_url=chat_server.url, answer="one-step", origin="scripted"), "a parabola"
-    )
-    study = optuna.create_study()
-    study.optimize(
-        lambda trial: trial.suggest_float("x", -9, 9) ** 2,
-        n_trials=5,
-        callbacks=[module.ProposalCallback(proposer, every=5)],
-    )
-    assert study.trials[4].params == {"x": 0.5}
-    assert study.trials[4].user_attrs["source"] == "scripted"
 
 
 def test_package_meets_the_registry_requirements() -> None:

@@ -19,7 +19,7 @@ import armwright as aw
 from armwright.page.page import write_report
 from armwright.page.request_guard import HEADERS
 from armwright.runs.control import read_control
-from tests.fuzz.request_targets import a_server
+from tests.fuzz.run_targets import a_server
 from tests.support.browser import FLAGS, Tab, program
 from tests.support.command_line import PATIENCE
 from tests.support.live_server import ask, post_control, served

@@ -32,11 +32,11 @@ WIDTHS = (1280, 390)
 
 def price_run(folder: Path) -> None:
     task, space = aw.load_task(EXAMPLES / "6-price-task.yaml"), aw.load_space(EXAMPLES / "6-price-space.yaml")
-    aw.find_front(aw.Problem(task, space), evaluations=500, out=folder)
+    aw.find_front(aw.Problem(task, space), evaluations=200, out=folder)
 
 
 def paper_run(folder: Path) -> None:
-    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="rules", n_total=40, out=folder)
+    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="rules", n_total=30, out=folder)
 
 
 def infeasible_run(folder: Path) -> None:
@@ -110,6 +110,7 @@ def figures_of_experiments(run: Path) -> Iterator[tuple[str, Figure]]:
         yield f"arm-{member.number}", draw_arm(history, title, member)
 
 
+@pytest.mark.slow
 def test_texts_of_figures_are_whole_and_apart(run: Path, drawn: dict[str, Drawn]) -> None:
     write_figures(run)
     write_drawn(run / "of-experiments", figures_of_experiments(run))

@@ -12,6 +12,7 @@ from armwright.proof.simulated_run import simulate_arm
 TASK, SPACE = aw.load_task("desk-sorting"), aw.load_space("desk-sorting")
 
 
+@pytest.mark.slow
 def test_cycle_model_is_what_a_simulation_of_the_run_drives() -> None:
     problem = aw.Problem(TASK, SPACE)
     sampled = SPACE.sample(100, 0)

@@ -152,6 +152,7 @@ def test_moved_base_and_links_break_what_their_evaluation_breaks() -> None:
         assert found.verdict.startswith(expected)
 
 
+@pytest.mark.slow
 def test_designs_hold_with_room_to_the_limits() -> None:
     found = survival_of(Desk(**ROOM))
     breaks = {one.name for one in found.perturbations if one.broken}

@@ -47,6 +47,7 @@ def test_a_finished_run_states_what_is_verified(run: Path) -> None:
     assert {file.name for file in (run / "designs" / "0000").iterdir()} >= {"arm.xml", "trajectory.csv"}
 
 
+@pytest.mark.slow
 def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
     content = json.loads(armwright("simulate", run, "--json").stdout)
     assert list(content) == ["mujoco", "timestep", "feed_forward", "simulated", "passed", "designs"]
@@ -171,6 +172,7 @@ def test_ends_of_the_front_have_the_least_objectives() -> None:
         assert history.values[first, index] == min(member.values[index] for member in history.front)
 
 
+@pytest.mark.slow
 def test_cheapest_and_stiffest_designs_are_roles_where_they_are_known() -> None:
     """Errors and holding torque are none then: constraints see to them."""
     examples = Path(__file__).parents[2] / "examples"

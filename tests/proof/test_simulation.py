@@ -205,6 +205,7 @@ def test_contacts_are_the_overlaps_of_our_clearance() -> None:
         assert 5 < touches.sum() < 395
 
 
+@pytest.mark.slow
 def test_the_independent_check_gives_the_same_verdicts(desk: Desk, tmp_path: Path) -> None:
     check: Callable[[Path], list[str]] = runpy.run_path(str(ROOT / "benchmarks" / "check_simulation.py"))["check"]
     for name, one in (("good", desk), ("weak", Desk(SPACE | {"actuators": [WEAK]}))):
@@ -225,6 +226,7 @@ def test_a_task_without_cycle_has_no_further_files() -> None:
     assert Desk(cycle=None, payload=0.1).files == {}
 
 
+@pytest.mark.slow
 def test_torques_between_the_instants_of_loads_are_not_higher() -> None:
     """Except where a joint meets its limit within a line: speeds jump there, so the line counts as a jump."""
     cycle = DESK["cycle"] | {"time": "fastest", "steps": [{"to": "bin"}, {"to": "tray"}, {"to": 3, "by": "line"}]}

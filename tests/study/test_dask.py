@@ -31,7 +31,7 @@ from tests.support.dask_processes import (
     descendants,
     wait_until,
 )
-from tests.torture.lives import n_lines, trials
+from tests.torture.short import n_lines, trials
 
 PAPER = aw.Problem(aw.load_task("target-1"))
 QUANTITIES = ("position_error", "torque", "collision", "path_error", "uncovered_fraction")

@@ -196,12 +196,9 @@ def qmc(seed: int) -> BaseSampler:
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
 @pytest.mark.parametrize(
     ("sampler", "proposer", "stop"),
-    [
-        pytest.param(*case, marks=[] if i % 7 == 0 else pytest.mark.slow)  # 7 is coprime to the lengths of the lists
-        for i, case in enumerate(
-            product(["tpe", "tpe-multivariate", "nsga2", nsga2, qmc], ["none", "rules", Listed()], [3, 5, 6, 12])
-        )
-    ],
+    [  # 7 is coprime to the lengths of the lists, so each value occurs
+        *product(["tpe", "tpe-multivariate", "nsga2", nsga2, qmc], ["none", "rules", Listed()], [3, 5, 6, 12])
+    ][::7],
 )
 @pytest.mark.fast_cases(3)
 def test_resumed_run_equals_uninterrupted_one(

@@ -5,9 +5,11 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import pytest
@@ -52,12 +54,22 @@ def refused(code: int, *arguments: object, **environment: str) -> str:
     return line
 
 
-def start(*arguments: object) -> subprocess.Popen[str]:
+def start(*arguments: object, **how: Any) -> subprocess.Popen[str]:
     """Start a command in a process of its own, its output in pipes."""
-    command = [sys.executable, "-m", "armwright", *map(str, arguments)]
     return subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"
-    )
+        [sys.executable, "-m", "armwright", *map(str, arguments)],
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8", **how,
+    )  # fmt: skip
+
+
+def wait_until(there: Callable[[], bool]) -> None:
+    """Wait for something that other threads or processes do."""
+    gone = threading.Event()
+    for _ in range(int(PATIENCE / 0.005)):
+        if there():
+            return
+        gone.wait(0.005)
+    raise AssertionError("it did not come to that")
 
 
 def press_ctrl_c() -> None:

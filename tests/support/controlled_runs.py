@@ -1,8 +1,5 @@
 """Short runs that tests watch, stop and give hints."""
 
-import json
-import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,10 +13,12 @@ from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import ChatServer
-from tests.support.command_line import PATIENCE
+from tests.support.command_line import wait_until as wait_until
 from tests.support.wire_formats import llm_proposer
+from tests.torture.short import trials
 
 PROBLEM = Problem(load_task("target-1"))
+lines = trials
 SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 9, "seed": 2, "verify": False}
 
 
@@ -29,12 +28,6 @@ def run(out: Path | None, proposer: Proposer | str = "rules", **settings: Any) -
 
 def asks(server: ChatServer, **asking: Any) -> LlmProposer:
     return llm_proposer(server.url, **asking)
-
-
-def lines(folder: Path) -> list[dict[str, Any]]:
-    """The trials of a run without their seconds."""
-    trials = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()
-    return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
 
 
 def calls(folder: Path) -> tuple[Call, ...]:
@@ -59,10 +52,3 @@ def status(folder: Path) -> Status:
     there = read_status(folder)
     assert there is not None
     return there
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        threading.Event().wait(0.005)

@@ -2,19 +2,15 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
-import threading
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import psutil
 
 import armwright as aw
-from tests.support.command_line import PATIENCE
+from tests.support.command_line import PATIENCE, start, wait_until
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 
@@ -73,16 +69,6 @@ class Bench:
         return Counter(name for _, name in self.evaluated)
 
 
-def wait_until(there: Callable[[], bool]) -> None:
-    """Wait for something that other processes do."""
-    gone = threading.Event()
-    for _ in range(int(PATIENCE / 0.01)):
-        if there():
-            return
-        gone.wait(0.01)
-    raise AssertionError("it did not come")
-
-
 class ShellCluster:
     """`dask scheduler` and `dask worker`, whose working folder holds no evaluator."""
 
@@ -119,12 +105,7 @@ class ShellCluster:
             process.wait()
 
 
-def begin_command(*arguments: str | Path, **how: Any) -> subprocess.Popen[str]:
-    """A command of armwright that heeds Ctrl-C, even where this process ignores it."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "armwright", *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL), **how,
-    )  # fmt: skip
+begin_command = start
 
 
 def descendants(pid: int) -> list[psutil.Process]:

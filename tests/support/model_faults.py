@@ -28,14 +28,19 @@ def both(response: Response) -> Fault:
     return {"openai": response, "anthropic": response}
 
 
+def errors(openai: tuple[Any, ...], anthropic: tuple[Any, ...]) -> Fault:
+    """The same error in the words of both: arguments of openai_error and anthropic_error."""
+    return {"openai": openai_error(*openai), "anthropic": anthropic_error(*anthropic)}
+
+
 def rate_limit(**headers: str) -> Fault:
     """headers: retry_after="1" is Retry-After: 1."""
     sent = {name.replace("_", "-"): value for name, value in headers.items()}
     words = "Rate limit reached for gpt-4o in organization org-1 on tokens per min (TPM): Limit 30000, Used 29500."
-    return {
-        "openai": openai_error(429, words, "tokens", "rate_limit_exceeded", sent),
-        "anthropic": anthropic_error(429, "This request would exceed your rate limit.", "rate_limit_error", sent),
-    }
+    return errors(
+        (429, words, "tokens", "rate_limit_exceeded", sent),
+        (429, "This request would exceed your rate limit.", "rate_limit_error", sent),
+    )
 
 
 def said(text: str | None, finish_reason: str, stop_reason: str, **more: Any) -> Fault:
@@ -53,6 +58,11 @@ def _stream_broken(event: Mapping[str, Any], pace: Any = "whole") -> Response:
     return Response(begun + end, content_type="text/event-stream", pace=pace)
 
 
+def _events(data: str) -> Response:
+    """The beginning of Anthropic's stream."""
+    return Response(f"event: message_start\ndata: {data}\n\n", content_type="text/event-stream")
+
+
 _OVERLOADED = {"type": "error", "error": {"type": "overloaded_error", "message": "Overloaded"}}
 _HTML = "<!DOCTYPE html>\n<html><head><title>{0}</title></head><body><h1>{0}</h1></body></html>"
 _CUT = {
@@ -60,20 +70,21 @@ _CUT = {
     "anthropic": _stream_broken({}, "cut"),
 }
 
+_INVALID = "invalid_request_error"
 FAULTS: Mapping[str, Mapping[str, Fault]] = {
     "rate_limit": {
         "rate limit": rate_limit(),
         "rate limit for a day": rate_limit(retry_after="86400"),
     },
     "server": {
-        "server error": {
-            "openai": openai_error(500, "The server had an error while processing your request.", "server_error"),
-            "anthropic": anthropic_error(500, "Internal server error", "api_error"),
-        },
-        "overloaded": {
-            "openai": openai_error(503, "The engine is currently overloaded, please try again later.", "server_error"),
-            "anthropic": anthropic_error(529, "Overloaded", "overloaded_error"),
-        },
+        "server error": errors(
+            (500, "The server had an error while processing your request.", "server_error"),
+            (500, "Internal server error", "api_error"),
+        ),
+        "overloaded": errors(
+            (503, "The engine is currently overloaded, please try again later.", "server_error"),
+            (529, "Overloaded", "overloaded_error"),
+        ),
         "overloaded later": {
             "openai": openai_error(503, "Service Unavailable", "service_unavailable_error"),
             "anthropic": _stream_broken(_OVERLOADED),
@@ -84,22 +95,16 @@ FAULTS: Mapping[str, Mapping[str, Fault]] = {
         "slow first byte": both(Response(pace="never")),
         "dripping body": both(Response(pace="drip")),
     },
-    "connection": {
-        "cut connection": _CUT,
-        "not a byte": both(Response(pace="gone")),
-    },
+    "connection": {"cut connection": _CUT, "not a byte": both(Response(pace="gone"))},
     "answer": {
         "HTML": both(Response(_HTML.format("Sign in to the network"), content_type="text/html")),
         "broken JSON": {
             "openai": Response(json.dumps(completion("ready", {}))[:-40]),
-            "anthropic": Response('event: message_start\ndata: {"type": "mess\n\n', content_type="text/event-stream"),
+            "anthropic": _events('{"type": "mess'),
         },
         "wrong shape": {
             "openai": Response('{"choices": [{"message": "ready"}]}'),
-            "anthropic": Response(
-                'event: message_start\ndata: {"type": "message_start", "message": "ready"}\n\n',
-                content_type="text/event-stream",
-            ),
+            "anthropic": _events('{"type": "message_start", "message": "ready"}'),
         },
         "JSON for a stream": both(Response('{"status": "ok"}')),
         "empty answer": said("", "stop", "end_turn"),
@@ -110,63 +115,41 @@ FAULTS: Mapping[str, Mapping[str, Fault]] = {
         "content filter": said(None, "content_filter", "refusal"),
     },
     "context": {
-        "context too long": {
-            "openai": openai_error(
-                400,
-                "This model's maximum context length is 8192 tokens. However, your messages resulted in 9999 tokens.",
-                "invalid_request_error",
-                "context_length_exceeded",
-            ),
-            "anthropic": anthropic_error(
-                400, "prompt is too long: 210000 tokens > 200000 maximum", "invalid_request_error"
-            ),
-        },
+        "context too long": errors(
+            (400, "This model's maximum context length is 8192 tokens. However, your messages resulted in 9999 tokens.",
+             _INVALID, "context_length_exceeded"),
+            (400, "prompt is too long: 210000 tokens > 200000 maximum", _INVALID),
+        ),
     },
     "quota": {
-        "quota gone": {
-            "openai": openai_error(
-                429,
-                "You exceeded your current quota, please check your plan and billing details.",
-                "insufficient_quota",
-                "insufficient_quota",
-            ),
-            "anthropic": anthropic_error(
-                400,
-                "Your credit balance is too low to access the Anthropic API. Please go to Plans & Billing.",
-                "invalid_request_error",
-            ),
-        },
+        "quota gone": errors(
+            (429, "You exceeded your current quota, please check your plan and billing details.",
+             "insufficient_quota", "insufficient_quota"),
+            (400, "Your credit balance is too low to access the Anthropic API. Please go to Plans & Billing.",
+             _INVALID),
+        ),
     },
     "key": {
-        "wrong key": {
-            "openai": openai_error(
-                401,
-                "Incorrect API key provided: sk-proj-**********ABCD. You can find your API key at "
-                "https://platform.openai.com/account/api-keys.",
-                "invalid_request_error",
-                "invalid_api_key",
-            ),
-            "anthropic": anthropic_error(401, "invalid x-api-key", "authentication_error"),
-        },
-        "forbidden": {
-            "openai": openai_error(403, "Country, region, or territory not supported", "request_forbidden"),
-            "anthropic": anthropic_error(403, "Your API key may not use this resource.", "permission_error"),
-        },
+        "wrong key": errors(
+            (401, "Incorrect API key provided: sk-proj-**********ABCD. You can find your API key at "
+             "https://platform.openai.com/account/api-keys.", _INVALID, "invalid_api_key"),
+            (401, "invalid x-api-key", "authentication_error"),
+        ),
+        "forbidden": errors(
+            (403, "Country, region, or territory not supported", "request_forbidden"),
+            (403, "Your API key may not use this resource.", "permission_error"),
+        ),
     },
     "unknown_model": {
-        "unknown model": {
-            "openai": openai_error(
-                404, "The model `gpt-5x` does not exist", "invalid_request_error", "model_not_found"
-            ),
-            "anthropic": anthropic_error(404, "model: claude-x", "not_found_error"),
-        },
+        "unknown model": errors(
+            (404, "The model `gpt-5x` does not exist", _INVALID, "model_not_found"),
+            (404, "model: claude-x", "not_found_error"),
+        ),
     },
     "rejected": {
-        "rejected": {
-            "openai": openai_error(
-                400, "Unsupported value: 'temperature'", "invalid_request_error", "unsupported_value"
-            ),
-            "anthropic": anthropic_error(400, "temperature: Extra inputs are not permitted", "invalid_request_error"),
-        },
+        "rejected": errors(
+            (400, "Unsupported value: 'temperature'", _INVALID, "unsupported_value"),
+            (400, "temperature: Extra inputs are not permitted", _INVALID),
+        ),
     },
-}
+}  # fmt: skip

@@ -109,13 +109,14 @@ def limit_gradient(arms: Chains, q: Array) -> Array:
     return np.abs((high - low) ** 2 * (2 * inside - high - low) / (4 * (high - inside) ** 2 * (inside - low) ** 2))
 
 
-def update(arms: Chains, targets: Array, q: Array, h_before: Array) -> tuple[Array, Array]:
-    """(q, H) after one update; targets (T, 3) or (N, T, 3) [m]."""
-    J = jacobian(arms, q)
+def short(vector: Array, longest: float) -> Array:
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.where(length > longest, longest * vector / np.maximum(length, longest), vector)
+
+
+def damped_step(arms: Chains, q: Array, h_before: Array, J: Array, dx: Array) -> tuple[Array, Array]:
+    """(q, H) after a step dx (N, T, R) by the weighted, damped inverse of J (N, T, R, D), and centring."""
     Jt = np.swapaxes(J, -1, -2)
-    e = targets - tip(arms, q)
-    length = np.linalg.norm(e, axis=-1, keepdims=True)
-    dx = np.where(length > MAX_STEP, MAX_STEP * e / np.maximum(length, MAX_STEP), e)
     m = np.sqrt(np.maximum(0.0, np.linalg.det(J @ Jt)))
     k = np.where(m < MANIPULABILITY_LIMIT, DAMPING * (1 - m / MANIPULABILITY_LIMIT) ** 2, 0.0)
     h = limit_gradient(arms, q)
@@ -123,10 +124,15 @@ def update(arms: Chains, targets: Array, q: Array, h_before: Array) -> tuple[Arr
     middle, half_range = (arms.upper + arms.lower) / 2, (arms.upper - arms.lower) / 2
     y = CENTRING_GAIN * w * np.sign(middle - q) * ((middle - q) / half_range) ** 2
     W = w[..., :, None] * np.eye(q.shape[-1])
-    J_sharp = W @ Jt @ np.linalg.inv(J @ W @ Jt + k[..., None, None] * np.eye(3))
+    J_sharp = W @ Jt @ np.linalg.inv(J @ W @ Jt + k[..., None, None] * np.eye(dx.shape[-1]))
     null = np.eye(q.shape[-1]) - J_sharp @ J
     dq = np.einsum("...da,...a->...d", J_sharp, dx) + np.einsum("...dc,...c->...d", null, y)
     return np.clip(q + dq, arms.lower, arms.upper), h
+
+
+def update(arms: Chains, targets: Array, q: Array, h_before: Array) -> tuple[Array, Array]:
+    """(q, H) after one update; targets (T, 3) or (N, T, 3) [m]."""
+    return damped_step(arms, q, h_before, jacobian(arms, q), short(targets - tip(arms, q), MAX_STEP))
 
 
 def solve(arms: Chains, targets: Array, updates: int = UPDATES, start: Array | None = None) -> Solution:

@@ -52,27 +52,18 @@ def update(
     arms: Chains, targets: Array, target_arrays: TargetArrays, axis: Array, side: Array, q: Array, h_before: Array
 ) -> tuple[Array, Array]:
     """(q, H) after one update, target by target with as many rows as it has."""
-    after, gradient = np.empty_like(q), reference.limit_gradient(arms, q)
-    w = np.where(gradient >= h_before, 1 / (1 + gradient), 1.0)
-    middle, half_range = (arms.upper + arms.lower) / 2, (arms.upper - arms.lower) / 2
-    y = reference.CENTRING_GAIN * w * np.sign(middle - q) * ((middle - q) / half_range) ** 2
-    frame, e = tool(arms, q, axis, side), targets - reference.tip(arms, q)
+    after, gradient = np.empty_like(q), np.empty_like(q)
+    frame, e = tool(arms, q, axis, side), reference.short(targets - reference.tip(arms, q), reference.MAX_STEP)
     turn = np.einsum("...ba,...b->...a", frame, turn_left(frame, target_arrays))  # in the tool's own frame
+    turn = reference.short(turn, MAX_TURN)
     linear = reference.jacobian(arms, q)
     angular = np.einsum("...ba,...bd->...ad", frame, angular_jacobian(arms, q))
     for t, rows in enumerate(target_arrays.n_angular):
-        J = np.concatenate([linear[:, t], angular[:, t, :rows]], axis=-2)
-        dx = np.concatenate([_short(e[:, t], reference.MAX_STEP), _short(turn[:, t], MAX_TURN)[:, :rows]], -1)
-        Jt = np.swapaxes(J, -1, -2)
-        m = np.sqrt(np.maximum(0.0, np.linalg.det(J @ Jt)))
-        limit = reference.MANIPULABILITY_LIMIT
-        k = np.where(m < limit, reference.DAMPING * (1 - m / limit) ** 2, 0.0)
-        W = w[:, t, :, None] * np.eye(q.shape[-1])
-        J_sharp = W @ Jt @ np.linalg.inv(J @ W @ Jt + k[..., None, None] * np.eye(3 + rows))
-        null = np.eye(q.shape[-1]) - J_sharp @ J
-        after[:, t] = q[:, t] + np.einsum("...da,...a->...d", J_sharp, dx)
-        after[:, t] += np.einsum("...dc,...c->...d", null, y[:, t])
-    return np.clip(after, arms.lower, arms.upper), gradient
+        at = slice(t, t + 1)
+        J = np.concatenate([linear[:, at], angular[:, at, :rows]], axis=-2)
+        dx = np.concatenate([e[:, at], turn[:, at, :rows]], axis=-1)
+        after[:, at], gradient[:, at] = reference.damped_step(arms, q[:, at], h_before[:, at], J, dx)
+    return after, gradient
 
 
 def solve(
@@ -97,8 +88,3 @@ def errors(
     """(N, T) distance [m] and angle [rad] from the targets."""
     angle = np.linalg.norm(turn_left(tool(arms, q, axis, side), target_arrays), axis=-1)
     return np.linalg.norm(targets - reference.tip(arms, q), axis=-1), angle
-
-
-def _short(vector: Array, longest: float) -> Array:
-    length = np.linalg.norm(vector, axis=-1, keepdims=True)
-    return np.where(length > longest, longest * vector / np.maximum(length, longest), vector)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.command_line import armwright
 from tests.torture.short import study
 
 
@@ -11,7 +12,7 @@ from tests.torture.short import study
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The short study, undisturbed."""
     folder = tmp_path_factory.mktemp("undisturbed") / "whole"
-    done = study(folder)
+    done = armwright(*study(folder))
     assert done.returncode == 0, done.stderr
     return folder
 

@@ -11,8 +11,8 @@ import pytest
 
 from armwright.exceptions import RunFolderError
 from armwright.llm.transcript import Call, Transcript
-from tests.torture.lives import is_beginning, is_same_run
-from tests.torture.short import armwright, command, one_line, study
+from tests.support import command_line
+from tests.torture.short import armwright, command, is_beginning, is_resumed, is_same_run, one_line, study
 
 Tell = Callable[[str, object], None]
 
@@ -30,33 +30,30 @@ def test_file_size_limit_keeps_finished_trials(tmp_path: Path, whole: Path, kill
     """At a random size, between nothing and more than is needed."""
     chance = random.Random("limits")
     ended: Counter[int] = Counter()
-    rounds = max(3, kills // 5)
+    rounds = max(2, kills // 5)
     for n in range(rounds):
         folder = tmp_path / f"run{n}"
-        done = study(folder, preexec_fn=limit(chance.randint(0, largest(whole) * 11 // 10)))
+        done = armwright(*study(folder), preexec_fn=limit(chance.randint(0, largest(whole) * 11 // 10)))
         ended[done.returncode] += 1
         if done.returncode:
             assert any(words in one_line(done) for words in ("File too large", "No space left on device"))
-            is_beginning(folder, whole)
-            again = study(folder)
-            assert again.returncode == 0, again.stderr
+            is_resumed(folder, whole)
         is_same_run(folder, whole)
     record_property("no file may grow", f"{rounds} sizes, {ended[1]} of them too small; each resumed")
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("thorough")
 def test_no_space_for_page_and_figures(tmp_path: Path, record_property: Tell, kills: int) -> None:
     whole = tmp_path / "whole"
-    study(whole, "--figures")
+    armwright(*study(whole, "--figures"))
     chance = random.Random("figures")
-    rounds = max(1, kills // 40)
+    rounds = kills // 40
     for n in range(rounds):
         folder = tmp_path / f"run{n}"
-        done = study(folder, "--figures", preexec_fn=limit(chance.randint(30_000, largest(whole) - 1)))
+        size = chance.randint(30_000, largest(whole) - 1)
+        done = armwright(*study(folder, "--figures"), preexec_fn=limit(size))
         assert "File too large; the trials are safe" in one_line(done)
-        assert study(folder, "--figures").returncode == 0
-        is_same_run(folder, whole)
+        is_resumed(folder, whole, "--figures")
     record_property("no room for page and figures", f"{rounds} sizes; each made again")
 
 
@@ -82,25 +79,19 @@ def test_full_disk_keeps_finished_trials(disk: Path, whole: Path, kills: int, re
         folder, other = disk / f"run{n}", disk / "other"
         subprocess.run(["mount", "-o", "remount,size=64k", disk], check=True)
         other.write_bytes(bytes(chance.randint(8, 15) * 4096))  # a disk counts in pages
-        assert "No space left on device" in one_line(study(folder))
-        if folder.exists():
-            is_beginning(folder, whole)
+        assert "No space left on device" in one_line(armwright(*study(folder)))
         subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
-        again = study(folder)
-        assert again.returncode == 0, again.stderr
-        is_same_run(folder, whole)
+        is_resumed(folder, whole)
         subprocess.run(["rm", "-r", folder, other], check=True)
     record_property("a full disk", f"{rounds} times; each resumed")
 
 
 def test_no_space_for_a_search(tmp_path: Path) -> None:
     asked = ("design", "target-1", "--evaluations", "5000", "--no-figures", "--out")
-    assert armwright(*asked, tmp_path / "whole").returncode == 0
-    for n in (1000, 20_000):
-        folder = tmp_path / f"run{n}"
-        assert "File too large" in one_line(armwright(*asked, folder, preexec_fn=limit(n)))
-        assert armwright(*asked, folder).returncode == 0
-        assert (folder / "trials.jsonl").read_bytes() == (tmp_path / "whole" / "trials.jsonl").read_bytes()
+    assert "File too large" in one_line(armwright(*asked, tmp_path / "run", preexec_fn=limit(20_000)))
+    for name in ("whole", "run"):
+        assert command_line.armwright(*asked, tmp_path / name).returncode == 0
+    assert (tmp_path / "run" / "trials.jsonl").read_bytes() == (tmp_path / "whole" / "trials.jsonl").read_bytes()
 
 
 def test_no_space_for_an_answer(tmp_path: Path) -> None:
@@ -119,20 +110,17 @@ def test_no_space_for_an_answer(tmp_path: Path) -> None:
     assert Transcript(tmp_path / "transcripts.jsonl").calls == (calls[0], calls[2])
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("thorough")
 def test_no_space_for_the_kernels(tmp_path: Path, whole: Path) -> None:
     cache = {"WARP_CACHE_PATH": str(tmp_path / "cache")}
-    words = one_line(study(tmp_path / "run", environment=cache, preexec_fn=limit(50_000)))
+    words = one_line(armwright(*study(tmp_path / "run"), environment=cache, preexec_fn=limit(50_000)))
     assert "cannot write compiled kernels: File too large" in words
-    again = study(tmp_path / "run", environment=cache)
-    assert again.returncode == 0, again.stderr
-    is_same_run(tmp_path / "run", whole)
+    is_resumed(tmp_path / "run", whole)
 
 
 def test_output_streams_on_a_full_disk(tmp_path: Path, whole: Path) -> None:
     """stdout and stderr on a full disk."""
     with open("/dev/full", "w", encoding="utf-8") as full:
-        code = subprocess.run(command(tmp_path / "run", "--no-figures"), stdout=full, stderr=full).returncode
+        code = subprocess.run(command(study(tmp_path / "run")), stdout=full, stderr=full).returncode
     assert code == 1
     is_beginning(tmp_path / "run", whole)

@@ -2,70 +2,23 @@
 
 import csv
 import json
-import subprocess
-import sys
 import zlib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
-from armwright.runs.folder import is_held
+from tests.support import command_line
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
 from tests.support.wire_formats import model_options
-from tests.torture.lives import (
-    Scenario,
-    files,
-    is_beginning,
-    is_same_run,
-    kill_often,
-    n_lines,
-    summary,
-    trials,
-)
+from tests.torture.lives import Scenario, kill_often
+from tests.torture.short import files, is_beginning, is_same_run, n_lines, summary, trials
 
-pytestmark = pytest.mark.slow
-Tell = Callable[[str, object], None]
-
-# Of all kills; the kernels' cache takes long to fill, so it is killed less often.
-SHARES = {
-    "optimize, rules": 0.2,
-    "optimize, NSGA-II": 0.15,
-    "optimize, a larger --n-total": 0.05,
-    "optimize, a local worker": 0.05,
-    "optimize, a model": 0.125,
-    "optimize, a model while it goes on": 0.125,
-    "front": 0.15,
-    "experiment": 0.125,
-    "the first start, kernels compiled": 0.025,
-    "optimize, Ctrl-C, Ctrl-C twice, SIGTERM": 0.1,  # beside the kills
-    "front, Ctrl-C, Ctrl-C twice, SIGTERM": 0.05,
-}
-
-
-@pytest.fixture
-def torture(
-    request: pytest.FixtureRequest, tmp_path: Path, record_property: Tell
-) -> Callable[[str, Scenario], Counter[str]]:
-    """Kills a scenario as often as is its share, and tells of it."""
-
-    def kill(name: str, scenario: Scenario) -> Counter[str]:
-        kills = max(1, round(SHARES[name] * request.config.getoption("--kills")))
-        fell = kill_often(scenario, tmp_path, kills, name)
-        parts = ", ".join(f"{fell[part]} in its {part}" for part in ("start", "search", "results") if fell[part])
-        worker = f", {fell['worker']} of a worker" if fell["worker"] else ""
-        record_property(
-            name, f"{fell.total() - fell['ended']} kills ({parts}{worker}), {fell['ended']} runs to their end"
-        )
-        return fell
-
-    return kill
+Maker = Callable[[Path, ChatServer], Scenario]
 
 
 def study(n_total: int, *settings: str) -> Scenario:
@@ -73,43 +26,26 @@ def study(n_total: int, *settings: str) -> Scenario:
     method = ["--n-init", "5", "--n-step", "4", "--n-total", str(n_total), "--seed", "3", *settings]
     return Scenario(
         arguments=lambda folder: ["optimize", "target-1", *method, "--out", str(folder)],
-        progress=lambda folder: n_lines(folder / "trials.jsonl") / (5 + n_total),
         check=is_beginning,
         same=is_same_run,
     )
 
 
-def test_killed_study_with_figures(torture: Callable[[str, Scenario], Counter[str]]) -> None:
-    torture("optimize, rules", study(60, "--proposer", "rules"))
+def done_here(arguments: Sequence[str]) -> None:
+    done = command_line.armwright(*arguments)
+    assert done.returncode == 0, done.stderr
 
 
-def test_killed_study_with_sampler_notes(torture: Callable[[str, Scenario], Counter[str]]) -> None:
-    settings = ("--proposer", "none", "--sampler", "nsga2", "--no-figures")
-    torture("optimize, NSGA-II", study(60, *settings))
-
-
-def test_killed_extension_of_a_finished_study(torture: Callable[[str, Scenario], Counter[str]], tmp_path: Path) -> None:
+def extension(_: Path, __: ChatServer) -> Scenario:
     """The command extends a finished run of 20 trials that it finds, or first makes it."""
     longer = study(50, "--proposer", "rules", "--no-figures")
 
-    def begin(folder: Path) -> list[str]:
+    def begin(folder: Path) -> Sequence[str]:
         if not folder.exists():
-            arguments = study(20, "--proposer", "rules", "--no-figures").arguments(folder)
-            subprocess.run([sys.executable, "-m", "armwright", *arguments], check=True, capture_output=True)
-        return list(longer.arguments(folder))
+            done_here(study(20, "--proposer", "rules", "--no-figures").arguments(folder))
+        return longer.arguments(folder)
 
-    torture(
-        "optimize, a larger --n-total",
-        Scenario(
-            begin, lambda folder: max(0.0, (n_lines(folder / "trials.jsonl") - 25) / 30), is_beginning, is_same_run
-        ),
-    )
-
-
-def test_killed_study_with_a_local_worker(torture: Callable[[str, Scenario], Counter[str]]) -> None:
-    """Killed: its process, its worker, or all at once."""
-    scenario = study(40, "--proposer", "rules", "--workers", "1", "--no-figures")
-    torture("optimize, a local worker", replace(scenario, victims=("process", "worker", "all")))
+    return replace(longer, arguments=begin)
 
 
 def thoughtful(request: Request) -> Answer:
@@ -131,35 +67,23 @@ def paid_once(folder: Path) -> None:
     assert used.keys() <= {proposal for proposal, step in paid if step == "parameters"}
 
 
-def test_killed_study_with_a_model(
-    torture: Callable[[str, Scenario], Counter[str]], chat_server: ChatServer, record_property: Tell
-) -> None:
-    chat_server.answer = thoughtful
-    asked = study(40, "--model", "m", *model_options(base_url=chat_server.url), "--no-figures")
+def model(_: Path, server: ChatServer) -> Scenario:
+    server.answer = thoughtful
 
     def same(folder: Path, whole: Path) -> None:
         paid_once(folder)
         assert trials(folder) == trials(whole)
-        n_calls = [
-            len((place / "transcripts.jsonl").read_text(encoding="utf-8").splitlines()) for place in (folder, whole)
-        ]
         # The model is tried once a session; an answer on its way when the kill came is asked for again.
-        assert n_calls[0] >= n_calls[1]
-        one, other = (
-            {key: value for key, value in summary(place).items() if key != "proposer"} for place in (folder, whole)
-        )
-        assert one == other
+        assert n_lines(folder / "transcripts.jsonl") >= n_lines(whole / "transcripts.jsonl")
+        one, other = summary(folder), summary(whole)
+        assert {**one, "proposer": None} == {**other, "proposer": None}
 
-    torture("optimize, a model", Scenario(asked.arguments, asked.progress, is_beginning, same))
+    return replace(study(40, "--model", "m", *model_options(base_url=server.url), "--no-figures"), same=same)
 
 
-def test_killed_study_with_model_calls_in_flight(
-    torture: Callable[[str, Scenario], Counter[str]], chat_server: ChatServer, tmp_path: Path
-) -> None:
+def model_in_flight(_: Path, server: ChatServer) -> Scenario:
     """What it comes to depends on when answers come, so its oracle is its own record, played again."""
-    chat_server.answer = thoughtful
-    settings = ("--model", "m", *model_options(base_url=chat_server.url, in_flight=3), "--no-figures")
-    asked = study(40, *settings)
+    server.answer = thoughtful
 
     def numbered(folder: Path, whole: Path) -> None:
         assert [trial["number"] for trial in trials(folder)] == list(range(len(trials(folder))))
@@ -168,93 +92,55 @@ def test_killed_study_with_model_calls_in_flight(
         paid_once(folder)
         assert [trial["number"] for trial in trials(folder)] == list(range(45))
         assert sum(trial["source"] == "llm" for trial in trials(folder)) == 10
-        n_requests = len(chat_server.requests)
+        n_requests = len(server.requests)
         again = folder.with_name(f"{folder.name}-again")
-        replay = study(
-            40, "--proposer", f"replay:{folder}", *model_options(replay_strict=True), "--no-figures"
-        ).arguments(again)
-        subprocess.run([sys.executable, "-m", "armwright", *replay], check=True, capture_output=True)
+        replay = ("--proposer", f"replay:{folder}", *model_options(replay_strict=True), "--no-figures")
+        done_here(study(40, *replay).arguments(again))
         assert trials(again) == trials(folder)
-        assert len(chat_server.requests) == n_requests
+        assert len(server.requests) == n_requests
 
-    torture("optimize, a model while it goes on", Scenario(asked.arguments, asked.progress, numbered, same))
-
-
-# Its state is written every 5 s; here more often, so that short searches go on, too.
-OFTEN = (
-    "import armwright.study.front.direct_search as f; f.SAVE_SECONDS = 0.1; from armwright.cli.app import main; main()"
-)
-BUDGET = 30_000
+    asked = study(40, "--model", "m", *model_options(base_url=server.url, in_flight=3), "--no-figures")
+    return replace(asked, check=numbered, same=same)
 
 
-def evaluations(folder: Path) -> float:
-    try:
-        there = (folder / "search.npz").stat()
-    except FileNotFoundError:
-        return 0.0
-    return _evaluations(folder / "search.npz", there.st_mtime_ns)
+def search(_: Path, __: ChatServer) -> Scenario:
+    """Its state is written every 5 s; here more often, so that short searches go on, too."""
+    often = "import armwright.study.front.direct_search as f; f.SAVE_SECONDS = 0.1"
 
+    def is_front(folder: Path, whole: Path) -> None:
+        assert trials(folder) in ([], trials(whole))
 
-@cache
-def _evaluations(state: Path, _mtime: int) -> float:
-    with np.load(state) as content:
-        return float(content["evaluations"]) / BUDGET
+    def same(folder: Path, whole: Path) -> None:
+        for name in ("trials.jsonl", "front.csv", "trials.csv"):
+            assert (folder / name).read_bytes() == (whole / name).read_bytes()
+        assert files(folder) == files(whole)
+        assert summary(folder) == summary(whole)
 
-
-def is_front(folder: Path, whole: Path) -> None:
-    """Its trials are the front of the whole search, or none yet."""
-    assert trials(folder) in ([], trials(whole))
-
-
-def is_same_front(folder: Path, whole: Path) -> None:
-    assert (folder / "trials.jsonl").read_bytes() == (whole / "trials.jsonl").read_bytes()
-    assert files(folder) == files(whole)
-    for name in ("front.csv", "trials.csv"):
-        assert (folder / name).read_bytes() == (whole / name).read_bytes()
-    assert summary(folder) == summary(whole)
-
-
-def searching(folder: Path) -> list[str]:
-    settings = ["--evaluations", str(BUDGET), "--no-stall", "--seed", "3", "--no-figures"]
-    return ["design", "target-1", *settings, "--out", str(folder)]
-
-
-SEARCH = Scenario(
-    searching, evaluations, is_front, is_same_front,
-    program=("-c", OFTEN), is_begun=lambda command: is_held(command.folder),
-)  # fmt: skip
-
-
-def test_killed_front_search(torture: Callable[[str, Scenario], Counter[str]]) -> None:
-    torture("front", SEARCH)
+    settings = ["--evaluations", "30000", "--no-stall", "--seed", "3", "--no-figures"]
+    return Scenario(
+        lambda folder: ["design", "target-1", *settings, "--out", str(folder)], is_front, same,
+        program=("-c", f"{often}; from armwright.cli.app import main; main()"),
+    )  # fmt: skip
 
 
 EXPERIMENT: dict[str, Any] = {
-    "name": "small",
-    "tasks": ["target-1"],
-    "seeds": 2,
-    "n_init": 4,
-    "n_total": 30,
+    "name": "small", "tasks": ["target-1"], "seeds": 2, "n_init": 4, "n_total": 30,
     "methods": {
         "bbo": {"label": "BBO", "proposer": "none"},
         "rules": {"label": "BBO/rules", "proposer": "rules", "n_step": 3},
     },
-}
+}  # fmt: skip
 
 
-def table(folder: Path) -> list[dict[str, str]]:
-    rows = csv.DictReader((folder / "table.csv").read_text(encoding="utf-8").splitlines())
-    return [{name: value for name, value in row.items() if "seconds" not in name} for row in rows]
-
-
-def test_killed_experiment(torture: Callable[[str, Scenario], Counter[str]], tmp_path: Path) -> None:
+def experiment(place: Path, _: ChatServer) -> Scenario:
     """Killed: its process, one of its workers, or all of them at once."""
-    file = tmp_path / "small.yaml"
+    file = place / "small.yaml"
     file.write_text(yaml.safe_dump(EXPERIMENT), encoding="utf-8")
     cells = [Path("runs") / method / "target-1" / f"seed{seed}" for method in ("bbo", "rules") for seed in (0, 1)]
 
-    def progress(folder: Path) -> float:
-        return sum(n_lines(folder / cell / "trials.jsonl") for cell in cells) / (34 * len(cells))
+    def table(folder: Path) -> list[dict[str, str]]:
+        rows = csv.DictReader((folder / "table.csv").read_text(encoding="utf-8").splitlines())
+        return [{name: value for name, value in row.items() if "seconds" not in name} for row in rows]
 
     def check(folder: Path, whole: Path) -> None:
         for cell in cells:
@@ -266,35 +152,54 @@ def test_killed_experiment(torture: Callable[[str, Scenario], Counter[str]], tmp
         assert files(folder) == files(whole)
         assert table(folder) == table(whole)
 
-    victims = ("process", "worker", "all")
-    torture(
-        "experiment",
-        Scenario(
-            lambda folder: ["experiment", str(file), "--workers", "2", "--no-figures", "--out", str(folder)],
-            progress, check, same, victims=victims,
-        ),
+    return Scenario(
+        lambda folder: ["experiment", str(file), "--workers", "2", "--no-figures", "--out", str(folder)],
+        check, same, victims=("process", "worker", "all"),
     )  # fmt: skip
 
 
-@pytest.mark.usefixtures("thorough")
-def test_killed_first_start(torture: Callable[[str, Scenario], Counter[str]], monkeypatch: pytest.MonkeyPatch) -> None:
-    """The kernels are compiled by the first command; each folder here has a cache of its own, which is empty."""
+def first_start(_: Path, __: ChatServer) -> Scenario:
+    """The first command compiles the kernels; each folder here has a cache of its own, which is empty."""
     short = study(3, "--proposer", "none", "--no-figures")
-
-    def arguments(folder: Path) -> list[str]:
-        monkeypatch.setenv("WARP_CACHE_PATH", str(folder.with_name(f"{folder.name}-cache")))
-        return list(short.arguments(folder))
-
-    torture("the first start, kernels compiled", Scenario(arguments, short.progress, is_beginning, is_same_run))
+    own = "import os, sys; os.environ['WARP_CACHE_PATH'] = sys.argv[-1] + '-cache'"
+    return replace(short, program=("-c", f"{own}; from armwright.cli.app import main; main()"))
 
 
-ENDED = ("INT", "INT INT", "TERM")
+def plain(*settings: str, **changes: Any) -> Maker:
+    return lambda _, __: replace(study(60, *settings), **changes)
 
 
-def test_interrupted_study(torture: Callable[[str, Scenario], Counter[str]]) -> None:
-    scenario = study(60, "--proposer", "rules", "--no-figures")
-    torture("optimize, Ctrl-C, Ctrl-C twice, SIGTERM", replace(scenario, victims=ENDED))
+def interrupted(make: Maker) -> Maker:
+    return lambda place, server: replace(make(place, server), victims=("INT", "INT INT", "TERM"))
 
 
-def test_interrupted_front_search(torture: Callable[[str, Scenario], Counter[str]]) -> None:
-    torture("front, Ctrl-C, Ctrl-C twice, SIGTERM", replace(SEARCH, victims=ENDED))
+RULES = plain("--proposer", "rules", "--no-figures")
+# Their share of all kills; those that would get none in the short form are left to `make torture`.
+SCENARIOS: dict[str, tuple[float, Maker]] = {
+    "optimize, rules": (0.2, plain("--proposer", "rules")),
+    "optimize, NSGA-II": (0.15, plain("--proposer", "none", "--sampler", "nsga2", "--no-figures")),
+    "optimize, a larger --n-total": (0.05, extension),
+    "optimize, a local worker": (
+        0.05, plain("--proposer", "rules", "--workers", "1", "--no-figures", victims=("process", "worker", "all"))
+    ),
+    "optimize, a model": (0.125, model),
+    "optimize, a model while it goes on": (0.125, model_in_flight),
+    "front": (0.15, search),
+    "experiment": (0.125, experiment),
+    "the first start, kernels compiled": (0.025, first_start),
+    "optimize, Ctrl-C, Ctrl-C twice, SIGTERM": (0.1, interrupted(RULES)),  # beside the kills
+    "front, Ctrl-C, Ctrl-C twice, SIGTERM": (0.05, interrupted(search)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_killed_command_resumes_to_the_same_result(
+    name: str, tmp_path: Path, chat_server: ChatServer, kills: int, record_property: Callable[[str, object], None]
+) -> None:
+    share, make = SCENARIOS[name]
+    own = round(share * kills)
+    if own == 0:
+        pytest.skip("killed in `make torture` alone")
+    fell = kill_often(make(tmp_path, chat_server), tmp_path, own, name)
+    who = ", ".join(f"{fell[victim]} of {victim}" for victim in fell if victim != "ended")
+    record_property(name, f"{own} kills ({who}), {fell['ended']} runs to their end")

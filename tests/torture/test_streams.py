@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.torture.lives import is_beginning, is_same_run, n_lines
-from tests.torture.short import armwright, command, one_line, run, study
+from tests.support import command_line
+from tests.torture.short import armwright, command, is_resumed, is_same_run, n_lines, run, study
 
 
 def test_closed_output_pipe_ends_the_command(tmp_path: Path, whole: Path) -> None:
     """As with `| head -1`."""
-    folder = tmp_path / "run"
     process = subprocess.Popen(
-        command(folder, "--no-figures"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8"
-    )
+        command(study(tmp_path / "run")),
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, encoding="utf-8",
+    )  # fmt: skip
     with process:
         assert process.stdout is not None
         assert process.stderr is not None
@@ -27,39 +27,30 @@ def test_closed_output_pipe_ends_the_command(tmp_path: Path, whole: Path) -> Non
         said = process.stderr.read()
     assert process.returncode == 1
     assert said == "armwright: output pipe closed; rerun the same command to resume an unfinished run\n"
-    is_beginning(folder, whole)
-    assert study(folder).returncode == 0
-    is_same_run(folder, whole)
+    is_resumed(tmp_path / "run", whole)
 
 
 @pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
-def test_closed_standard_streams(tmp_path: Path, whole: Path, closed: str) -> None:
+def test_closed_standard_streams_and_no_terminal(tmp_path: Path, whole: Path, closed: str) -> None:
     """Nor does any file of the run take their numbers."""
-    folder = tmp_path / "run"
-    done = run(["sh", "-c", f'exec "$@" {closed}', "sh", *command(folder, "--no-figures")], start_new_session=True)
+    shell = ["sh", "-c", f'exec "$@" {closed}', "sh", *command(study(tmp_path / "run"))]
+    nothing = {"TERM": None, "COLUMNS": "0", "LINES": None}
+    done = run(shell, environment=nothing, start_new_session=True)
     assert (done.returncode, done.stderr) == (0, "")
-    is_same_run(folder, whole)
+    is_same_run(tmp_path / "run", whole)
 
 
 def test_error_without_a_stderr(tmp_path: Path) -> None:
     (tmp_path / "run").write_text("", encoding="utf-8")
-    done = run(["sh", "-c", 'exec "$@" 2>&-', "sh", *command(tmp_path / "run")])
+    done = run(["sh", "-c", 'exec "$@" 2>&-', "sh", *command(study(tmp_path / "run"))])
     assert (done.returncode, done.stderr) == (1, "")
-
-
-@pytest.mark.parametrize("terminal", [None, "no-such-terminal"])
-def test_command_without_a_terminal(tmp_path: Path, whole: Path, terminal: str | None) -> None:
-    folder = tmp_path / "run"
-    done = study(folder, environment={"TERM": terminal, "COLUMNS": "0", "LINES": None}, start_new_session=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    is_same_run(folder, whole)
 
 
 def test_terminal_that_disappears(tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "run"
     master, slave = pty.openpty()
     process = subprocess.Popen(
-        command(folder, "--no-figures"), stdin=slave, stdout=slave, stderr=subprocess.PIPE, start_new_session=True
+        command(study(folder)), stdin=slave, stdout=slave, stderr=subprocess.PIPE, start_new_session=True
     )
     os.close(slave)
     while n_lines(folder / "trials.jsonl") < 3:
@@ -68,14 +59,7 @@ def test_terminal_that_disappears(tmp_path: Path, whole: Path) -> None:
     _, said = process.communicate()
     assert process.returncode in (0, 1)  # it ends before it says anything more, perhaps
     assert b"Traceback" not in said
-    is_beginning(folder, whole)
-    assert study(folder).returncode == 0
-    is_same_run(folder, whole)
-
-
-def test_error_is_one_line_on_any_stream(tmp_path: Path) -> None:
-    (tmp_path / "run").write_text("", encoding="utf-8")
-    assert "cannot write" in one_line(armwright("optimize", "target-1", "--out", tmp_path / "run"))
+    is_resumed(folder, whole)
 
 
 CHATTY = """
@@ -119,24 +103,17 @@ def redirects(arm, task):
 @pytest.mark.parametrize("function", ["chats", "closes", "redirects"])
 def test_output_is_ours_alone_whatever_an_evaluator_does(in_folder: Path, function: str) -> None:
     Path("chatty.py").write_text(CHATTY, encoding="utf-8")
-    study = (
+    done = armwright(
         "optimize", "target-1", "--evaluator", f"chatty.py:{function}", "--proposer", "none", "--no-figures",
-        "--n-init", "2", "--n-total", "8", "--out", "run",
+        "--n-init", "2", "--n-total", "8", "--out", "run", "--json",
     )  # fmt: skip
-    done = armwright(*study, "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["n_trials"] == 10
-    assert all(word in done.stderr for word in ("proposer: none", "import"))
-    if function == "chats":
-        assert all(word in done.stderr for word in ("print", "write", "printf", "child", "until the end"))
-    shown = armwright(*study)
-    assert shown.returncode == 0, shown.stderr
-    assert "run/ is finished" in shown.stdout
-    assert not any(word in shown.stdout for word in ("import", "printf", "child"))
+    said = ("print", "write", "printf", "child", "until the end") if function == "chats" else ()
+    assert all(word in done.stderr for word in ("proposer: none", "import", *said))
 
 
-@pytest.mark.parametrize("form", ["--json", "--csv"])
-def test_other_code_in_any_command_prints_to_stderr(tmp_path: Path, form: str) -> None:
+def test_other_code_in_any_command_prints_to_stderr(tmp_path: Path) -> None:
     noisy = (
         "import ctypes, os, sys\n"
         "import armwright.experiments.run_list as it\n"
@@ -148,30 +125,25 @@ def test_other_code_in_any_command_prints_to_stderr(tmp_path: Path, form: str) -
         "sys.argv = ['armwright', 'runs', *sys.argv[1:]]\n"
         "main()\n"
     )
-    done = run([sys.executable, "-c", noisy, str(tmp_path), form])
-    assert (done.returncode, done.stdout) == (0, "[]\n" if form == "--json" else "")
+    done = run([sys.executable, "-c", noisy, str(tmp_path), "--json"])
+    assert (done.returncode, done.stdout) == (0, "[]\n")
     assert sorted(done.stderr.split()) == ["child", "print", "puts"]
 
 
-def test_help_is_printed_to_stdout() -> None:
-    for arguments in (["--help"], ["runs", "--help"], ["--version"]):
-        done = armwright(*arguments)
-        assert (done.returncode, done.stderr) == (0, "")
-        assert done.stdout
+@pytest.mark.parametrize("arguments", [["--help"], ["runs", "--help"], ["--version"]])
+def test_help_is_printed_to_stdout(arguments: list[str]) -> None:
+    done = command_line.armwright(*arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout
 
 
-@pytest.mark.parametrize("arguments", [["tasks", "--json"], ["actuators", "--csv"], ["prompt", "--variables"]])
-def test_closed_pipe_is_one_line(in_folder: Path, arguments: list[str]) -> None:
+def test_closed_pipe_is_one_line(in_folder: Path) -> None:
+    """Of a command that prints a document at its end."""
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "wb") as pipe:
         process = subprocess.run(
-            [sys.executable, "-m", "armwright", *arguments],
-            stdout=pipe,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-            encoding="utf-8",
+            command(["tasks", "--json"]), stdout=pipe, stderr=subprocess.PIPE, text=True, encoding="utf-8"
         )
     assert process.returncode == 1
     assert process.stderr == "armwright: output pipe closed; rerun the same command to resume an unfinished run\n"
