@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from armwright.exceptions import DesignError, ProposalError
 from armwright.problem.objective import Objective
@@ -15,28 +16,31 @@ from armwright.seeding import PROPOSING, derived_seed
 
 @dataclass(frozen=True)
 class ProposalSlot:
-    """A trial reserved for the proposer: its proposal, or the kind of fault that left the trial without one.
+    """A trial reserved for the proposer: its proposal, or the kind of fault that left the trial without one."""
 
-    Attributes:
-        asked: number of the trial that the proposal was requested for.
-        feedback: number of finished trials that the proposer knew.
-        proposal: the design, if there is one.
-        fault: kind of the fault, if there is none.
-        note: message for the user.
-        screened: the proposal, if it is not evaluated because the surrogate expects too little of it.
-    """
-
-    asked: int
-    feedback: int
+    asked: int  # trial that the proposal was requested for
+    feedback: int  # finished trials that the proposer knew
     proposal: Proposal | None = None
     fault: str | None = None
-    note: str = ""
-    screened: ScreenedOut | None = None
+    note: str = ""  # message for the user
+    screened: ScreenedOut | None = None  # the proposal, if the surrogate expects too little of it to evaluate it
 
     @property
     def fault_message(self) -> str | None:
         """Reason for a missing design: empty if there is a design, None if the reason was reported before."""
         return "" if self.proposal is not None or self.screened is not None else self.note or None
+
+    def fields(self, number: int) -> dict[str, Any]:
+        """Return the fields of trial `number`, which takes the slot."""
+        proposal = self.proposal
+        return {
+            **({} if proposal is None else {name: getattr(proposal, name) for name in ("reason", "expected")}),
+            "proposal": None if proposal is None else proposal.id,
+            "fault": self.fault,
+            "screened": self.screened,
+            "asked": None if self.asked == number else self.asked,
+            "feedback": None if self.feedback == number else self.feedback,
+        }
 
     def screened_out(self, source: str, rejection: Rejection, objectives: Sequence[Objective]) -> "ProposalSlot":
         """Return the slot without its proposal, which is not evaluated."""
