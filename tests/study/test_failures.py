@@ -102,9 +102,7 @@ def test_pages_figures_and_prompts_show_failures(run: Path) -> None:
 
 @pytest.mark.slow
 def test_exported_study_has_failed_trials(run: Path) -> None:
-    exported = export_study(run)
-    (study,) = optuna.get_all_study_summaries(f"sqlite:///{exported.database}")
-    trials = optuna.load_study(study_name=study.study_name, storage=f"sqlite:///{exported.database}").trials
+    trials = optuna.load_study(study_name=None, storage=f"sqlite:///{export_study(run)}").trials
     _, history = aw.read_run(run)
     states = [trial.state == optuna.trial.TrialState.FAIL for trial in trials]
     assert states == history.failed.tolist()

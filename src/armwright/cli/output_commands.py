@@ -1,5 +1,6 @@
 """Commands that show and export what a run holds: pick, export, report, live, prompt, doctor."""
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -95,9 +96,9 @@ def export(
         if design is not None:
             raise SettingsError(f"--design {design} does not go with --format optuna, which exports the whole run")
         with activity(f"exporting {run}"):
-            study = export_study(run, out)
-        print_text(f"{study.database}; to view it in a browser (pip install optuna-dashboard):")
-        print_text(f"  {study.dashboard_command}")
+            database = export_study(run, out)
+        print_text(f"{database}; to view it in a browser (pip install optuna-dashboard):")
+        print_text(f"  {shlex.join(['optuna-dashboard', f'sqlite:///{database.as_posix()}'])}")
         return
     with activity(f"exporting a design of {run}"):
         text = export_design(run, design, format_)
