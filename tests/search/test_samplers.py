@@ -54,20 +54,19 @@ def test_injected_design_outside_space_is_refused(name: str, value: float | str)
     box = BlackBox(SPACE, "tpe", seed=0)
     wrong = Design({**SPACE.sample(1, 0)[0].params, name: value})
     with pytest.raises(DesignError, match=name):
-        box.inject(wrong, 0, "rules", "rules-0000")
+        box.inject(wrong, 0)
     assert box.study.get_trials(deepcopy=False) == []
 
 
-def test_injected_design_keeps_parameters_and_source() -> None:
+def test_injected_design_keeps_its_parameters() -> None:
     box = BlackBox(SPACE, "tpe", seed=0)
     design = SPACE.sample(1, 3)[0]
-    trial, taken = box.inject(design, 0, "rules", "rules-0000")
+    trial, taken = box.inject(design, 0)
     assert taken == design
     box.tell(trial, (1.0, 2.0))
     kept = box.study.trials[0]
     assert kept.state is TrialState.COMPLETE
     assert kept.params == dict(design.params)
-    assert kept.user_attrs == {"source": "rules", "proposal": "rules-0000"}
 
 
 def test_sampler_learns_from_injected_designs() -> None:
@@ -76,7 +75,7 @@ def test_sampler_learns_from_injected_designs() -> None:
     for box in (plain, taught):
         fill(box, 12)
     for box, values in ((plain, (9.0, 9.0)), (taught, (0.1, 0.1))):
-        box.tell(box.inject(SPACE.sample(1, 7)[0], 12, "rules", "rules-0012")[0], values)
+        box.tell(box.inject(SPACE.sample(1, 7)[0], 12)[0], values)
     assert plain.draw(13, BBO)[1] != taught.draw(13, BBO)[1]
 
 
@@ -88,7 +87,7 @@ def test_named_samplers_learn_from_rules_proposals(sampler: str) -> None:
         box = BlackBox(SPACE, sampler, seed=0)
         trials = fill(box, 8)
         proposal = RulesProposer().propose(History(PROBLEM, trials, 8), seed=0, number=8)
-        box.tell(box.inject(proposal.design, 8, "rules", proposal.id)[0], values)
+        box.tell(box.inject(proposal.design, 8)[0], values)
         assert box.study.trials[8].params == dict(proposal.design.params)
         return [trial.design for trial in fill(box, 4, first=9)][1:]
 
@@ -148,7 +147,7 @@ def test_injected_designs_count_as_startup_trials_of_tpe() -> None:
     for n, random in ((9, True), (10, False)):
         box = BlackBox(SPACE, "tpe", seed=0)
         for number, design in enumerate(SPACE.sample(n, 1)):
-            box.tell(box.inject(design, number, "rules", f"rules-{number}")[0], (1.0 + number, 2.0))
+            box.tell(box.inject(design, number)[0], (1.0 + number, 2.0))
         drawn = box.draw(n, BBO)[1]
         assert (drawn == box.__class__(SPACE, "random", seed=0).draw(n, BBO)[1]) is random
 
@@ -186,7 +185,7 @@ def test_genetic_samplers_use_injected_designs_as_parents() -> None:
     box = BlackBox(SPACE, nsga2, seed=0)
     injected = SPACE.sample(4, 11)
     for number, design in enumerate(injected):
-        box.tell(box.inject(design, number, "rules", f"rules-{number}")[0], (1.0 + number, 5.0 - number))
+        box.tell(box.inject(design, number)[0], (1.0 + number, 5.0 - number))
     generations = [
         value for trial in box.study.trials for name, value in trial.system_attrs.items() if name.endswith("generation")
     ]

@@ -306,15 +306,13 @@ class Study:
 
     def _choose_design(self, number: int, slot: ProposalSlot | None) -> tuple[Any, Design, str]:
         """Return Optuna's trial, the design to evaluate, and its source."""
-        source, proposal_id = RANDOM if number < self._method.n_init else BBO, None
         if slot is not None and slot.proposal is not None:
             assert self._proposer is not None
-            source, given, proposal_id = self._proposer.name, slot.proposal.design, slot.proposal.id
-        elif number < len(self._method.initial_designs):
-            source, given = INITIAL_DESIGN, Design(self._method.initial_designs[number])
-        else:
-            return *self._black_box.draw(number, source), source
-        return *self._black_box.inject(given, number, source, proposal_id), source
+            return *self._black_box.inject(slot.proposal.design, number), self._proposer.name
+        if number < len(self._method.initial_designs):
+            return *self._black_box.inject(Design(self._method.initial_designs[number]), number), INITIAL_DESIGN
+        source = RANDOM if number < self._method.n_init else BBO
+        return *self._black_box.draw(number, source), source
 
     def _take_results(self, timeout: float) -> None:
         """Pass all finished evaluations to the sampler, and record the trials that no missing one precedes.

@@ -16,7 +16,7 @@ from armwright.problem.objectives import CLEARANCE_QUANTITIES, JOINTS, QUANTITIE
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
 from armwright.search.surrogate.custom_inputs import CustomInputs
-from armwright.search.surrogate.dynamic_quantities import DYNAMIC_QUANTITIES
+from armwright.search.surrogate.dynamic_quantities import dynamic_quantities
 from armwright.spaces.parameters import CategoricalParameter, Design
 
 PHYSICS, DYNAMICS, PARAMETERS = "physics", "dynamics", "parameters"  # sets of inputs
@@ -142,8 +142,8 @@ class CheapFeatures:
         violations = np.empty((len(matrix), len(self._problem.constraints)))
         for rows in self._problem.chunks(len(matrix)):
             evaluation = self._problem.physics(matrix[rows])
-            quantities = (*self._quantities, *DYNAMIC_QUANTITIES)
-            tables.append(np.column_stack([quantity(evaluation) for quantity in quantities]))
+            physics = [quantity(evaluation) for quantity in self._quantities]
+            tables.append(np.column_stack([*physics, dynamic_quantities(evaluation)]))
             violations[rows] = self._worst_violations(matrix[rows], evaluation)
         return np.concatenate(tables), violations
 
