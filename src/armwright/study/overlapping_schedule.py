@@ -78,9 +78,10 @@ class OverlappingSchedule(Schedule):
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
 
-    def upcoming(self, number: int) -> tuple[int, int]:
-        """Return the trial of the next request, once `number` trials are finished, and how many will be finished."""
-        return self._next_asked(), max(number, self._method.n_init + max(0, self._next_request_after()))
+    def upcoming(self, number: int) -> int:
+        """Return the trial of the next request: the first of a block without one."""
+        numbers = count(self._method.n_init, self._method.n_step * self._requests.per_call)
+        return next(number for number in numbers if number not in self._asked)
 
     def _take(self, counted: int) -> ProposalSlot | None:
         """Return the next slot, if one is due."""
@@ -105,7 +106,7 @@ class OverlappingSchedule(Schedule):
         while self.n_in_flight < self._max_in_flight and self._n_supplied() < self._method.n_proposals:
             if counted < self._next_request_after():
                 return
-            number = self._next_asked()
+            number = self.upcoming(counted + self._method.n_init)
             self._asked.add(number)
             self.n_in_flight += 1
             thread = threading.Thread(
@@ -122,11 +123,6 @@ class OverlappingSchedule(Schedule):
     def _next_request_after(self) -> int:
         """Return the number of counted trials after which the next request is made."""
         return (self._n_supplied() - (self._max_in_flight - 1) * self._requests.per_call) * self._method.n_step
-
-    def _next_asked(self) -> int:
-        """Return the trial of the next request: the first of a block without one."""
-        numbers = count(self._method.n_init, self._method.n_step * self._requests.per_call)
-        return next(number for number in numbers if number not in self._asked)
 
     def _request(self, history: History, number: int) -> None:
         answer: list[ProposalSlot] = []

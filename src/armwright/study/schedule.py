@@ -49,11 +49,10 @@ class AlternatingSchedule(Schedule):
             self._ready.extend(self._requests.request(self._history(), number))
         return self._ready.popleft()
 
-    def upcoming(self, number: int) -> tuple[int, int]:
-        """Return the trial of the next request, once `number` trials are finished, and how many will be finished."""
+    def upcoming(self, number: int) -> int:
+        """Return the trial of the next request, once `number` trials are finished."""
         first = next(n for n in count(number) if self._method.is_first_trial(n))
-        asked = first + len(self._ready) * self._method.n_step
-        return asked, asked
+        return first + len(self._ready) * self._method.n_step
 
 
 class ReplaySchedule(Schedule):
