@@ -24,7 +24,7 @@ from armwright.study.study import optimize
 class Preview:
     """Prompt for a trial."""
 
-    number: int  # of the trial
+    number: int
     prompt: str
     tokens: int  # estimated length of the prompt
     schema: dict[str, Any]  # JSON schema of the answer

@@ -16,13 +16,9 @@ from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, pa
 
 
 class Schedule:
-    """Assigns each trial to the black box or to the proposer. This base class assigns all trials to the black box.
+    """Assigns each trial to the black box or to the proposer. This base class assigns all trials to the black box."""
 
-    Attributes:
-        n_in_flight: number of requests that run while trials go on.
-    """
-
-    n_in_flight: int = 0
+    n_in_flight: int = 0  # number of requests that run while trials go on
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return the slot of trial `number`, or None if it is the black box's."""

@@ -30,19 +30,12 @@ FeatureFunction = Callable[[Design], Sequence[float]]
 
 @dataclass(frozen=True)
 class Scaling:
-    """Scaling of inputs to mean 0 and variance 1 over random designs.
+    """Scaling of inputs to mean 0 and variance 1 over random designs."""
 
-    Attributes:
-        kept: (K,) columns that differ and are no copies of others.
-        floors: (K,) added before the logarithm; NaN for columns that have none.
-        mean: (K,) after it.
-        deviation: (K,) after it.
-    """
-
-    kept: NDArray[np.intp]
-    floors: Array
-    mean: Array
-    deviation: Array
+    kept: NDArray[np.intp]  # (K,) columns that differ and are no copies of others
+    floors: Array  # (K,) added before the logarithm; NaN for columns that have none
+    mean: Array  # (K,) after it
+    deviation: Array  # (K,) after it
 
     @classmethod
     def of(cls, columns: Array) -> "Scaling":
@@ -85,15 +78,10 @@ def _logarithms(columns: Array, floors: Array) -> Array:
 
 @dataclass(frozen=True)
 class Description:
-    """What is known of N designs without evaluating them.
+    """What is known of N designs without evaluating them."""
 
-    Attributes:
-        inputs: (N, F) scaled inputs of each set: `physics`, `dynamics` and `parameters`.
-        violations: (N, C) of the constraints, which the built-in physics alone decides.
-    """
-
-    inputs: Mapping[str, Array]
-    violations: Array
+    inputs: Mapping[str, Array]  # (N, F) scaled inputs of each set: `physics`, `dynamics` and `parameters`
+    violations: Array  # (N, C) of the constraints, which the built-in physics alone decides
 
     def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Description":
         """Return the description of some of the designs."""

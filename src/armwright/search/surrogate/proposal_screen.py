@@ -14,15 +14,10 @@ LEAST_GAIN = 0.1  # of the best candidate's; such a proposal is worth less than 
 
 @dataclass(frozen=True)
 class Rejection:
-    """Why a design is not worth an evaluation.
+    """Why a design is not worth an evaluation."""
 
-    Attributes:
-        gain: its expected gain of hypervolume, as a share of the best candidate's.
-        predicted: its objectives as predicted.
-    """
-
-    gain: float
-    predicted: tuple[float, ...]
+    gain: float  # its expected gain of hypervolume, as a share of the best candidate's
+    predicted: tuple[float, ...]  # its objectives as predicted
 
 
 def rejection(surrogate: Surrogate, observations: Observations, row: Array, seed: int) -> Rejection | None:

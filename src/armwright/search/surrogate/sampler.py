@@ -23,15 +23,10 @@ from armwright.spaces.parameters import Design
 
 @dataclass(frozen=True)
 class SurrogateFactory:
-    """Makes a sampler for each trial; they share what saves time.
+    """Makes a sampler for each trial; they share what saves time."""
 
-    Attributes:
-        surrogate: of a problem.
-        name: in the settings of a run.
-    """
-
-    surrogate: Surrogate = field(repr=False)
-    name: str
+    surrogate: Surrogate = field(repr=False)  # of a problem
+    name: str  # in the settings of a run
 
     def __call__(self, seed: int) -> "SurrogateSampler":
         """Return the sampler of one trial."""
