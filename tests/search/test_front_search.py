@@ -93,10 +93,6 @@ def test_ask_repeats_its_designs_until_tell():
     assert not np.array_equal(search.ask(), rows)
 
 
-def test_evaluations_count_every_batch():
-    assert stepped(made(), 3).evaluations == FIRST_BATCH + 2 * SMALLEST_BATCH
-
-
 def test_random_designs_that_the_first_generation_lacks_come_later():
     """A generation's last designs are the random ones, which `vary` does not make."""
     asked = []
@@ -132,18 +128,6 @@ def test_only_random_designs_that_were_not_evaluated_come_later():
     assert search.state()["random_left"] == FIRST_BATCH - 200 - 10
     search.step()
     assert search.state()["random_left"] == FIRST_BATCH - 200 - 10 - 50
-
-
-def test_search_with_a_cut_first_generation_continues_after_a_restore():
-    def cut():
-        search = made()
-        search.step(200)
-        return search
-
-    whole = stepped(cut(), 8)
-    restored = made()
-    restored.restore(stepped(cut(), 3).state())
-    assert_same(stepped(restored, 5), whole)
 
 
 @pytest.mark.parametrize(("n_objectives", "least"), [(1, 0.999), (2, 0.98), (3, 0.9), (4, 0.7)])
@@ -364,16 +348,6 @@ def test_units_outside_a_range_are_reflected():
     columns = DesignEncoding(MIXED[:1])
     units = np.array([[-0.1], [0.0], [1.2], [2.5], [-7.0]])
     np.testing.assert_allclose(columns.from_units(units)[:, 0], [-1.5, -2.0, 2.0, -2.0, -2.0], atol=1e-12)
-
-
-def test_search_beats_random_arms():
-    problem = Problem(load_task("target-1"))
-    search = stepped(
-        FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).values, (5.0, 5.0), seed=0), 8
-    )
-    columns = DesignEncoding(SPACE.parameters)
-    random = problem.evaluate_matrix(columns.random(search.evaluations, np.random.default_rng(0))).values
-    assert search.hypervolume > 1.1 * hypervolume(random, (5.0, 5.0))
 
 
 @pytest.mark.slow

@@ -17,7 +17,6 @@ from armwright.llm.feedback import Feedback
 from armwright.pareto import hypervolume
 from armwright.search.samplers import SAMPLERS
 from armwright.study.optuna_export import export_study
-from armwright.study.progress import Progress
 from armwright.study.workers import evaluation_process
 from tests.torture.short import armwright
 
@@ -165,27 +164,6 @@ def test_run_goes_on_if_one_of_the_first_evaluations_succeeds() -> None:
     found = aw.optimize(aw.Problem(TASK, SPACE, evaluator=second), **SHORT)
     assert found.summary["failures"]["exception"] == len(calls) - 1
     assert [member.number for member in found.front] == [1]
-
-
-def test_reference_point_follows_the_first_five_successes(tmp_path: Path) -> None:
-    calls: list[int] = []
-
-    @aw.evaluator("reach [m]")
-    def later(arm: aw.Arm, task: aw.Task) -> float:
-        calls.append(1)
-        if len(calls) <= 9:
-            raise TypeError("wrong argument")
-        return length_of(arm)
-
-    points: list[float | None] = []
-
-    def watch(progress: Progress) -> None:
-        points.append(progress.hypervolume)
-
-    found = aw.optimize(aw.Problem(TASK, SPACE, evaluator=later), **SHORT, allow_failures=True, watch=watch)
-    values = found.history.values[~found.history.failed, 0]
-    assert found.config.reference_point == pytest.approx([1.1 * values[:5].min()])
-    assert points[-1] == pytest.approx(found.summary["hypervolume"]["final"])
 
 
 def test_reference_point_of_rare_successes_is_the_same_after_a_resumption(tmp_path: Path) -> None:

@@ -72,12 +72,6 @@ def test_front_run_writes_summary_and_designs(done: FrontRun) -> None:
 
 
 @pytest.mark.slow
-def test_front_search_beats_a_study_of_similar_duration(done: FrontRun) -> None:
-    study = optimize(PROBLEM, proposer="none", n_total=60, seed=1)
-    assert hypervolume(done.history.values, (5, 5)) > study.hypervolume[-1]
-
-
-@pytest.mark.slow
 def test_resumed_front_run_equals_uninterrupted_one(done: FrontRun, tmp_path: Path) -> None:
     class StopError(Exception):
         pass
@@ -229,21 +223,6 @@ def test_proposer_is_not_called_for_a_conflicting_folder(tmp_path: Path) -> None
     with pytest.raises(RunConflictError):
         find_front(PROBLEM, evaluations=500, initial_designs=RulesProposer(), out=tmp_path / "study")
     assert not (tmp_path / "study" / "proposals").exists()
-
-
-def test_good_initial_designs_are_not_a_stall() -> None:
-    known = known_front(PROBLEM)
-    assert known is not None
-    search = FrontSearch(
-        PROBLEM.space.parameters,
-        lambda rows: PROBLEM.evaluate_matrix(rows).values,
-        (5.0, 5.0),
-        0,
-        PROBLEM.space.matrix(known.designs[::4]),
-    )
-    while search.evaluations < 2000:
-        search.step()
-        assert not search.stalled
 
 
 @pytest.mark.slow

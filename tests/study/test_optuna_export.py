@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
 import optuna
 import pytest
@@ -175,34 +173,6 @@ def test_optuna_computes_the_same_hypervolume(plain: Path) -> None:
         figure = optuna.visualization.plot_hypervolume_history(study, study.user_attrs["reference_point"])
     (curve,) = (trace for trace in figure.data if trace.mode == "lines+markers")
     assert np.allclose(curve.y, history.hypervolumes, rtol=1e-12)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("which", ["run", "plain"])
-def test_optuna_plots_an_exported_study(which: str, request: pytest.FixtureRequest) -> None:
-    matplotlib.use("agg")
-    folder = request.getfixturevalue(which)
-    _, history = read_run(folder)
-    names = set(distributions(history.problem.space))
-
-    def error(trial: optuna.trial.FrozenTrial) -> float:
-        return trial.values[0]
-
-    about: dict[str, Any] = {"target": error, "target_name": "position_error"}
-    with opened(folder / STUDY_DB) as study, warnings.catch_warnings():
-        warnings.simplefilter("ignore", ExperimentalWarning)
-        warnings.filterwarnings("ignore", "PedAnova|Param .* unique value")  # Optuna's own
-        front = optuna.visualization.plot_pareto_front(study)
-        best = front.data[-1]
-        assert set(zip(best.x, best.y, strict=True)) >= {member.values[:2] for member in history.front}
-        assert all(objective.name in str(front.layout) for objective in history.problem.objectives)
-        assert optuna.visualization.plot_slice(study, **about).data
-        assert optuna.visualization.plot_parallel_coordinate(study, **about).data
-        importances = set(optuna.visualization.plot_param_importances(study, **about).data[0].y)
-        assert importances
-        assert importances == names if which == "plain" else importances <= names  # all parameters of each design
-        optuna.visualization.matplotlib.plot_slice(study, **about)
-        plt.close("all")
 
 
 def test_exported_study_can_be_continued(plain: Path, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
-from tests.support.command_line import PATIENCE, armwright
+from tests.support.command_line import PATIENCE
 from tests.support.fixed_problem import SIX_AXIS
 from tests.support.wire_formats import llm_proposer, model_options
 
@@ -189,15 +189,6 @@ def test_template_variables_are_listed() -> None:
     assert [line.partition(":")[0] for line in shown("--variables")[0].splitlines()] == list(VARIABLES)
 
 
-@pytest.mark.parametrize("name", ["plus", "minus"])
-@pytest.mark.slow
-def test_copied_template_gives_the_same_prompt(in_folder: Path, name: str) -> None:
-    whole = shown("--template", "--prompt", name)[0]
-    (in_folder / "own.md").write_text(whole, encoding="utf-8")
-    assert shown("target-1", "--prompt", "own.md")[0] == shown("target-1", "--prompt", name)[0]
-    assert shown("--template", "--prompt", "own.md")[0] == whole
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder that holds a finished run and a space file."""
@@ -236,14 +227,6 @@ def test_invalid_arguments_are_refused(
         shown(*args)
     assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)
-
-
-def test_template_error_is_one_line_on_stderr(in_folder: Path) -> None:
-    (in_folder / "own.md").write_text("{{ ''.__class__ }}", encoding="utf-8")
-    done = armwright("prompt", "target-1", "--prompt", "own.md")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("armwright: prompt own.md, line 1 cannot be rendered: access to attribute")
-    assert done.stderr.count("\n") == 1
 
 
 def test_changed_template_is_refused_in_one_line(chat_server: ChatServer, in_folder: Path) -> None:

@@ -242,15 +242,6 @@ def shown(*progress: SearchProgress) -> list[str]:
     return [line for line in console.file.getvalue().splitlines() if "designs/s" in line]
 
 
-def test_rate_is_shown_once_after_a_second_of_search() -> None:
-    budget = SearchBudget(seconds=150.0)
-    early = SearchProgress(100, 0.5, 0.0, 1, budget, 119.5, 100, 0.5)
-    first = SearchProgress(403, 1.0, 0.0, 1, budget, 119.0, 403, 1.0)
-    later = SearchProgress(900, 2.0, 0.0, 1, budget, 118.0, 900, 2.0)
-    assert shown(early) == []
-    assert shown(early, first, later) == ["about 400 designs/s: 48,000 designs in 2 min"]
-
-
 @pytest.mark.parametrize(
     ("progress", "line"),
     [

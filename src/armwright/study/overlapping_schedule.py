@@ -3,12 +3,10 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 from itertools import count, groupby
 
-from armwright.runs.config import Method
 from armwright.runs.history import History
-from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
 from armwright.study.schedule import AlternatingSchedule, Schedule
 
 POLL_SECONDS = 0.2  # between two checks for Ctrl-C, because a wait cannot be interrupted everywhere
@@ -24,19 +22,14 @@ class OverlappingSchedule(Schedule):
 
     Args:
         requests: requests to the proposer.
-        method: search settings of the run.
-        history: returns the finished trials.
         max_in_flight: requests at a time.
     """
 
-    def __init__(
-        self, requests: ProposalRequests, method: Method, history: Callable[[], History], max_in_flight: int
-    ) -> None:
+    def __init__(self, requests: ProposalRequests, max_in_flight: int) -> None:
         self._requests = requests
-        self._method = method
-        self._history = history
+        self._method = requests.method
         self._max_in_flight = max_in_flight
-        past = past_slots(history())
+        past = requests.past_slots()
         self._entered = len(past)
         self._asked = {slot.asked for slot in past}
         self._arrived: deque[list[ProposalSlot]] = deque()  # answers with all their designs
@@ -45,7 +38,7 @@ class OverlappingSchedule(Schedule):
         self._threads: list[threading.Thread] = []
         self.n_in_flight = 0
         self._change = threading.Condition()
-        for asked, slots in groupby(requests.unused(history()), lambda slot: slot.asked):
+        for asked, slots in groupby(requests.unused(), lambda slot: slot.asked):
             if asked in self._asked:
                 self._surplus.extend(slots)
             else:
@@ -110,7 +103,10 @@ class OverlappingSchedule(Schedule):
             self._asked.add(number)
             self.n_in_flight += 1
             thread = threading.Thread(
-                target=self._request, args=(self._history(), number), name=f"armwright-request-{number}", daemon=True
+                target=self._request,
+                args=(self._requests.history(), number),
+                name=f"armwright-request-{number}",
+                daemon=True,
             )
             self._threads = [other for other in self._threads if other.is_alive()] + [thread]
             thread.start()
@@ -139,10 +135,7 @@ class OverlappingSchedule(Schedule):
             self._change.notify_all()
 
 
-def request_schedule(
-    requests: ProposalRequests, method: Method, history: Callable[[], History]
-) -> AlternatingSchedule | OverlappingSchedule:
+def request_schedule(requests: ProposalRequests) -> AlternatingSchedule | OverlappingSchedule:
     """Return the schedule of a proposer; its requests overlap with black-box trials if `in_flight` is set."""
-    if method.in_flight is None:
-        return AlternatingSchedule(requests, method, history)
-    return OverlappingSchedule(requests, method, history, method.in_flight)
+    in_flight = requests.method.in_flight
+    return AlternatingSchedule(requests) if in_flight is None else OverlappingSchedule(requests, in_flight)

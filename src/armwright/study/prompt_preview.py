@@ -16,7 +16,7 @@ from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.study.overlapping_schedule import request_schedule
-from armwright.study.proposal_requests import ProposalRequests
+from armwright.study.proposal_requests import ProposalRequests, proposal_seed
 from armwright.study.study import optimize
 
 
@@ -38,7 +38,7 @@ def preview(
     assert history.method is not None
     history = replace(history, method=history.method.model_copy(update={"n_total": n_total}))
     proposer = PromptedProposer(ReplayBackend((), Path()), options, "llm")
-    text = proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init), n_init)
+    text = proposer.prompt_for(history, proposal_seed(seed, n_init), n_init)
     return _preview(proposer, problem, n_init, text)
 
 
@@ -61,17 +61,17 @@ def preview_after(run: Path, options: PromptOptions | None = None, *, number: in
         ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm", prompt=prompt
     )
     proposer.open_read_only(run)
-    requests = ProposalRequests(proposer, config.seed)
     if number is not None:
         past = _history_at(run, config, history, proposer.requested_trials(), number)
-        text = proposer.prompt_for(past, requests.seed(number), number, proposer.past_hints(number))
+        text = proposer.prompt_for(past, proposal_seed(config.seed, number), number, proposer.past_hints(number))
         return _preview(proposer, history.problem, number, text)
-    number = request_schedule(requests, config.study, lambda: history).upcoming(len(history))
+    requests = ProposalRequests(proposer, config.seed, config.study, lambda: history)
+    number = request_schedule(requests).upcoming(len(history))
     # With other options the new prompt is shown, even if the run waits for the second call of an answer.
     if given:
-        text = proposer.prompt_for(history, requests.seed(number), number, proposer.next_hints(number))
+        text = proposer.prompt_for(history, proposal_seed(config.seed, number), number, proposer.next_hints(number))
     else:
-        text = proposer.question(history, requests.seed(number), number).prompt
+        text = proposer.question(history, proposal_seed(config.seed, number), number).prompt
     return _preview(proposer, history.problem, number, text)
 
 

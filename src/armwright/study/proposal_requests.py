@@ -8,6 +8,7 @@ from typing import Any
 from armwright.exceptions import DesignError, ProposalError
 from armwright.problem.objective import Objective
 from armwright.proposers.proposer import Proposal, Proposer
+from armwright.runs.config import Method
 from armwright.runs.history import History
 from armwright.runs.trial import ScreenedOut
 from armwright.search.surrogate.proposal_screen import Rejection
@@ -55,20 +56,37 @@ class ProposalRequests:
     Args:
         proposer: the proposer.
         seed: of the run.
+        method: search settings of the run.
+        history: returns the finished trials.
         notify: called with the number of the trial before each request.
     """
 
-    def __init__(self, proposer: Proposer, seed: int, notify: Callable[[int], None] | None = None) -> None:
+    def __init__(
+        self,
+        proposer: Proposer,
+        seed: int,
+        method: Method,
+        history: Callable[[], History],
+        notify: Callable[[int], None] | None = None,
+    ) -> None:
         self.per_call = proposer.per_call
+        self.method = method
+        self.history = history
         self._proposer = proposer
         self._seed = seed
         self._notify = notify
         self._final_fault: str | None = None  # the kind of the fault that ended the requests
         self._lock = threading.Lock()
 
-    def unused(self, history: History) -> list[ProposalSlot]:
+    def unused(self) -> list[ProposalSlot]:
         """Return the proposals of earlier sessions that no trial has used yet."""
-        return [ProposalSlot(p.asked, p.known or 0, p, note=p.note) for p in self._proposer.unused(history)]
+        return [ProposalSlot(p.asked, p.known or 0, p, note=p.note) for p in self._proposer.unused(self.history())]
+
+    def past_slots(self) -> list[ProposalSlot]:
+        """Return the slots that the finished trials took."""
+        return [
+            ProposalSlot(*trial.request, fault=trial.fault) for trial in self.history() if trial.request is not None
+        ]
 
     def request(self, history: History, number: int) -> list[ProposalSlot]:
         """Request proposals for trial `number` after `history`: one slot per design, or one with a fault."""
@@ -78,7 +96,7 @@ class ProposalRequests:
         if self._notify is not None:
             self._notify(number)
         try:
-            answer = self._proposer.propose(history, self.seed(number), number)
+            answer = self._proposer.propose(history, proposal_seed(self._seed, number), number)
         except ProposalError as fault:
             known = known if fault.known is None else fault.known
             return [ProposalSlot(number, known, fault=fault.kind, note=self._note(fault))]
@@ -86,10 +104,6 @@ class ProposalRequests:
         if not proposals:
             return [ProposalSlot(number, known, fault="answer", note="the proposer gave no design")]
         return [_check_design(history, number, proposal) for proposal in proposals]
-
-    def seed(self, number: int) -> int:
-        """Return the seed of the request for trial `number`."""
-        return derived_seed(self._seed, PROPOSING, number)
 
     def stop(self, kind: str) -> bool:
         """Make no more requests in this session, and return True if none had stopped them before."""
@@ -108,6 +122,11 @@ class ProposalRequests:
         return f"{fault}; no more requests are made in this session" if self.stop(fault.kind) else ""
 
 
+def proposal_seed(seed: int, number: int) -> int:
+    """Return the seed of the request for trial `number` of a run with this seed."""
+    return derived_seed(seed, PROPOSING, number)
+
+
 def _check_design(history: History, number: int, proposal: Proposal) -> ProposalSlot:
     known = len(history) if proposal.known is None else proposal.known
     try:
@@ -115,8 +134,3 @@ def _check_design(history: History, number: int, proposal: Proposal) -> Proposal
     except DesignError as fault:
         return ProposalSlot(number, known, fault="answer", note=str(fault))
     return ProposalSlot(number, known, proposal, note=proposal.note)
-
-
-def past_slots(history: History) -> list[ProposalSlot]:
-    """Return the slots that the finished trials took."""
-    return [ProposalSlot(*trial.request, fault=trial.fault) for trial in history if trial.request is not None]

@@ -30,7 +30,7 @@ from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
 from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.progress import Activity, Progress, StudyResult
-from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
 from armwright.study.record import Record
 from armwright.study.sampler_advice import sampler_advice
 from armwright.study.schedule import ReplaySchedule, Schedule
@@ -157,11 +157,11 @@ class Study:
         self._folder = folder
         self._watch = watch
         self._channel = Channel(None if folder is None else folder.path)
+        self._record = Record(problem, config, folder, evaluation.allow_failures)
         self._requests: ProposalRequests | None = None
         if proposer is not None:
             notify = self._report_request if self._method.in_flight is None else None
-            self._requests = ProposalRequests(proposer, config.seed, notify)
-        self._record = Record(problem, config, folder, evaluation.allow_failures)
+            self._requests = ProposalRequests(proposer, config.seed, self._method, self._record.history, notify)
         names = [constraint.description for constraint in problem.constraints]
         can_fail = problem.evaluator is not None
         self._black_box = BlackBox(problem.space, sampler, config.seed, len(problem.objectives), names, can_fail)
@@ -218,7 +218,7 @@ class Study:
         """Report what the proposals will cost, and check that the proposer works."""
         if self._proposer is None or self._requests is None:
             return
-        n_due = self._method.n_proposals - len(past_slots(self._record.history()))
+        n_due = self._method.n_proposals - len(self._requests.past_slots())
         if n_due <= 0:
             return
         forecast = self._proposer.forecast(self._problem, n_due)
@@ -243,8 +243,8 @@ class Study:
             return Schedule()
         record = self._proposer.recorded_trials()
         if record:
-            return ReplaySchedule(self._requests, record, self._method, self._record.history)
-        return request_schedule(self._requests, self._method, self._record.history)
+            return ReplaySchedule(self._requests, record)
+        return request_schedule(self._requests)
 
     def _wait_for_start(self, number: int) -> None:
         """Take results until trial `number` may start; StoppedError if the watcher ended the session."""
