@@ -22,7 +22,6 @@ from armwright.runs.history import RANDOM
 from armwright.runs.trial import FinishedTrial
 from armwright.search.callable_names import name_of
 from armwright.search.surrogate.cheap_features import FeatureFunction
-from armwright.search.surrogate.proposal_screen import Rejection
 from armwright.search.surrogate.sampler import SurrogateFactory, surrogate_sampler
 from armwright.seeding import SAMPLING, derived_seed
 from armwright.spaces.design_space import DesignSpace
@@ -200,8 +199,8 @@ class BlackBox:
         self._assign_generation(sampler, trial)
         return trial, checked
 
-    def rejection(self, design: Design, number: int) -> Rejection | None:
-        """Return why the surrogate advises against evaluating a design in trial `number`; None for other samplers."""
+    def rejection(self, design: Design, number: int) -> tuple[float, tuple[float, ...]] | None:
+        """Return the gain and the prediction of a design that the surrogate would not evaluate in trial `number`."""
         if not isinstance(self._factory, SurrogateFactory):
             return None
         return self._factory(derived_seed(self._seed, SAMPLING, number)).rejection(self._study, design)

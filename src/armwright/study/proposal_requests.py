@@ -11,7 +11,6 @@ from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.config import Method
 from armwright.runs.history import History
 from armwright.runs.trial import ScreenedOut
-from armwright.search.surrogate.proposal_screen import Rejection
 from armwright.seeding import PROPOSING, derived_seed
 
 
@@ -43,10 +42,12 @@ class ProposalSlot:
             "feedback": None if self.feedback == number else self.feedback,
         }
 
-    def screened_out(self, source: str, rejection: Rejection, objectives: Sequence[Objective]) -> "ProposalSlot":
+    def screened_out(
+        self, source: str, rejection: tuple[float, tuple[float, ...]], objectives: Sequence[Objective]
+    ) -> "ProposalSlot":
         """Return the slot without its proposal, which is not evaluated."""
         assert self.proposal is not None
-        screened = ScreenedOut(source, self.proposal.id, rejection.gain, rejection.predicted)
+        screened = ScreenedOut(source, self.proposal.id, *rejection)
         return replace(self, proposal=None, note=screened.describe(objectives), screened=screened)
 
 

@@ -6,7 +6,7 @@ before it only. A killed run therefore resumes where it stopped and ends as an u
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -111,10 +111,8 @@ def optimize(
     refuse_unread_parameters(problem)
     stop_if_proven(check_instantly(problem))
     config = run_config(problem, method, seed)
-    with ExitStack() as stack:
-        folder = None
-        if out is not None:
-            folder = stack.enter_context(RunFolder(Path(out)))
+    with nullcontext() if out is None else RunFolder(Path(out)) as folder:
+        if folder is not None:
             config = folder.adopt(config)
         study = Study(problem, config, proposer, sampler, folder, watch, evaluation)
         return study.run(on_model_failure, verify and problem.evaluator is None)

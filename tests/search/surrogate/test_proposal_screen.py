@@ -80,8 +80,9 @@ def test_design_that_gains_nothing_is_rejected_with_its_prediction() -> None:
     worst = known.matrix[int(np.argmax(known.values.sum(axis=1)))]
     found = rejection(Surrogate(p), known, worst, 0)
     assert found is not None
-    assert 0.0 <= found.gain < LEAST_GAIN
-    assert found.predicted == pytest.approx(measure(p.arm(p.space.designs(worst[None])[0]), TASK), rel=0.5)
+    gain, predicted = found
+    assert 0.0 <= gain < LEAST_GAIN
+    assert predicted == pytest.approx(measure(p.arm(p.space.designs(worst[None])[0]), TASK), rel=0.5)
 
 
 def test_best_candidate_is_not_rejected() -> None:

@@ -196,22 +196,20 @@ class CheapFeatures:
 
 def _checked_features(function: FeatureFunction, designs: Sequence[Design]) -> Array:
     """Return (N, F) the custom features of designs, or raise SettingsError."""
-    rows = [_numbers(function(design)) for design in designs]
-    for row, design in zip(rows, designs, strict=True):
+    rows: list[Array] = []
+    for design in designs:
+        given: Any = function(design)
+        try:
+            row = np.atleast_1d(np.asarray(given, dtype=np.float64))
+        except (TypeError, ValueError):
+            raise SettingsError(f"features: expected numbers, got {given!r}") from None
+        rows.append(row)
         if row.shape != rows[0].shape or row.ndim != 1 or not np.all(np.isfinite(row)):
             raise SettingsError(
                 f"features: expected {rows[0].size} finite numbers for every design, got {row.tolist()} for "
                 f"{dict(design.params)}"
             )
     return np.array(rows)
-
-
-def _numbers(given: Any) -> Array:
-    """Return what a custom function returned as an array; SettingsError if it is not made of numbers."""
-    try:
-        return np.atleast_1d(np.asarray(given, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise SettingsError(f"features: expected numbers, got {given!r}") from None
 
 
 def _is_defined(quantity: Objective, evaluation: Evaluation) -> bool:
