@@ -286,12 +286,9 @@ def test_worker_evaluator_exception_has_its_traceback_and_design(
     shell.only(2)
     problem = bench.problem()
     bench.file.unlink()  # its lines are in the traceback all the same
-    fails_then_goes_on(tmp_path / "run", bench, problem, on(shell))
 
-
-def fails_then_goes_on(run: Path, bench: Bench, problem: aw.Problem, workers: aw.Workers | None) -> None:
     def search() -> aw.StudyResult:
-        return aw.optimize(problem, **SHORT, out=run, workers=workers)
+        return aw.optimize(problem, **SHORT, out=tmp_path / "run", workers=on(shell))
 
     bench.ask("fail")
     with pytest.raises(

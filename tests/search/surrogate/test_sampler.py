@@ -140,11 +140,6 @@ def test_auto_is_the_surrogate_for_evaluators_only() -> None:
     assert sampler_for(problem(), "nsga2") == "nsga2"
 
 
-def test_custom_features_are_part_of_the_name() -> None:
-    found = surrogate_sampler(problem(), features=longest_link)
-    assert sampler_name(found) == "surrogate(features=tests.search.surrogate.test_sampler.longest_link)"
-
-
 def longest_link(design: Design) -> list[float]:
     return [max(design.links)]
 
