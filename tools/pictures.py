@@ -231,7 +231,7 @@ def dashboard(folder: Path, page: Page, file: Path) -> None:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [Path(sys.executable).with_name("optuna-dashboard"), f"sqlite:///{run}/study.db"]
-    options = ["--artifact-dir", run / "artifacts", "--port", str(port)]
+    options = ["--port", str(port)]
     with subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
         address = f"http://127.0.0.1:{port}/dashboard"
         for _ in range(100):

@@ -98,8 +98,6 @@ def test_run_without_a_successful_evaluation_ends_with_an_error(in_folder: Path)
         (2, ("design", "target-9"), 'unknown task "target-9"'),
         (2, ("design", "target-1", "--device", "cuda"), "no NVIDIA GPU"),
         (2, ("design", "target-1", "--device", "tpu"), 'device = "tpu" is not one of'),
-        (2, ("design", "target-1", "--proposer", "none"), "proposes no initial designs"),
-        (2, ("design", "target-1", "--proposer", "rules", "--from", "x"), "use one of them"),
         (1, ("design", "target-1", "--from", "nothing"), "not a run folder"),
     ],
 )

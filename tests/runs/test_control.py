@@ -7,14 +7,10 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from armwright.exceptions import ModelError, ProposalError, RunFolderError, SettingsError, StoppedError
-from armwright.experiments.cells import plan_cells
-from armwright.experiments.plan import ExperimentPlan
-from armwright.experiments.runner import run_cell
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs import control
 from armwright.runs.control import (
@@ -35,8 +31,8 @@ from armwright.runs.control import (
 from armwright.runs.history import History
 from armwright.study.progress import Progress
 from tests.support.chat_server import Answer, ChatServer, Request, designer
-from tests.support.command_line import PATIENCE, armwright
-from tests.support.controlled_runs import after, asks, interrupt, lines, run, status, wait_until
+from tests.support.command_line import armwright
+from tests.support.controlled_runs import after, asks, interrupt, lines, run, status
 from tests.support.wire_formats import model_options
 
 # Pause and stop.
@@ -65,16 +61,6 @@ def test_paused_study_adds_no_trial_until_resumed(tmp_path: Path, monkeypatch: p
     assert read_control(out) == Control()
     run(tmp_path / "undisturbed")
     assert lines(out) == lines(tmp_path / "undisturbed")
-
-
-def test_another_thread_can_resume_a_paused_study(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    watcher = threading.Thread(
-        target=lambda: (wait_until(lambda: status(out).doing == "paused"), resume_study(out)), daemon=True
-    )
-    result = run(out, watch=after(5, lambda: (pause_study(out), watcher.start())))
-    watcher.join()
-    assert len(result.trials) == 13
 
 
 def test_ctrl_c_ends_a_paused_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,22 +108,6 @@ def test_paused_study_can_be_stopped(tmp_path: Path) -> None:
     assert len(lines(out)) == 7
 
 
-def test_stop_cancels_calls_in_flight(chat_server: ChatServer, tmp_path: Path) -> None:
-    out, held = tmp_path / "run", threading.Event()
-
-    def answer(request: Request) -> Answer:
-        if len(chat_server.requests) > 1:  # all but the check
-            held.wait(PATIENCE)
-        return designer(request)
-
-    chat_server.answer = answer
-    with pytest.raises(StoppedError):
-        run(out, asks(chat_server), in_flight=1, watch=after(5, lambda: stop_study(out)))
-    held.set()
-    assert len(lines(out)) == 6
-    assert len(run(out, asks(chat_server), in_flight=1).trials) == 13
-
-
 def test_only_hints_survive_an_earlier_session(tmp_path: Path) -> None:
     """This holds even if that session had no trial."""
     out = tmp_path / "run"
@@ -181,27 +151,6 @@ def test_stopped_command_exits_as_after_ctrl_c(chat_server: ChatServer, in_folde
     assert "resumed at trial 11 of 16" in done.stdout
 
 
-def test_stopped_cell_reports_its_failure(chat_server: ChatServer, tmp_path: Path) -> None:
-    method: dict[str, Any] = {"label": "LLM", "proposer": "llm", "n_step": 3}
-    method["model_options"] = {"model": "m", "base_url": chat_server.url}
-    plan = ExperimentPlan.model_validate(
-        {"name": "one", "tasks": ["target-1"], "seeds": 1, "n_init": 4, "n_total": 6, "methods": {"llm": method}}
-    )
-    (cell,), _ = plan_cells(plan, tmp_path, tmp_path / "out")
-
-    def answer(request: Request) -> Answer:
-        if len(chat_server.requests) == 2:
-            stop_study(cell.folder)
-        return designer(request)
-
-    chat_server.answer = answer
-    stopped = run_cell(cell)
-    assert stopped.fault == (
-        f"stopped on request; every finished trial is in {cell.folder}/, and the same command resumes"
-    )
-    assert run_cell(cell).fault == ""
-
-
 # control.json and status.json.
 
 
@@ -233,19 +182,6 @@ def test_damaged_control_file_is_ignored(tmp_path: Path, name: str) -> None:
     (tmp_path / CONTROL).write_bytes(hostile()[name])
     assert read_control(tmp_path) == Control()
     assert add_hint(tmp_path, "and it can be written anew") == Hint(1, "and it can be written anew")
-
-
-def test_study_continues_beside_a_damaged_control_file(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    contents = list(hostile().values())
-
-    def watch(progress: Progress) -> None:
-        if progress.doing == "finished":
-            (out / CONTROL).write_bytes(contents[progress.number % len(contents)])
-
-    run(out, n_total=len(contents), watch=watch)
-    run(tmp_path / "undisturbed", n_total=len(contents))
-    assert lines(out) == lines(tmp_path / "undisturbed")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
@@ -311,18 +247,6 @@ def test_status_goes_from_evaluating_through_asking_to_finished(chat_server: Cha
     before = (out / STATUS).read_bytes()
     run(out, asks(chat_server, answer="one-step"), n_total=6)  # shown again
     assert (out / STATUS).read_bytes() == before
-
-
-def test_status_is_not_written_for_every_trial(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    written: set[tuple[int, int]] = set()
-
-    def watch(progress: Progress) -> None:
-        there = (out / STATUS).stat()
-        written.add((there.st_ino, there.st_mtime_ns))
-
-    run(out, "none", watch=watch)
-    assert len(written) == 1
 
 
 class Faulty(Proposer):

@@ -15,7 +15,7 @@ from armwright.llm.prompt import PROMPTS, Prompt, load_prompt, whole_template
 from armwright.llm.transcript import hints_of, used_hints
 from armwright.proposers.manual import ManualProposer
 from armwright.proposers.replay import ReplayProposer
-from armwright.runs.control import CONTROL, Hint, add_hint, read_control
+from armwright.runs.control import Hint, add_hint, read_control
 from armwright.study.progress import Progress
 from armwright.study.prompt_preview import preview_after
 from armwright.tasks.catalogue import load_task
@@ -139,18 +139,6 @@ def test_concurrent_calls_share_no_hint(chat_server: ChatServer, tmp_path: Path)
     assert len(used_hints(calls(out))) == 1
 
 
-def test_reused_hint_number_is_a_new_hint(chat_server: ChatServer, tmp_path: Path) -> None:
-    """Numbers restart after control.json is deleted."""
-    out = tmp_path / "run"
-
-    def watch(progress: Progress) -> None:
-        after(3, lambda: add_hint(out, "first"))(progress)
-        after(6, lambda: ((out / CONTROL).unlink(), add_hint(out, "second")))(progress)
-
-    run(out, asks(chat_server), watch=watch)
-    assert used_hints(calls(out)) == {Hint(1, "first"): "llm-0004", Hint(1, "second"): "llm-0007"}
-
-
 def test_previewed_hints_are_those_sent(chat_server: ChatServer, tmp_path: Path) -> None:
     out = tmp_path / "run"
     run(out, asks(chat_server), n_total=3)
@@ -215,14 +203,6 @@ def test_whole_template_renders_the_built_in_prompt(name: str) -> None:
 def test_template_may_place_hints_itself() -> None:
     own = Prompt("own", "{% for hint in hints %}!{{ hint | upper }}{% endfor %} Go.")
     assert own.render(fixed_history(PAPER), 3, hints=["first", "second"]) == "!FIRST!SECOND Go.\n"
-
-
-def test_run_with_a_template_without_hints_sends_them(chat_server: ChatServer, tmp_path: Path) -> None:
-    out, own = tmp_path / "run", tmp_path / "own.md"
-    own.write_text("{{ targets }} End with ORIGIN, JOINTS and LINKS.", encoding="utf-8")
-    run(out, asks(chat_server, prompt=str(own)), watch=after(5, lambda: add_hint(out, "first")))
-    ends = [call.prompt.rpartition("LINKS.\n")[2] for call in calls(out) if call.step == "reasoning"]
-    assert ends == ["", f"\n{NOTE}first\n", ""]
 
 
 def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: Path) -> None:

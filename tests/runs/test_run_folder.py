@@ -115,19 +115,6 @@ def test_summary_has_the_documented_keys(run: StudyResult) -> None:
     assert 0.0 <= summary["proposer_bias"]["proposer"]["equal_neighbours"] <= 1.0
 
 
-def test_summary_with_lone_surrogate_is_read(run: StudyResult) -> None:
-    """Paths that are not UTF-8 contain one, such as the source of a replay."""
-    summary = run.summary | {"replay": "runs/\udc80"}
-    (folder(run) / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
-    assert read_summary(folder(run)) == summary
-
-
-def test_run_without_a_proposer_has_no_proposer_bias() -> None:
-    summary = optimize(PROBLEM, proposer="none", n_init=2, n_total=2).summary
-    assert summary["proposer_bias"] is None
-    assert list(summary["attribution"]) == ["random", "bbo"]
-
-
 def test_front_designs_are_written_with_their_values(run: StudyResult) -> None:
     written = sorted(path.name for path in (folder(run) / "designs").iterdir())
     assert written == sorted(f"{member.number:04d}" for member in run.front)

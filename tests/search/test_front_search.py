@@ -20,7 +20,7 @@ from armwright.search.front.front_search import (
     FrontSearch,
 )
 from armwright.search.front.selection import best_of_each, leaders, ranks, survivors
-from armwright.search.front.variation import RARE_SHARE, _of_equal_number, _parents, offspring
+from armwright.search.front.variation import RARE_SHARE, _parents, offspring
 from armwright.spaces.design_space import load_space, paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.tasks.catalogue import load_task
@@ -93,10 +93,6 @@ def test_ask_repeats_its_designs_until_tell():
     assert not np.array_equal(search.ask(), rows)
 
 
-def test_evaluations_count_every_batch():
-    assert stepped(made(), 3).evaluations == FIRST_BATCH + 2 * SMALLEST_BATCH
-
-
 def test_random_designs_that_the_first_generation_lacks_come_later():
     """A generation's last designs are the random ones, which `vary` does not make."""
     asked = []
@@ -119,31 +115,6 @@ def test_random_designs_that_the_first_generation_lacks_come_later():
     assert sum(len(designs) for designs in drawn) == FIRST_BATCH
     units = np.vstack(drawn)[:, 2:6]
     assert np.quantile(units, [0.1, 0.5, 0.9]) == pytest.approx([0.1, 0.5, 0.9], abs=0.03)  # over the whole range
-
-
-def test_only_random_designs_that_were_not_evaluated_come_later():
-    """Neither known designs that were cut off nor generations that were cut short change their number."""
-    search = made(known=DesignEncoding(MIXED).random(300, np.random.default_rng(1)))
-    search.step(100)  # a part of the known designs
-    assert search.state()["random_left"] == FIRST_BATCH
-    search = made()
-    search.step(200)
-    search.step(SMALLEST_BATCH - 40)  # of 50 random designs, the last of the generation, 40 are left out
-    assert search.state()["random_left"] == FIRST_BATCH - 200 - 10
-    search.step()
-    assert search.state()["random_left"] == FIRST_BATCH - 200 - 10 - 50
-
-
-def test_search_with_a_cut_first_generation_continues_after_a_restore():
-    def cut():
-        search = made()
-        search.step(200)
-        return search
-
-    whole = stepped(cut(), 8)
-    restored = made()
-    restored.restore(stepped(cut(), 3).state())
-    assert_same(stepped(restored, 5), whole)
 
 
 @pytest.mark.parametrize(("n_objectives", "least"), [(1, 0.999), (2, 0.98), (3, 0.9), (4, 0.7)])
@@ -306,15 +277,6 @@ def test_best_of_each_group_stay(points, n):
         assert not len(others) or rank[chosen].max() <= rank[others].min()
 
 
-def test_pairs_have_one_number_of_joints_and_every_number_is_as_likely():
-    numbers = np.array([6] * 80 + [4] + [5] * 19)
-    pairs = _of_equal_number(numbers, 20_000, np.random.default_rng(0))
-    np.testing.assert_array_equal(numbers[pairs[0]], numbers[pairs[1]])
-    for number in (4, 5, 6):
-        assert np.mean(numbers[pairs[0]] == number) == pytest.approx(1 / 3, abs=0.02)
-    assert set(pairs.ravel().tolist()) == set(range(100))
-
-
 def test_few_joints_stay_in_the_pool_until_they_are_feasible():
     space = load_space("desk-sorting")
     columns = DesignEncoding(space.parameters)
@@ -364,16 +326,6 @@ def test_units_outside_a_range_are_reflected():
     columns = DesignEncoding(MIXED[:1])
     units = np.array([[-0.1], [0.0], [1.2], [2.5], [-7.0]])
     np.testing.assert_allclose(columns.from_units(units)[:, 0], [-1.5, -2.0, 2.0, -2.0, -2.0], atol=1e-12)
-
-
-def test_search_beats_random_arms():
-    problem = Problem(load_task("target-1"))
-    search = stepped(
-        FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).values, (5.0, 5.0), seed=0), 8
-    )
-    columns = DesignEncoding(SPACE.parameters)
-    random = problem.evaluate_matrix(columns.random(search.evaluations, np.random.default_rng(0))).values
-    assert search.hypervolume > 1.1 * hypervolume(random, (5.0, 5.0))
 
 
 @pytest.mark.slow

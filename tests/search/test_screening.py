@@ -10,10 +10,10 @@ from armwright.problem.estimates import lower_bounds
 from armwright.problem.problem import Problem
 from armwright.proof.front_gap import known_front
 from armwright.search.encoding import DesignEncoding
-from armwright.search.front.screening import CANDIDATES, NEAR_MISSES, REJECTED_SHARE, REMEMBERED, Screen, pays
+from armwright.search.front.screening import CANDIDATES, NEAR_MISSES, REJECTED_SHARE, REMEMBERED, Screen
 from armwright.search.front.variation import offspring
 from armwright.spaces.design_space import default_space
-from armwright.tasks.catalogue import builtin_tasks, load_task
+from armwright.tasks.catalogue import load_task
 
 TASK, SPACE = load_task("dispensing"), default_space("dispensing")
 PROBLEM = Problem(TASK, SPACE)
@@ -38,11 +38,6 @@ def learnt(pool: Any, problem: Problem = PROBLEM, point: tuple[float, ...] = POI
 
 def screened(screen: Screen, pool: Any, seed: int = 1) -> Any:
     return screen.offspring(pool, np.zeros(len(pool)), ENCODING, N, np.random.default_rng(seed))
-
-
-def test_screening_is_for_tasks_with_cycles() -> None:
-    chosen = {name for name, task in builtin_tasks().items() if pays(Problem(task, default_space(name)))}
-    assert chosen == {name for name, task in builtin_tasks().items() if task.cycle is not None}
 
 
 def test_chosen_offspring_are_feasible_more_often(pool: Any) -> None:

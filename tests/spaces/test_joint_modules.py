@@ -211,7 +211,7 @@ def test_sampler_draws_active_parameters_only() -> None:
         assert trial.params == MIXED.free_values(design)
         box.tell(trial, (float(number), 1.0 / (1 + number)))
     (given_design,) = MIXED.sample(1, 99)
-    trial, design = box.inject(given_design, 25, "rules", "rules-0025")
+    trial, design = box.inject(given_design, 25)
     assert design == given_design
     assert trial.params == MIXED.free_values(design)
 

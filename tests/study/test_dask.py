@@ -17,7 +17,7 @@ import armwright as aw
 from armwright.exceptions import ClusterError, EvaluatorError, SettingsError, StoppedError
 from armwright.experiments.cells import Cell, plan_cells
 from armwright.experiments.plan import ExperimentPlan
-from armwright.experiments.runner import _outcome_of, finished_before, run_cells
+from armwright.experiments.runner import _outcome_of
 from armwright.problem.objective import Objective
 from armwright.runs.control import stop_study
 from armwright.study.progress import Progress
@@ -280,22 +280,15 @@ def test_version_mismatch_and_lost_scheduler_are_one_line(tmp_path: Path, bench:
 # --- what goes wrong --------------------------------------------------------------------------------------------------
 
 
-def test_evaluator_exception_has_its_traceback_and_design(tmp_path: Path, bench: Bench) -> None:
-    fails_then_goes_on(tmp_path / "run", bench, bench.problem(), None)
-
-
 def test_worker_evaluator_exception_has_its_traceback_and_design(
     tmp_path: Path, shell: ShellCluster, bench: Bench
 ) -> None:
     shell.only(2)
     problem = bench.problem()
     bench.file.unlink()  # its lines are in the traceback all the same
-    fails_then_goes_on(tmp_path / "run", bench, problem, on(shell))
 
-
-def fails_then_goes_on(run: Path, bench: Bench, problem: aw.Problem, workers: aw.Workers | None) -> None:
     def search() -> aw.StudyResult:
-        return aw.optimize(problem, **SHORT, out=run, workers=workers)
+        return aw.optimize(problem, **SHORT, out=tmp_path / "run", workers=on(shell))
 
     bench.ask("fail")
     with pytest.raises(
@@ -425,24 +418,6 @@ def two_cells(folder: Path, n_total: int) -> tuple[ExperimentPlan, list[Cell]]:
 
 def have_begun(cells: list[Cell]) -> bool:
     return all(n_lines(cell.folder / "trials.jsonl") for cell in cells)
-
-
-def test_cell_of_a_killed_shell_worker_is_rerun(tmp_path: Path, shell: ShellCluster) -> None:
-    victim, _ = shell.only(2)
-    _, cells = two_cells(tmp_path, n_total=600)
-
-    def kill() -> None:
-        wait_until(lambda: have_begun(cells))
-        victim.kill()
-
-    killer = threading.Thread(target=kill)
-    killer.start()
-    notes: list[str] = []
-    outcomes = list(run_cells(cells, on(shell), notes.append))
-    killer.join()
-    assert [outcome.fault for outcome in outcomes] == ["", ""]
-    assert all(finished_before(cell) for cell in cells)
-    assert [note for note in notes if note.startswith("a worker was lost; BBO, random-3, seed ")]
 
 
 def test_cell_that_kills_workers_reports_its_failure(tmp_path: Path) -> None:

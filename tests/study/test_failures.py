@@ -17,7 +17,6 @@ from armwright.llm.feedback import Feedback
 from armwright.pareto import hypervolume
 from armwright.search.samplers import SAMPLERS
 from armwright.study.optuna_export import export_study
-from armwright.study.progress import Progress
 from armwright.study.workers import evaluation_process
 from tests.torture.short import armwright
 
@@ -102,9 +101,7 @@ def test_pages_figures_and_prompts_show_failures(run: Path) -> None:
 
 @pytest.mark.slow
 def test_exported_study_has_failed_trials(run: Path) -> None:
-    exported = export_study(run)
-    (study,) = optuna.get_all_study_summaries(f"sqlite:///{exported.database}")
-    trials = optuna.load_study(study_name=study.study_name, storage=f"sqlite:///{exported.database}").trials
+    trials = optuna.load_study(study_name=None, storage=f"sqlite:///{export_study(run)}").trials
     _, history = aw.read_run(run)
     states = [trial.state == optuna.trial.TrialState.FAIL for trial in trials]
     assert states == history.failed.tolist()
@@ -167,27 +164,6 @@ def test_run_goes_on_if_one_of_the_first_evaluations_succeeds() -> None:
     found = aw.optimize(aw.Problem(TASK, SPACE, evaluator=second), **SHORT)
     assert found.summary["failures"]["exception"] == len(calls) - 1
     assert [member.number for member in found.front] == [1]
-
-
-def test_reference_point_follows_the_first_five_successes(tmp_path: Path) -> None:
-    calls: list[int] = []
-
-    @aw.evaluator("reach [m]")
-    def later(arm: aw.Arm, task: aw.Task) -> float:
-        calls.append(1)
-        if len(calls) <= 9:
-            raise TypeError("wrong argument")
-        return length_of(arm)
-
-    points: list[float | None] = []
-
-    def watch(progress: Progress) -> None:
-        points.append(progress.hypervolume)
-
-    found = aw.optimize(aw.Problem(TASK, SPACE, evaluator=later), **SHORT, allow_failures=True, watch=watch)
-    values = found.history.values[~found.history.failed, 0]
-    assert found.config.reference_point == pytest.approx([1.1 * values[:5].min()])
-    assert points[-1] == pytest.approx(found.summary["hypervolume"]["final"])
 
 
 def test_reference_point_of_rare_successes_is_the_same_after_a_resumption(tmp_path: Path) -> None:

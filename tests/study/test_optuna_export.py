@@ -1,28 +1,18 @@
-"""Runs exported to Optuna, read back with Optuna, its figures, and optuna-dashboard in a real browser."""
+"""Runs exported to Optuna, read back with Optuna and its figures."""
 
 import os
-import re
-import shlex
-import socket
-import subprocess
 import sys
-import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
 import optuna
 import pytest
-from optuna.artifacts import FileSystemArtifactStore, download_artifact, get_all_artifact_meta
 from optuna.exceptions import ExperimentalWarning, StorageInternalError
 from optuna.trial import TrialState
-from optuna_dashboard import get_note, save_note
-from playwright.sync_api import Browser, expect
 from typer.testing import CliRunner, Result
 
 from armwright.cli.app import app
@@ -35,12 +25,10 @@ from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.optuna_distributions import distributions
 from armwright.study.front.front_run import find_front
-from armwright.study.optuna_export import ARTIFACTS, STUDY_DB, ExportedStudy, export_study
+from armwright.study.optuna_export import STUDY_DB, export_study
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
-from tests.support.browser import Tab
-from tests.support.command_line import PATIENCE
 
 SPACE = DesignSpace.model_validate({"name": "some", "joints": [2, 4], "actuators": ["XL430-W250", "XM430-W350"]})
 TASK = Task.model_validate(
@@ -52,7 +40,7 @@ TASK = Task.model_validate(
         "reference_point": [0.6, 60.0, 2.0],
     }
 )
-REASON = 'one <img src=x onerror="document.title=1"> | **two**, $x^2$ and [three](http://127.0.0.1:9/a.png)\n# four'
+REASON = "one | **two**\n# four"
 
 
 class Talker(Proposer):
@@ -187,60 +175,6 @@ def test_optuna_computes_the_same_hypervolume(plain: Path) -> None:
     assert np.allclose(curve.y, history.hypervolumes, rtol=1e-12)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("which", ["run", "plain"])
-def test_optuna_plots_an_exported_study(which: str, request: pytest.FixtureRequest) -> None:
-    matplotlib.use("agg")
-    folder = request.getfixturevalue(which)
-    _, history = read_run(folder)
-    names = set(distributions(history.problem.space))
-
-    def error(trial: optuna.trial.FrozenTrial) -> float:
-        return trial.values[0]
-
-    about: dict[str, Any] = {"target": error, "target_name": "position_error"}
-    with opened(folder / STUDY_DB) as study, warnings.catch_warnings():
-        warnings.simplefilter("ignore", ExperimentalWarning)
-        warnings.filterwarnings("ignore", "PedAnova|Param .* unique value")  # Optuna's own
-        front = optuna.visualization.plot_pareto_front(study)
-        best = front.data[-1]
-        assert set(zip(best.x, best.y, strict=True)) >= {member.values[:2] for member in history.front}
-        assert all(objective.name in str(front.layout) for objective in history.problem.objectives)
-        assert optuna.visualization.plot_slice(study, **about).data
-        assert optuna.visualization.plot_parallel_coordinate(study, **about).data
-        importances = set(optuna.visualization.plot_param_importances(study, **about).data[0].y)
-        assert importances
-        assert importances == names if which == "plain" else importances <= names  # all parameters of each design
-        optuna.visualization.matplotlib.plot_slice(study, **about)
-        plt.close("all")
-
-
-def test_dashboard_note_lists_the_front(run: Path) -> None:
-    _, history = read_run(run)
-    assert history.front
-    with opened(run / STUDY_DB) as study:
-        note = get_note(study)
-    for member in history.front:
-        assert f"| {member.number} | {member.design.joints} |" in note
-
-
-def test_front_designs_have_urdf_artifacts(run: Path, tmp_path: Path) -> None:
-    _, history = read_run(run)
-    store = FileSystemArtifactStore(run / ARTIFACTS)
-    front = {member.number for member in history.front}
-    assert front
-    with opened(run / STUDY_DB) as study:
-        found = {trial.number: get_all_artifact_meta(trial, storage=study._storage) for trial in study.trials}
-    assert {number for number, artifacts in found.items() if artifacts} == front
-    for number in front:
-        (artifact,) = found[number]
-        assert (artifact.filename, artifact.mimetype) == (f"some-{number}.urdf", "application/xml")
-        copy = tmp_path / artifact.filename
-        download_artifact(artifact_store=store, file_path=str(copy), artifact_id=artifact.artifact_id)
-        assert copy.read_bytes() == (run / "designs" / f"{number:04d}" / "arm.urdf").read_bytes()
-    assert len(list((run / ARTIFACTS).iterdir())) == len(front)
-
-
 def test_exported_study_can_be_continued(plain: Path, tmp_path: Path) -> None:
     """An export never replaces trials added to it."""
     database, problem = tmp_path / STUDY_DB, Problem(load_task("target-1"))
@@ -249,14 +183,11 @@ def test_exported_study_can_be_continued(plain: Path, tmp_path: Path) -> None:
         study.sampler = optuna.samplers.TPESampler(seed=0)
         trial = study.ask(distributions(problem.space))
         study.tell(trial, problem.evaluate([problem.space.from_free_values(trial.params)]).values[0].tolist())
-        save_note(study, "mine")
     before = database.read_bytes()
-    artifacts = set((tmp_path / ARTIFACTS).iterdir())
     result = exported(plain, "--out", str(database))
     assert isinstance(result.exception, RunFolderError)
     assert "exists, and may hold notes or trials of yours" in str(result.exception)
     assert database.read_bytes() == before
-    assert set((tmp_path / ARTIFACTS).iterdir()) == artifacts
     with opened(database) as study:
         assert len(study.trials) == 21
 
@@ -278,7 +209,6 @@ def test_only_an_export_writes_a_database(tmp_path: Path) -> None:
     problem, folder = Problem(load_task("target-1")), tmp_path / "run"
     optimize(problem, proposer="none", n_total=1, out=folder)
     assert not (folder / STUDY_DB).exists()
-    assert not (folder / ARTIFACTS).exists()
 
     def stop(progress: Any) -> None:
         raise KeyboardInterrupt
@@ -287,9 +217,7 @@ def test_only_an_export_writes_a_database(tmp_path: Path) -> None:
         optimize(problem, proposer="none", n_total=9, out=folder, watch=stop)
     result = exported(folder)
     assert result.exit_code == 0, result.output
-    assert (
-        result.output.splitlines()[-1].strip() == ExportedStudy(folder / STUDY_DB, folder / ARTIFACTS).dashboard_command
-    )
+    assert result.output.splitlines()[-1].strip() == f"optuna-dashboard sqlite:///{folder / STUDY_DB}"
     _, history = read_run(folder)
     assert 11 < len(history) < 19
     with opened(folder / STUDY_DB) as study:
@@ -303,7 +231,7 @@ def test_only_an_export_writes_a_database(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_front_search_is_exported(tmp_path: Path) -> None:
     found = find_front(Problem(load_task("target-1")), evaluations=1000, out=tmp_path / "front")
-    with opened(export_study(tmp_path / "front").database) as study:
+    with opened(export_study(tmp_path / "front")) as study:
         assert sorted(trial.values for trial in study.best_trials) == sorted(list(m.values) for m in found.front)
         assert {trial.user_attrs["source"] for trial in study.trials} == {"front_search"}
         assert study.user_attrs["method"]["search"] == "front_search"
@@ -315,7 +243,7 @@ def test_folder_with_an_undecodable_name_is_exported(plain: Path, tmp_path: Path
     folder.mkdir()
     for name in ("config.yaml", "trials.jsonl", "summary.json"):
         (folder / name).write_bytes((plain / name).read_bytes())
-    with opened(export_study(folder, tmp_path / STUDY_DB).database) as study:
+    with opened(export_study(folder, tmp_path / STUDY_DB)) as study:
         assert study.study_name == "run-?"
 
 
@@ -328,7 +256,7 @@ def test_failed_export_leaves_no_database(plain: Path, tmp_path: Path, monkeypat
         patch.setattr(optuna.Study, "add_trials", fail)
         with pytest.raises(RunFolderError, match=r"cannot write .*study\.db: database or disk is full"):
             export_study(plain, tmp_path / STUDY_DB)
-    assert [path.name for path in tmp_path.iterdir()] == [ARTIFACTS]
+    assert not list(tmp_path.iterdir())
     export_study(plain, tmp_path / STUDY_DB)
 
 
@@ -345,74 +273,3 @@ def test_invalid_exports_are_refused(plain: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "nothing").exists()
     unknown = CliRunner().invoke(app, ["export", str(plain), "--format", "optunaa"])
     assert 'Did you mean "optuna"' in str(unknown.exception)
-
-
-@contextmanager
-def dashboard(command: list[str], port: int) -> Iterator[str]:
-    """Serve with the real program."""
-    program = str(Path(sys.executable).with_name(command[0]))
-    with subprocess.Popen(
-        [program, *command[1:], "--port", str(port)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    ) as server:
-        try:
-            assert server.stdout is not None
-            while b"Listening" not in (line := server.stdout.readline()):
-                assert line, "it did not begin"
-            deadline = time.monotonic() + PATIENCE
-            while True:  # it says so before it accepts connections
-                with suppress(ConnectionRefusedError), socket.create_connection(("127.0.0.1", port)):
-                    break
-                assert time.monotonic() < deadline, "it accepts no connection"
-            yield f"http://127.0.0.1:{port}/dashboard"
-        finally:
-            server.kill()
-
-
-def free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
-
-
-def test_optuna_dashboard_shows_an_exported_study(run: Path, browser: Browser) -> None:
-    _, history = read_run(run)
-    number = max(member.number for member in history.front)
-    proposed = next(trial for trial in history if trial.source == "talker")
-    content = (run / "designs" / f"{number:04d}" / "arm.urdf").read_bytes()
-    command = shlex.split(ExportedStudy(run / STUDY_DB, run / ARTIFACTS).dashboard_command)
-    before = (run / STUDY_DB).read_bytes()
-    tab = Tab(browser, viewport={"width": 1400, "height": 1600}, accept_downloads=True)
-    page = tab.page
-    with dashboard(command, free_port()) as address:
-        page.goto(f"{address}/studies/1")
-        expect(page.get_by_text("Pareto Front")).to_be_visible()
-        expect(page.locator("body")).to_contain_text("worst_error")
-        expect(page.locator(".scatterlayer .point")).not_to_have_count(0)
-        expect(page.locator("body")).to_contain_text("Hyperparameter Importance")
-
-        page.goto(f"{address}/studies/1/trials?numbers={number}")
-        shown = page.locator("body")
-        expect(shown).to_contain_text(f"Trial {number} (trial_id={number + 1})")
-        expect(shown).to_contain_text("Best Trial")
-        expect(shown).to_contain_text(f"source {history.trials[number].source}")
-        expect(shown).to_contain_text(f"joints {history.trials[number].design.joints}")
-        expect(shown).to_contain_text(f"verdict {verdicts_of(run, history)[number]}")
-        for name in history.trials[number].design.params:
-            expect(shown).to_contain_text(f"{name} ")
-        with page.expect_download() as download:
-            page.get_by_label(re.compile("download", re.IGNORECASE)).first.click()
-        assert download.value.suggested_filename == f"some-{number}.urdf"
-        assert download.value.path().read_bytes() == content
-
-        # A model's words are shown as they are: no picture is fetched, no script runs.
-        page.goto(f"{address}/studies/1/trials?numbers={proposed.number}")
-        expect(shown).to_contain_text("source talker")
-        expect(shown).to_contain_text('one <img src=x onerror="document.title=1"> | **two**, $x^2$ and [three]')
-        expect(page.get_by_role("link", name="three")).to_have_count(0)
-
-        page.goto(f"{address}/studies/1/note")
-        expect(page.get_by_role("cell", name=str(number), exact=True).first).to_be_visible()
-    assert not [url for url in tab.requests if not url.startswith(address.removesuffix("/dashboard"))]
-    assert not tab.faults
-    tab.close()
-    assert (run / STUDY_DB).read_bytes() == before, "to look changes nothing"

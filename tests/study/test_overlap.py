@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from armwright.exceptions import ProposalError, SettingsError
+from armwright.exceptions import ProposalError
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
@@ -112,21 +112,6 @@ def test_answer_becomes_the_next_trial_after_its_arrival() -> None:
         "ratio_with_failures": 0.2,
         "feedback_age": {"mean": 2.5, "max": 3},
     }
-
-
-def test_black_box_waits_when_a_block_ahead() -> None:
-    """Four black-box trials a block; the fifth has to wait for the answer."""
-    proposer = Held()
-    seen: list[tuple[int, int]] = []
-
-    def watch(progress: Progress) -> None:
-        seen.append((progress.number, progress.n_in_flight))
-        if progress.doing == "finished" and progress.number == 7:
-            threading.Timer(0.05, proposer.release, (4,)).start()  # nothing can be drawn until then
-
-    run = search(proposer, n_total=5, watch=watch)
-    assert [trial.source for trial in run.trials[4:]] == ["bbo"] * 4 + ["held"]
-    assert (7, 1) in seen
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -248,11 +233,6 @@ def test_proposer_exception_ends_the_study() -> None:
 
     with pytest.raises(ZeroDivisionError, match="a bug of its own"):
         search(Broken())
-
-
-def test_invalid_in_flight_is_refused() -> None:
-    with pytest.raises(SettingsError, match="in_flight: expected a whole number"):
-        search(Held(), in_flight=0)
 
 
 @pytest.mark.parametrize("stop", [6, 13])

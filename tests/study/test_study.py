@@ -16,7 +16,6 @@ from optuna.samplers import BaseSampler, NSGAIISampler, QMCSampler, RandomSample
 from armwright.exceptions import ProposalError, RunConflictError, RunFolderError, SettingsError, TaskError
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.search.samplers import SamplerFactory
 from armwright.spaces.parameters import Design
@@ -90,12 +89,6 @@ def test_front_members_are_the_non_dominated_trials_with_their_arms() -> None:
     assert run.front[0].arm == PROBLEM.arm(run.front[0].design)
 
 
-def test_equal_seeds_give_equal_runs() -> None:
-    assert designs(short()) == designs(short())
-    other = optimize(PROBLEM, proposer="none", n_init=5, n_total=8, seed=1)
-    assert other.trials[0].design != short().trials[0].design
-
-
 def test_open_reference_point_is_frozen(tmp_path: Path) -> None:
     run = short(tmp_path / "run", OPEN)
     first = np.array([trial.values for trial in run.trials[:5]])
@@ -104,12 +97,6 @@ def test_open_reference_point_is_frozen(tmp_path: Path) -> None:
     more = short(tmp_path / "run", OPEN, n_total=16)
     assert more.config.reference_point == run.config.reference_point
     assert more.hypervolume[:8] == pytest.approx(run.hypervolume)
-
-
-def test_failed_proposal_becomes_black_box_trial() -> None:
-    run = short(proposer=Listed(faulty=(9,)))
-    assert (run.trials[9].source, run.trials[9].fault, run.trials[9].proposal) == ("bbo", "timeout", None)
-    assert run.summary["proposer"]["failures"] == {"timeout": 1}
 
 
 def test_failing_proposer_is_counted_and_flagged() -> None:
@@ -254,17 +241,6 @@ def test_changed_settings_are_refused_with_differences(tmp_path: Path) -> None:
         assert difference in str(refusal.value)
 
 
-def test_parameter_order_of_proposals_is_irrelevant(tmp_path: Path) -> None:
-    class Backwards(Listed):
-        def propose(self, history: History, seed: int, number: int) -> Proposal:
-            proposal = super().propose(history, seed, number)
-            return Proposal(Design(dict(reversed(proposal.design.params.items()))), proposal.id)
-
-    run = short(tmp_path / "run", proposer=Backwards())
-    assert designs(run) == designs(short(proposer=Listed()))
-    assert [t.values for t in read_run(tmp_path / "run")[1]] == [t.values for t in run.trials]
-
-
 def test_folder_without_trials_accepts_any_settings(tmp_path: Path) -> None:
     def fail(progress: Progress) -> None:
         raise KeyboardInterrupt
@@ -291,19 +267,6 @@ def test_second_writer_of_a_run_is_refused(tmp_path: Path) -> None:
             short(tmp_path / "run")
 
     optimize(PROBLEM, proposer="none", n_init=2, n_total=1, out=tmp_path / "run", watch=second)
-
-
-def test_sampler_factory_is_used_and_named(tmp_path: Path) -> None:
-    def uniform(seed: int) -> BaseSampler:
-        return RandomSampler(seed=seed)
-
-    run = optimize(PROBLEM, proposer="none", sampler=uniform, n_init=2, n_total=3, out=tmp_path / "run")
-    named = optimize(PROBLEM, proposer="none", sampler="random", n_init=2, n_total=3)
-    assert designs(run) == designs(named)
-    assert run.config.method.sampler.startswith("line ")
-    assert run.config.method.sampler.endswith(
-        " of tests.study.test_study, test_sampler_factory_is_used_and_named.<locals>.uniform"
-    )
 
 
 def test_changed_sampler_factory_is_refused(tmp_path: Path) -> None:
@@ -355,24 +318,11 @@ def test_settings_out_of_range_are_refused(settings: dict[str, int]) -> None:
         optimize(PROBLEM, proposer="none", **settings)
 
 
-def test_front_outside_reference_box_has_no_hypervolume() -> None:
-    content = {"name": "far", "targets": [[9.0, 0.0, 0.0]], "reference_point": [1.0, 1.0]}
-    problem = Problem(Task.model_validate(content | {"constraints": ["worst_error <= 12"]}))
-    run = short(problem=problem)
-    assert run.hypervolume.tolist() == [0.0] * 8
-    assert run.front
-
-
 def test_study_runs_with_one_and_eight_joints() -> None:
     for joints in (1, 8):
         space = PROBLEM.space.model_copy(update={"joints": joints})
         run = optimize(Problem(PROBLEM.task, space), proposer="rules", n_init=3, n_step=2, n_total=4)
         assert len(run.trials) == 7
-
-
-def test_history_reevaluates_trials_to_equal_values() -> None:
-    history = short().history
-    assert PROBLEM.outcomes(history.evaluation(range(13))).values.tolist() == [list(trial.values) for trial in history]
 
 
 @pytest.mark.parametrize("search", [optimize, find_front])

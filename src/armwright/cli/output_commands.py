@@ -1,5 +1,6 @@
 """Commands that show and export what a run holds: pick, export, report, live, prompt, doctor."""
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -95,9 +96,9 @@ def export(
         if design is not None:
             raise SettingsError(f"--design {design} does not go with --format optuna, which exports the whole run")
         with activity(f"exporting {run}"):
-            study = export_study(run, out)
-        print_text(f"{study.database}; to view it in a browser (pip install optuna-dashboard):")
-        print_text(f"  {study.dashboard_command}")
+            database = export_study(run, out)
+        print_text(f"{database}; to view it in a browser (pip install optuna-dashboard):")
+        print_text(f"  {shlex.join(['optuna-dashboard', f'sqlite:///{database.as_posix()}'])}")
         return
     with activity(f"exporting a design of {run}"):
         text = export_design(run, design, format_)
@@ -175,9 +176,7 @@ def prompt(
     from armwright.llm.configuration import load_model_options
     from armwright.llm.prompt import whole_template
     from armwright.llm.prompt_values import VARIABLES
-    from armwright.spaces.design_space import load_space
     from armwright.study.prompt_preview import preview, preview_after
-    from armwright.tasks.catalogue import load_task
 
     if variables:
         print_text("\n".join(f"{name}: {description}" for name, description in VARIABLES.items()))
@@ -194,22 +193,16 @@ def prompt(
         n_init = 10 if n_init is None else n_init
         shown = preview(load_problem(task, space, evaluator=evaluator), options, n_init=n_init, seed=seed or 0)
     else:
-        for option, value in (("--n-init", n_init), ("--seed", seed), ("--evaluator", evaluator)):
+        new = {"TASK": task, "--space": space, "--evaluator": evaluator, "--n-init": n_init, "--seed": seed}
+        for option, value in new.items():
             if value is not None:
                 raise SettingsError(f"{option} {value} is for a new run; {after} has its own")
-        shown = preview_after(
-            after,
-            options,
-            task=None if task is None else load_task(task),
-            space=None if space is None else load_space(space),
-            number=number,
-        )
+        shown = preview_after(after, options, number=number)
     if schema:
         print_json(shown.schema)
         return
     print_text(shown.prompt, end="")
-    note = f"; {shown.note}" if shown.note else ""
-    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}{note}")
+    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}")
 
 
 def doctor(

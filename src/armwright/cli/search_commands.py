@@ -33,7 +33,7 @@ from armwright.cli.options import (
 )
 from armwright.cli.signals import interruptible
 from armwright.cli.streams import exit_interrupted, open_console, print_command, print_json, repeat_command
-from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
+from armwright.exceptions import AnswerPendingError, StoppedError
 
 
 def design(
@@ -54,9 +54,6 @@ def design(
     from_: Annotated[
         Path | None, typer.Option("--from", help="Use all designs of this run as initial designs.")
     ] = None,
-    proposer: Annotated[
-        str | None, typer.Option(help="Proposer of the initial designs: rules, or a configured model (llm).")
-    ] = None,
     robust: Robust = False,
     device: DeviceName = "auto",
     figures: Figures = True,
@@ -74,24 +71,16 @@ def design(
     from armwright.cli.notes import space_note
     from armwright.cli.progress import announce_compilation, search_progress
     from armwright.cli.show_results import show_search
-    from armwright.proposers.factory import choose_proposer
     from armwright.study.front.front_run import find_front
     from armwright.study.front.search_budget import SearchBudget
     from armwright.study.front.time_plan import TimePlan
 
-    if from_ is not None and proposer is not None:
-        raise SettingsError("--from and --proposer both set the initial designs; use one of them")
     console = open_console(json_)
     announce_compilation(console)
     plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=figures, started=started)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
     if space is None and (note := space_note(problem)):
         console.print(note)
-    choice = None if proposer is None else choose_proposer(proposer)
-    if choice is not None:
-        if choice.proposer is None:
-            raise SettingsError(f"--proposer {proposer} proposes no initial designs; leave it out")
-        console.print(choice.reason)
     folder = out or Path("runs") / f"{problem.task.name}-design-seed{seed}"
     check_before_search(console, problem, check_files(task, space), folder)
     try:
@@ -100,7 +89,7 @@ def design(
                 problem,
                 budget=plan,
                 seed=seed,
-                initial_designs=from_ if choice is None else choice.proposer,
+                initial_designs=from_,
                 stop_at_stall=stall,
                 out=folder,
                 watch=watch,

@@ -44,8 +44,7 @@ def repeat_command(config: RunConfig, folder: Path, spent: int | None = None) ->
     if is_named and _content(default_space(name)) != _content(config.space):
         settings["space"] = spaces[0]
     if isinstance(config.method, FrontMethod):
-        first = config.method.initial_designs or {}
-        settings |= {"evaluations": spent, "from": first.get("run"), "proposer": first.get("proposer", {}).get("name")}
+        settings |= {"evaluations": spent, "from": (config.method.initial_designs or {}).get("run")}
         command = "design"
     else:
         command = "optimize"

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, get_args
 
-from pydantic import PlainSerializer
+from pydantic import Field, PlainSerializer
 
 from armwright.files import replace_surrogates
 
@@ -29,7 +29,7 @@ class Failure:
     reason: _Text
     error: _Text = ""
     place: _Text = ""
-    traceback: str = field(default="", compare=False, repr=False)
+    traceback: Annotated[str, Field(exclude=True)] = field(default="", compare=False, repr=False)
 
     @property
     def description(self) -> str:

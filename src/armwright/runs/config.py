@@ -32,27 +32,17 @@ PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai
 
 
 class Method(BaseModel, frozen=True, extra="forbid"):
-    """The search settings of a study.
+    """The search settings of a study."""
 
-    Attributes:
-        proposer: Its name and settings; None for black-box trials only.
-        sampler: The name of the sampler.
-        n_init: Number of random trials.
-        n_step: Trials of a block; one of each block is the proposer's.
-        n_total: Number of counted trials.
-        in_flight: Requests to the proposer that run while black-box trials continue; None to wait for each.
-        initial_designs: Designs of the first of the n_init trials.
-        screen: Whether the surrogate decides which proposals are evaluated.
-    """
-
-    proposer: dict[str, Any] | None
+    proposer: dict[str, Any] | None  # its name and settings; None for black-box trials only
     sampler: str
-    n_init: int = Field(ge=1)
-    n_step: int = Field(ge=1)
-    n_total: int = Field(ge=1)
+    n_init: int = Field(ge=1)  # number of random trials
+    n_step: int = Field(ge=1)  # trials of a block; one of each block is the proposer's
+    n_total: int = Field(ge=1)  # number of counted trials
+    # Requests to the proposer that run while black-box trials continue; None to wait for each
     in_flight: int | None = Field(default=None, ge=1)
-    initial_designs: tuple[dict[str, float | str], ...] = ()
-    screen: bool = False
+    initial_designs: tuple[dict[str, float | str], ...] = ()  # designs of the first of the n_init trials
+    screen: bool = False  # whether the surrogate decides which proposals are evaluated
 
     @field_validator("proposer")
     @classmethod
@@ -114,33 +104,21 @@ def record_objectives(objectives: Sequence[Objective]) -> tuple[ObjectiveRecord,
 
 
 class RunConfig(BaseModel, frozen=True, extra="forbid"):
-    """Everything needed to repeat a run.
-
-    Attributes:
-        task: The task.
-        space: The design space.
-        tolerance: Build tolerance of the problem [m].
-        device: Device of the problem.
-        objectives: What is minimised, in the order of the trials' values.
-        reference_point: The task's, or the one chosen after the first n_init trials; None until then.
-        method: The search settings.
-        seed: Seed of all random numbers.
-        evaluator: Name of the custom evaluator; never loaded from here.
-        versions: Versions that the results depend on.
-        earlier_versions: Versions of earlier sessions, if they differ.
-    """
+    """Everything needed to repeat a run."""
 
     task: Task
     space: DesignSpace
-    tolerance: float = Field(default=0.0, ge=0.0)
-    device: Device = "cpu"
+    tolerance: float = Field(default=0.0, ge=0.0)  # build tolerance of the problem [m]
+    device: Device = "cpu"  # device of the problem
+    # What is minimised, in the order of the trials' values
     objectives: tuple[ObjectiveRecord, ...] = record_objectives(PAPER_OBJECTIVES)
+    # The task's, or the one chosen after the first n_init trials; None until then
     reference_point: tuple[Annotated[float, Field(le=2.0 * LARGEST_OBJECTIVE)], ...] | None
     method: Method | FrontMethod
-    seed: int
-    evaluator: str | None = None
-    versions: dict[str, str]
-    earlier_versions: list[dict[str, str]] = []
+    seed: int  # seed of all random numbers
+    evaluator: str | None = None  # name of the custom evaluator; never loaded from here
+    versions: dict[str, str]  # versions that the results depend on
+    earlier_versions: list[dict[str, str]] = []  # versions of earlier sessions, if they differ
 
     @cached_property
     def problem(self) -> Problem:

@@ -43,16 +43,11 @@ class Hint:
 
 
 class Control(BaseModel, frozen=True, extra="forbid", strict=True):
-    """A request to a study.
+    """A request to a study."""
 
-    Attributes:
-        paused: No trial begins.
-        stop: The session ends before the next trial.
-        hints: All hints of the run, used ones included, by increasing id.
-    """
-
-    paused: bool = False
-    stop: bool = False
+    paused: bool = False  # no trial begins
+    stop: bool = False  # the session ends before the next trial
+    # All hints of the run, used ones included, by increasing id
     hints: tuple[Hint, ...] = Field(default=(), max_length=MAX_HINTS)
 
     @field_validator("hints")
@@ -65,21 +60,14 @@ class Control(BaseModel, frozen=True, extra="forbid", strict=True):
 
 
 class Status(BaseModel, frozen=True, extra="forbid", strict=True):
-    """The status of a study.
+    """The status of a study."""
 
-    Attributes:
-        pid: Its process, which may have been killed since.
-        doing: Its activity.
-        number: The trial at which the activity began; the number of trials of a finished study.
-        since: When the activity began [s since 1970].
-        fault: Why the last request to the model, or the session, failed; empty if it did not.
-    """
-
-    pid: int = Field(gt=0, lt=2**31)
+    pid: int = Field(gt=0, lt=2**31)  # its process, which may have been killed since
     doing: Doing
+    # The trial at which the activity began; the number of trials of a finished study
     number: int = Field(ge=0, lt=2**31)
-    since: float = Field(allow_inf_nan=False)
-    fault: str = ""
+    since: float = Field(allow_inf_nan=False)  # when the activity began [s since 1970]
+    fault: str = ""  # why the last request to the model, or the session, failed; empty if it did not
 
 
 Content = TypeVar("Content", bound=BaseModel)

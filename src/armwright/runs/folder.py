@@ -4,7 +4,7 @@
     trials.jsonl       one line per finished trial, written before the next begins
     transcripts.jsonl  every call to a language model (llm/transcript.py)
     control.json, status.json  channel between a running study and its watchers (control.py)
-    search.npz, proposals/  state and initial designs of a direct search (study/front/front_run.py)
+    search.npz         state of a direct search (study/front/direct_search.py)
     trials.csv, front.csv, summary.json, designs/NNNN/ (results.py), and figures/ (pictures/figures.py)
 
 The files of the last line are derived from the finished trials and can be written again.
@@ -39,10 +39,9 @@ LOCK_SECONDS = 2.0  # to wait for it: the workers of a killed experiment take a 
 CONFIG = "config.yaml"
 MAX_CONFIG = 4 * MAX_BYTES  # [bytes]; a task and a space with all their defaults
 KEPT = ". What was written before is safe; free room or give another --out DIR, and run the same command again"
-PROPOSALS = "proposals"
 SEARCH = "search.npz"
 REACH_MAPS = "reach-maps"
-BEFORE_TRIALS = {LOCK, CONFIG, TRIALS, "transcripts.jsonl", *CHANNEL_FILES, PROPOSALS}
+BEFORE_TRIALS = {LOCK, CONFIG, TRIALS, "transcripts.jsonl", *CHANNEL_FILES}
 
 
 class RunFolder:

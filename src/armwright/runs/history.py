@@ -62,22 +62,15 @@ class FrontMember:
 
 @dataclass(frozen=True)
 class History:
-    """The finished trials of a study by number; the first `n_init` are random.
-
-    Attributes:
-        problem: The problem.
-        trials: The trials.
-        n_init: Number of random trials.
-        frozen_reference_point: The one chosen from the random trials, if the task states none.
-        method: The search settings of the study; None outside one.
-        earlier: Values of the history that this one extends (`grown`), with its number of trials.
-    """
+    """The finished trials of a study by number; the first `n_init` are random."""
 
     problem: Problem
     trials: Sequence[FinishedTrial]
-    n_init: int
+    n_init: int  # number of random trials
+    # The one chosen from the random trials, if the task states none
     frozen_reference_point: tuple[float, ...] | None = None
-    method: Method | None = None
+    method: Method | None = None  # the search settings of the study; None outside one
+    # Values of the history that this one extends (`grown`), with its number of trials
     earlier: Mapping[str, tuple[int, Any]] = field(
         default_factory=dict[str, tuple[int, Any]], repr=False, compare=False
     )

@@ -52,19 +52,12 @@ _Text = Annotated[str, PlainSerializer(replace_surrogates)]
 
 @dataclass(frozen=True)
 class ScreenedOut:
-    """A proposal that was not evaluated, because the surrogate expected too little of it.
+    """A proposal that was not evaluated, because the surrogate expected too little of it."""
 
-    Attributes:
-        source: name of the proposer.
-        proposal: its id.
-        gain: expected gain of hypervolume, as a share of the best candidate's.
-        predicted: objectives that the surrogate predicted.
-    """
-
-    source: str
-    proposal: str
-    gain: float
-    predicted: tuple[float, ...]
+    source: str  # name of the proposer
+    proposal: str  # its id
+    gain: float  # expected gain of hypervolume, as a share of the best candidate's
+    predicted: tuple[float, ...]  # objectives that the surrogate predicted
 
     def describe(self, objectives: Sequence[Objective]) -> str:
         """Return in one line what was predicted of the proposal."""
@@ -76,44 +69,29 @@ class ScreenedOut:
 
 @dataclass(frozen=True)
 class FinishedTrial:
-    """Hold one evaluated design.
-
-    Attributes:
-        number: of the trial in its run, from 0.
-        source: `random`, `initial_design`, `bbo`, `front_search`, or the name of the proposer.
-        design: what was evaluated.
-        values: the objectives; infinite if its evaluation failed, and left out of its line.
-        proposal: the proposal's id, if a proposer made the design.
-        reason: why the proposer suggested it.
-        expected: objectives that the proposer expected.
-        fault: why a trial that was a proposer's became a black-box one.
-        asked: the trial that the proposal was asked for, if another one.
-        feedback: how many finished trials the proposer knew, if not all before this one.
-        duplicate_of: the earlier trial with an equal design, whose values it has; it was not evaluated again.
-        seconds: wall time by part (total, proposing, sampling, evaluation).
-        sampler_notes: attributes that the sampler set on its trial and study, needed to resume.
-        violations: of each constraint; satisfied at <= 0.
-        failure: why the custom evaluator gave no values, which makes the design infeasible.
-        screened: the proposal in whose place this design was drawn, because the surrogate expected little of it.
-    """
+    """Hold one evaluated design."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
-    number: int
-    source: str
-    design: _Params
-    values: _Objectives
-    proposal: str | None = None
-    reason: _Text = ""
-    expected: _Objectives | None = None
-    fault: str | None = None
-    asked: int | None = None
-    feedback: int | None = None
+    number: int  # of the trial in its run, from 0
+    source: str  # `random`, `initial_design`, `bbo`, `front_search`, or the name of the proposer
+    design: _Params  # what was evaluated
+    values: _Objectives  # the objectives; infinite if its evaluation failed, and left out of its line
+    proposal: str | None = None  # the proposal's id, if a proposer made the design
+    reason: _Text = ""  # why the proposer suggested it
+    expected: _Objectives | None = None  # objectives that the proposer expected
+    fault: str | None = None  # why a trial that was a proposer's became a black-box one
+    asked: int | None = None  # the trial that the proposal was asked for, if another one
+    feedback: int | None = None  # how many finished trials the proposer knew, if not all before this one
+    # The earlier trial with an equal design, whose values it has; it was not evaluated again
     duplicate_of: int | None = None
+    # Wall time by part (total, proposing, sampling, evaluation)
     seconds: _Seconds = field(default_factory=dict[str, float])
+    # Attributes that the sampler set on its trial and study, needed to resume
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
-    violations: _Violations = ()
-    failure: Failure | None = None
+    violations: _Violations = ()  # of each constraint; satisfied at <= 0
+    failure: Failure | None = None  # why the custom evaluator gave no values, which makes the design infeasible
+    # The proposal in whose place this design was drawn, because the surrogate expected little of it
     screened: ScreenedOut | None = None
 
     @property

@@ -22,7 +22,6 @@ from armwright.runs.history import RANDOM
 from armwright.runs.trial import FinishedTrial
 from armwright.search.callable_names import name_of
 from armwright.search.surrogate.cheap_features import FeatureFunction
-from armwright.search.surrogate.proposal_screen import Rejection
 from armwright.search.surrogate.sampler import SurrogateFactory, surrogate_sampler
 from armwright.seeding import SAMPLING, derived_seed
 from armwright.spaces.design_space import DesignSpace
@@ -165,7 +164,6 @@ class BlackBox:
                     params=params,
                     distributions={name: self._distributions[name] for name in params},
                     values=list(trial.values),
-                    user_attrs=_attributes(trial.source, trial.proposal),
                     system_attrs=dict(trial.sampler_notes.get("trial", {})),
                     constraints=self._constraint_values(trial.violations, trial.failure is not None),
                 )
@@ -184,10 +182,9 @@ class BlackBox:
             trial = self._study.ask()
             design = self._suggest(trial)
         self._assign_generation(sampler, trial)
-        trial.set_user_attr("source", source)
         return trial, design
 
-    def inject(self, design: Design, number: int, source: str, proposal: str | None) -> tuple[Trial, Design]:
+    def inject(self, design: Design, number: int) -> tuple[Trial, Design]:
         """Return a trial with a design from another source, and the design with normalised parameters.
 
         Raises:
@@ -196,14 +193,14 @@ class BlackBox:
         # Optuna only warns of values out of range, and leaves a trial with an unknown category RUNNING for ever.
         checked = self._space.design(design.params)
         sampler = self._study.sampler = self._factory(derived_seed(self._seed, SAMPLING, number))
-        self._study.enqueue_trial(self._space.free_values(checked), user_attrs=_attributes(source, proposal))
+        self._study.enqueue_trial(self._space.free_values(checked))
         trial = self._study.ask()
         self._suggest(trial)
         self._assign_generation(sampler, trial)
         return trial, checked
 
-    def rejection(self, design: Design, number: int) -> Rejection | None:
-        """Return why the surrogate advises against evaluating a design in trial `number`; None for other samplers."""
+    def rejection(self, design: Design, number: int) -> tuple[float, tuple[float, ...]] | None:
+        """Return the gain and the prediction of a design that the surrogate would not evaluate in trial `number`."""
         if not isinstance(self._factory, SurrogateFactory):
             return None
         return self._factory(derived_seed(self._seed, SAMPLING, number)).rejection(self._study, design)
@@ -270,10 +267,6 @@ def _notes(attributes: Mapping[str, Any], constraints: Sequence[str]) -> dict[st
     """Return the system attributes of a trial that the sampler wrote, without those of Optuna itself."""
     own = {"fixed_params", *(f"constraints:{name}" for name in constraints)}
     return {name: note for name, note in attributes.items() if name not in own}
-
-
-def _attributes(source: str, proposal: str | None) -> dict[str, Any]:
-    return {"source": source} if proposal is None else {"source": source, "proposal": proposal}
 
 
 def quiet_study(storage: InMemoryStorage, directions: Sequence[StudyDirection]) -> optuna.Study:

@@ -3,12 +3,10 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 from itertools import count, groupby
 
-from armwright.runs.config import Method
 from armwright.runs.history import History
-from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
 from armwright.study.schedule import AlternatingSchedule, Schedule
 
 POLL_SECONDS = 0.2  # between two checks for Ctrl-C, because a wait cannot be interrupted everywhere
@@ -24,19 +22,14 @@ class OverlappingSchedule(Schedule):
 
     Args:
         requests: requests to the proposer.
-        method: search settings of the run.
-        history: returns the finished trials.
         max_in_flight: requests at a time.
     """
 
-    def __init__(
-        self, requests: ProposalRequests, method: Method, history: Callable[[], History], max_in_flight: int
-    ) -> None:
+    def __init__(self, requests: ProposalRequests, max_in_flight: int) -> None:
         self._requests = requests
-        self._method = method
-        self._history = history
+        self._method = requests.method
         self._max_in_flight = max_in_flight
-        past = past_slots(history())
+        past = requests.past_slots()
         self._entered = len(past)
         self._asked = {slot.asked for slot in past}
         self._arrived: deque[list[ProposalSlot]] = deque()  # answers with all their designs
@@ -45,7 +38,7 @@ class OverlappingSchedule(Schedule):
         self._threads: list[threading.Thread] = []
         self.n_in_flight = 0
         self._change = threading.Condition()
-        for asked, slots in groupby(requests.unused(history()), lambda slot: slot.asked):
+        for asked, slots in groupby(requests.unused(), lambda slot: slot.asked):
             if asked in self._asked:
                 self._surplus.extend(slots)
             else:
@@ -78,9 +71,10 @@ class OverlappingSchedule(Schedule):
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
 
-    def upcoming(self, number: int) -> tuple[int, int]:
-        """Return the trial of the next request, once `number` trials are finished, and how many will be finished."""
-        return self._next_asked(), max(number, self._method.n_init + max(0, self._next_request_after()))
+    def upcoming(self, number: int) -> int:
+        """Return the trial of the next request: the first of a block without one."""
+        numbers = count(self._method.n_init, self._method.n_step * self._requests.per_call)
+        return next(number for number in numbers if number not in self._asked)
 
     def _take(self, counted: int) -> ProposalSlot | None:
         """Return the next slot, if one is due."""
@@ -105,11 +99,14 @@ class OverlappingSchedule(Schedule):
         while self.n_in_flight < self._max_in_flight and self._n_supplied() < self._method.n_proposals:
             if counted < self._next_request_after():
                 return
-            number = self._next_asked()
+            number = self.upcoming(counted + self._method.n_init)
             self._asked.add(number)
             self.n_in_flight += 1
             thread = threading.Thread(
-                target=self._request, args=(self._history(), number), name=f"armwright-request-{number}", daemon=True
+                target=self._request,
+                args=(self._requests.history(), number),
+                name=f"armwright-request-{number}",
+                daemon=True,
             )
             self._threads = [other for other in self._threads if other.is_alive()] + [thread]
             thread.start()
@@ -122,11 +119,6 @@ class OverlappingSchedule(Schedule):
     def _next_request_after(self) -> int:
         """Return the number of counted trials after which the next request is made."""
         return (self._n_supplied() - (self._max_in_flight - 1) * self._requests.per_call) * self._method.n_step
-
-    def _next_asked(self) -> int:
-        """Return the trial of the next request: the first of a block without one."""
-        numbers = count(self._method.n_init, self._method.n_step * self._requests.per_call)
-        return next(number for number in numbers if number not in self._asked)
 
     def _request(self, history: History, number: int) -> None:
         answer: list[ProposalSlot] = []
@@ -143,10 +135,7 @@ class OverlappingSchedule(Schedule):
             self._change.notify_all()
 
 
-def request_schedule(
-    requests: ProposalRequests, method: Method, history: Callable[[], History]
-) -> AlternatingSchedule | OverlappingSchedule:
+def request_schedule(requests: ProposalRequests) -> AlternatingSchedule | OverlappingSchedule:
     """Return the schedule of a proposer; its requests overlap with black-box trials if `in_flight` is set."""
-    if method.in_flight is None:
-        return AlternatingSchedule(requests, method, history)
-    return OverlappingSchedule(requests, method, history, method.in_flight)
+    in_flight = requests.method.in_flight
+    return AlternatingSchedule(requests) if in_flight is None else OverlappingSchedule(requests, in_flight)

@@ -15,58 +15,34 @@ Activity = Literal["beginning", "proposing", "paused", "finished"]
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a study: it begins, requests a proposal, is paused, or has finished a trial.
-
-    Attributes:
-        doing: the activity.
-        number: number of the trial.
-        iteration: counted trials finished; 0 during the random ones.
-        n_total: counted trials of the run.
-        hypervolume: hypervolume of the front, if there is a reference point.
-        front_size: designs on the front.
-        source: source of the trial.
-        n_in_flight: requests to the proposer that run while trials go on.
-        fault: kind of the fault of this trial.
-        faults: faults of all trials so far, by kind.
-        failures: failed evaluations so far, by kind.
-        latest_failures: trial and reason of the last failed evaluation of each kind.
-        note: message for the user, reported once.
-        reason: reason of the proposer for this trial's design.
-    """
+    """Progress of a study: it begins, requests a proposal, is paused, or has finished a trial."""
 
     doing: Activity
     number: int
-    iteration: int
-    n_total: int
-    hypervolume: float | None
-    front_size: int
-    source: str
-    n_in_flight: int = 0
-    fault: str | None = None
-    faults: Mapping[str, int] = field(default_factory=dict[str, int])
-    failures: Mapping[str, int] = field(default_factory=dict[str, int])
+    iteration: int  # counted trials finished; 0 during the random ones
+    n_total: int  # counted trials of the run
+    hypervolume: float | None  # hypervolume of the front, if there is a reference point
+    front_size: int  # designs on the front
+    source: str  # source of the trial
+    n_in_flight: int = 0  # requests to the proposer that run while trials go on
+    fault: str | None = None  # kind of the fault of this trial
+    faults: Mapping[str, int] = field(default_factory=dict[str, int])  # faults of all trials so far, by kind
+    failures: Mapping[str, int] = field(default_factory=dict[str, int])  # failed evaluations so far, by kind
+    # Trial and reason of the last failed evaluation of each kind
     latest_failures: Mapping[str, str] = field(default_factory=dict[str, str])
-    note: str = ""
-    reason: str = ""
+    note: str = ""  # message for the user, reported once
+    reason: str = ""  # reason of the proposer for this trial's design
 
 
 @dataclass(frozen=True)
 class RunResult:
-    """Result of a run.
+    """Result of a run."""
 
-    Attributes:
-        history: all trials.
-        config: settings of the run.
-        summary: content of summary.json.
-        folder: the run folder, if there is one.
-        resumed: number of trials of earlier sessions.
-    """
-
-    history: History
-    config: RunConfig
-    summary: dict[str, Any]
-    folder: Path | None
-    resumed: int
+    history: History  # all trials
+    config: RunConfig  # settings of the run
+    summary: dict[str, Any]  # content of summary.json
+    folder: Path | None  # the run folder, if there is one
+    resumed: int  # number of trials of earlier sessions
 
     @property
     def front(self) -> list[FrontMember]:

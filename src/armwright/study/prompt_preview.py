@@ -15,30 +15,19 @@ from armwright.proposers.replay import recorded_options
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
-from armwright.spaces.design_space import DesignSpace
 from armwright.study.overlapping_schedule import request_schedule
-from armwright.study.proposal_requests import ProposalRequests
+from armwright.study.proposal_requests import ProposalRequests, proposal_seed
 from armwright.study.study import optimize
-from armwright.tasks.task import Task
 
 
 @dataclass(frozen=True)
 class Preview:
-    """Prompt for a trial.
-
-    Attributes:
-        number: number of the trial.
-        prompt: the text.
-        tokens: estimated length of the prompt [tokens].
-        schema: JSON schema of the answer.
-        note: trials that will be in the prompt when it is sent; empty if there are none.
-    """
+    """Prompt for a trial."""
 
     number: int
     prompt: str
-    tokens: int
-    schema: dict[str, Any]
-    note: str = ""
+    tokens: int  # estimated length of the prompt
+    schema: dict[str, Any]  # JSON schema of the answer
 
 
 def preview(
@@ -49,32 +38,19 @@ def preview(
     assert history.method is not None
     history = replace(history, method=history.method.model_copy(update={"n_total": n_total}))
     proposer = PromptedProposer(ReplayBackend((), Path()), options, "llm")
-    text = proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init), n_init)
+    text = proposer.prompt_for(history, proposal_seed(seed, n_init), n_init)
     return _preview(proposer, problem, n_init, text)
 
 
-def preview_after(
-    run: Path,
-    options: PromptOptions | None = None,
-    *,
-    task: Task | None = None,
-    space: DesignSpace | None = None,
-    number: int | None = None,
-) -> Preview:
+def preview_after(run: Path, options: PromptOptions | None = None, *, number: int | None = None) -> Preview:
     """Return the prompt for the next proposal of a run, requested as the run would.
 
     Args:
         run: run folder.
         options: options that replace those of the run, if set.
-        task: task that the run must have, if given.
-        space: design space that the run must have, if given.
         number: trial whose past prompt is returned; None for the next one.
     """
     config, history = read_run(run)
-    if task is not None and task.targets != config.task.targets:
-        raise SettingsError(f"{run} is a run of another task: {config.task.name}")
-    if space is not None and space != config.space:
-        raise SettingsError(f"{run} is a run of another space: {config.space.name}")
     own, recorded = recorded_options(config)
     stated = {} if options is None else options.given
     given = {name: value for name, value in stated.items() if name in PromptOptions.model_fields}
@@ -85,20 +61,18 @@ def preview_after(
         ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm", prompt=prompt
     )
     proposer.open_read_only(run)
-    requests = ProposalRequests(proposer, config.seed)
     if number is not None:
         past = _history_at(run, config, history, proposer.requested_trials(), number)
-        text = proposer.prompt_for(past, requests.seed(number), number, proposer.past_hints(number))
+        text = proposer.prompt_for(past, proposal_seed(config.seed, number), number, proposer.past_hints(number))
         return _preview(proposer, history.problem, number, text)
-    schedule = request_schedule(requests, config.study, lambda: history)
-    number, finished = schedule.upcoming(len(history))
+    requests = ProposalRequests(proposer, config.seed, config.study, lambda: history)
+    number = request_schedule(requests).upcoming(len(history))
     # With other options the new prompt is shown, even if the run waits for the second call of an answer.
     if given:
-        text = proposer.prompt_for(history, requests.seed(number), number, proposer.next_hints(number))
+        text = proposer.prompt_for(history, proposal_seed(config.seed, number), number, proposer.next_hints(number))
     else:
-        text = proposer.question(history, requests.seed(number), number).prompt
-    note = _note(finished - len(history), len(proposer.unused(history)))
-    return replace(_preview(proposer, history.problem, number, text), note=note)
+        text = proposer.question(history, proposal_seed(config.seed, number), number).prompt
+    return _preview(proposer, history.problem, number, text)
 
 
 def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: str) -> Preview:
@@ -115,12 +89,3 @@ def _history_at(run: Path, config: RunConfig, history: History, requests: Mappin
         numbers = ", ".join(map(str, sorted(known)))
         raise SettingsError(f"--number {number}: the proposals of {run} were requested for trials {numbers}")
     return history.before(known[number])
-
-
-def _note(before: int, unused: int) -> str:
-    """Return a note on the trials that precede the next request."""
-    if not before:
-        return ""
-    trials = "1 trial comes" if before == 1 else f"{before} trials come"
-    designs = f", {unused} of them of the calls so far" if unused else ""
-    return f"{trials} before it{designs}, and will be in it"

@@ -3,45 +3,51 @@
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from armwright.exceptions import DesignError, ProposalError
 from armwright.problem.objective import Objective
 from armwright.proposers.proposer import Proposal, Proposer
+from armwright.runs.config import Method
 from armwright.runs.history import History
 from armwright.runs.trial import ScreenedOut
-from armwright.search.surrogate.proposal_screen import Rejection
 from armwright.seeding import PROPOSING, derived_seed
 
 
 @dataclass(frozen=True)
 class ProposalSlot:
-    """A trial reserved for the proposer: its proposal, or the kind of fault that left the trial without one.
+    """A trial reserved for the proposer: its proposal, or the kind of fault that left the trial without one."""
 
-    Attributes:
-        asked: number of the trial that the proposal was requested for.
-        feedback: number of finished trials that the proposer knew.
-        proposal: the design, if there is one.
-        fault: kind of the fault, if there is none.
-        note: message for the user.
-        screened: the proposal, if it is not evaluated because the surrogate expects too little of it.
-    """
-
-    asked: int
-    feedback: int
+    asked: int  # trial that the proposal was requested for
+    feedback: int  # finished trials that the proposer knew
     proposal: Proposal | None = None
     fault: str | None = None
-    note: str = ""
-    screened: ScreenedOut | None = None
+    note: str = ""  # message for the user
+    screened: ScreenedOut | None = None  # the proposal, if the surrogate expects too little of it to evaluate it
 
     @property
     def fault_message(self) -> str | None:
         """Reason for a missing design: empty if there is a design, None if the reason was reported before."""
         return "" if self.proposal is not None or self.screened is not None else self.note or None
 
-    def screened_out(self, source: str, rejection: Rejection, objectives: Sequence[Objective]) -> "ProposalSlot":
+    def fields(self, number: int) -> dict[str, Any]:
+        """Return the fields of trial `number`, which takes the slot."""
+        proposal = self.proposal
+        return {
+            **({} if proposal is None else {name: getattr(proposal, name) for name in ("reason", "expected")}),
+            "proposal": None if proposal is None else proposal.id,
+            "fault": self.fault,
+            "screened": self.screened,
+            "asked": None if self.asked == number else self.asked,
+            "feedback": None if self.feedback == number else self.feedback,
+        }
+
+    def screened_out(
+        self, source: str, rejection: tuple[float, tuple[float, ...]], objectives: Sequence[Objective]
+    ) -> "ProposalSlot":
         """Return the slot without its proposal, which is not evaluated."""
         assert self.proposal is not None
-        screened = ScreenedOut(source, self.proposal.id, rejection.gain, rejection.predicted)
+        screened = ScreenedOut(source, self.proposal.id, *rejection)
         return replace(self, proposal=None, note=screened.describe(objectives), screened=screened)
 
 
@@ -51,20 +57,37 @@ class ProposalRequests:
     Args:
         proposer: the proposer.
         seed: of the run.
+        method: search settings of the run.
+        history: returns the finished trials.
         notify: called with the number of the trial before each request.
     """
 
-    def __init__(self, proposer: Proposer, seed: int, notify: Callable[[int], None] | None = None) -> None:
+    def __init__(
+        self,
+        proposer: Proposer,
+        seed: int,
+        method: Method,
+        history: Callable[[], History],
+        notify: Callable[[int], None] | None = None,
+    ) -> None:
         self.per_call = proposer.per_call
+        self.method = method
+        self.history = history
         self._proposer = proposer
         self._seed = seed
         self._notify = notify
         self._final_fault: str | None = None  # the kind of the fault that ended the requests
         self._lock = threading.Lock()
 
-    def unused(self, history: History) -> list[ProposalSlot]:
+    def unused(self) -> list[ProposalSlot]:
         """Return the proposals of earlier sessions that no trial has used yet."""
-        return [ProposalSlot(p.asked, p.known or 0, p, note=p.note) for p in self._proposer.unused(history)]
+        return [ProposalSlot(p.asked, p.known or 0, p, note=p.note) for p in self._proposer.unused(self.history())]
+
+    def past_slots(self) -> list[ProposalSlot]:
+        """Return the slots that the finished trials took."""
+        return [
+            ProposalSlot(*trial.request, fault=trial.fault) for trial in self.history() if trial.request is not None
+        ]
 
     def request(self, history: History, number: int) -> list[ProposalSlot]:
         """Request proposals for trial `number` after `history`: one slot per design, or one with a fault."""
@@ -74,7 +97,7 @@ class ProposalRequests:
         if self._notify is not None:
             self._notify(number)
         try:
-            answer = self._proposer.propose(history, self.seed(number), number)
+            answer = self._proposer.propose(history, proposal_seed(self._seed, number), number)
         except ProposalError as fault:
             known = known if fault.known is None else fault.known
             return [ProposalSlot(number, known, fault=fault.kind, note=self._note(fault))]
@@ -82,10 +105,6 @@ class ProposalRequests:
         if not proposals:
             return [ProposalSlot(number, known, fault="answer", note="the proposer gave no design")]
         return [_check_design(history, number, proposal) for proposal in proposals]
-
-    def seed(self, number: int) -> int:
-        """Return the seed of the request for trial `number`."""
-        return derived_seed(self._seed, PROPOSING, number)
 
     def stop(self, kind: str) -> bool:
         """Make no more requests in this session, and return True if none had stopped them before."""
@@ -104,6 +123,11 @@ class ProposalRequests:
         return f"{fault}; no more requests are made in this session" if self.stop(fault.kind) else ""
 
 
+def proposal_seed(seed: int, number: int) -> int:
+    """Return the seed of the request for trial `number` of a run with this seed."""
+    return derived_seed(seed, PROPOSING, number)
+
+
 def _check_design(history: History, number: int, proposal: Proposal) -> ProposalSlot:
     known = len(history) if proposal.known is None else proposal.known
     try:
@@ -111,8 +135,3 @@ def _check_design(history: History, number: int, proposal: Proposal) -> Proposal
     except DesignError as fault:
         return ProposalSlot(number, known, fault="answer", note=str(fault))
     return ProposalSlot(number, known, proposal, note=proposal.note)
-
-
-def past_slots(history: History) -> list[ProposalSlot]:
-    """Return the slots that the finished trials took."""
-    return [ProposalSlot(*trial.request, fault=trial.fault) for trial in history if trial.request is not None]

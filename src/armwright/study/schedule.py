@@ -6,23 +6,17 @@ ReplaySchedule        a recorded run is repeated: each proposal enters at its re
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import count
 
-from armwright.runs.config import Method
-from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
-from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
 
 
 class Schedule:
-    """Assigns each trial to the black box or to the proposer. This base class assigns all trials to the black box.
+    """Assigns each trial to the black box or to the proposer. This base class assigns all trials to the black box."""
 
-    Attributes:
-        n_in_flight: number of requests that run while trials go on.
-    """
-
-    n_in_flight: int = 0
+    n_in_flight: int = 0  # number of requests that run while trials go on
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return the slot of trial `number`, or None if it is the black box's."""
@@ -35,25 +29,22 @@ class Schedule:
 class AlternatingSchedule(Schedule):
     """The first trial of each block is the proposer's; the study waits for its design."""
 
-    def __init__(self, requests: ProposalRequests, method: Method, history: Callable[[], History]) -> None:
+    def __init__(self, requests: ProposalRequests) -> None:
         self._requests = requests
-        self._method = method
-        self._history = history
-        self._ready = deque(requests.unused(history()))
+        self._ready = deque(requests.unused())
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return the slot if the trial is the first of a block; request proposals if none is left."""
-        if not self._method.is_first_trial(number):
+        if not self._requests.method.is_first_trial(number):
             return None
         if not self._ready:
-            self._ready.extend(self._requests.request(self._history(), number))
+            self._ready.extend(self._requests.request(self._requests.history(), number))
         return self._ready.popleft()
 
-    def upcoming(self, number: int) -> tuple[int, int]:
-        """Return the trial of the next request, once `number` trials are finished, and how many will be finished."""
-        first = next(n for n in count(number) if self._method.is_first_trial(n))
-        asked = first + len(self._ready) * self._method.n_step
-        return asked, asked
+    def upcoming(self, number: int) -> int:
+        """Return the trial of the next request, once `number` trials are finished."""
+        first = next(n for n in count(number) if self._requests.method.is_first_trial(n))
+        return first + len(self._ready) * self._requests.method.n_step
 
 
 class ReplaySchedule(Schedule):
@@ -62,22 +53,14 @@ class ReplaySchedule(Schedule):
     After the end of the record, the proposals that would be due are missing.
     """
 
-    def __init__(
-        self,
-        requests: ProposalRequests,
-        record: Sequence[FinishedTrial],
-        method: Method,
-        history: Callable[[], History],
-    ) -> None:
+    def __init__(self, requests: ProposalRequests, record: Sequence[FinishedTrial]) -> None:
         self._requests = requests
         self._record = record
-        self._method = method
-        self._history = history
-        past = past_slots(history())
+        past = requests.past_slots()
         self._asked = {slot.asked for slot in past}
         self._end_is_reported = any(slot.fault == "missing" for slot in past)
         self._ready: dict[tuple[int, str | None], ProposalSlot] = {}  # by trial and proposal; None for a fault
-        self._add(requests.unused(history()))
+        self._add(requests.unused())
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return what was recorded for this trial."""
@@ -88,7 +71,7 @@ class ReplaySchedule(Schedule):
             return None
         asked, feedback = recorded.request
         if (asked, recorded.answer) not in self._ready and asked not in self._asked:
-            self._add(self._requests.request(self._history().before(feedback), asked))
+            self._add(self._requests.request(self._requests.history().before(feedback), asked))
         self._asked.add(asked)
         missing = ProposalSlot(asked, feedback, fault="missing", note=f"no design is left of call {asked}")
         return self._ready.pop((asked, recorded.answer), self._ready.pop((asked, None), missing))
@@ -98,7 +81,7 @@ class ReplaySchedule(Schedule):
             self._ready[slot.asked, None if slot.proposal is None else slot.proposal.id] = slot
 
     def _next_after_end(self, number: int) -> ProposalSlot | None:
-        if len(past_slots(self._history())) >= self._method.n_started(number):
+        if len(self._requests.past_slots()) >= self._requests.method.n_started(number):
             return None
         note = "" if self._end_is_reported else f"the record ends with trial {len(self._record) - 1}"
         self._end_is_reported = True

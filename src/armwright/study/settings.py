@@ -23,17 +23,11 @@ ON_MODEL_FAILURE = ("stop", "continue")
 
 @dataclass(frozen=True)
 class EvaluationOptions:
-    """How the designs of a study are evaluated.
+    """How the designs of a study are evaluated."""
 
-    Attributes:
-        workers: processes that evaluate the designs; None: this process.
-        timeout: for one call of the custom evaluator [s]; None for no limit.
-        allow_failures: whether the run goes on if its first evaluations all fail with the same exception.
-    """
-
-    workers: Workers | None = None
-    timeout: float | None = None
-    allow_failures: bool = False
+    workers: Workers | None = None  # processes that evaluate the designs; None: this process
+    timeout: float | None = None  # for one call of the custom evaluator [s]; None for no limit
+    allow_failures: bool = False  # whether the run goes on if its first evaluations all fail with the same exception
 
 
 def study_method(

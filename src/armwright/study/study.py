@@ -5,18 +5,15 @@ before it only. A killed run therefore resumes where it stopped and ends as an u
 """
 
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, closing
-from dataclasses import replace
+from contextlib import closing, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import ModelError, StoppedError
-from armwright.pareto import FrontTracker
 from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
-from armwright.problem.evaluators import evaluator_error
 from armwright.problem.problem import Outcome, Problem
 from armwright.proof.results import complete_summary, discard_results, summarize, write_results
 from armwright.proof.verification import verify_front
@@ -25,28 +22,22 @@ from armwright.runs.config import RunConfig
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
+from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for
 from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
 from armwright.study.overlapping_schedule import request_schedule
-from armwright.study.pending_trial import PendingTrial, new_trial
 from armwright.study.progress import Activity, Progress, StudyResult
-from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
+from armwright.study.record import Record
 from armwright.study.sampler_advice import sampler_advice
 from armwright.study.schedule import ReplaySchedule, Schedule
 from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, run_config, study_method
 from armwright.study.workers.cluster import Workers
 from armwright.study.workers.dask_backend import DaskBackend
-from armwright.study.workers.evaluation_backend import (
-    Evaluated,
-    EvaluationBackend,
-    InProcessBackend,
-    ProcessBackend,
-    describe_design,
-)
-from armwright.study.workers.failure_watch import FailureWatch
+from armwright.study.workers.evaluation_backend import Evaluated, LocalBackend
 
 POLL_SECONDS = 0.1  # between two checks for requests of the watcher while the study waits
 
@@ -120,13 +111,27 @@ def optimize(
     refuse_unread_parameters(problem)
     stop_if_proven(check_instantly(problem))
     config = run_config(problem, method, seed)
-    with ExitStack() as stack:
-        folder = None
-        if out is not None:
-            folder = stack.enter_context(RunFolder(Path(out)))
+    with nullcontext() if out is None else RunFolder(Path(out)) as folder:
+        if folder is not None:
             config = folder.adopt(config)
         study = Study(problem, config, proposer, sampler, folder, watch, evaluation)
         return study.run(on_model_failure, verify and problem.evaluator is None)
+
+
+@dataclass
+class PendingTrial:
+    """A trial that has started and is not recorded yet."""
+
+    optuna_trial: Any
+    trial: FinishedTrial  # as far as it is known; it has values once it is evaluated
+    note: str  # message for the user
+    proposing: float  # time spent on the proposal [s]
+    sampling: float  # time spent in the sampler [s]
+
+    @property
+    def is_evaluated(self) -> bool:
+        """True if the trial has values."""
+        return bool(self.trial.values)
 
 
 class Study:
@@ -144,41 +149,32 @@ class Study:
     ) -> None:
         self._problem = problem
         self._evaluation = evaluation
-        self._config = config
         self._method = config.study
         self._proposer = proposer
         self._sampler = sampler
         self._folder = folder
         self._watch = watch
         self._channel = Channel(None if folder is None else folder.path)
+        self._record = Record(problem, config, folder, evaluation.allow_failures)
         self._requests: ProposalRequests | None = None
         if proposer is not None:
             notify = self._report_request if self._method.in_flight is None else None
-            self._requests = ProposalRequests(proposer, config.seed, notify)
-        n_objectives, names = len(problem.objectives), [constraint.description for constraint in problem.constraints]
+            self._requests = ProposalRequests(proposer, config.seed, self._method, self._record.history, notify)
+        names = [constraint.description for constraint in problem.constraints]
         can_fail = problem.evaluator is not None
-        self._black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names, can_fail)
-        self._trials = folder.open_trials(config) if folder is not None else []
-        self._black_box.restore(self._trials)
+        self._black_box = BlackBox(problem.space, sampler, config.seed, len(problem.objectives), names, can_fail)
+        self._black_box.restore(self._record.trials)
         self._first_of: dict[Design, int] = {}  # the first trial of each design
-        for trial in self._trials:
+        for trial in self._record.trials:
             self._first_of.setdefault(trial.design, trial.number)
-        self._failures = FailureWatch(self._trials, self._method.n_trials)
-        self._faults = Counter(trial.fault for trial in self._trials if trial.fault)
-        self._latest = History(problem, (), self._method.n_init, config.reference_point, self._method)
-        self._tracker = FrontTracker(n_objectives, config.reference_point)
-        self._is_frozen = problem.reference_point is not None
-        for values in self._history().masked_objectives:
-            self._tracker.add(values)
-        self._freeze_reference_point()
-        self._backend: EvaluationBackend = InProcessBackend(problem)
-        self._schedule: Schedule = Schedule()
+        self._backend: LocalBackend | DaskBackend = LocalBackend(problem)
+        self._schedule = Schedule()
         self._pending: dict[int, PendingTrial] = {}  # by number; a trial is recorded when all before it are
         self._is_paused = False
 
     def run(self, on_model_failure: str, verify: bool) -> StudyResult:
         """Run the trials that are left, and write the results."""
-        resumed = len(self._trials)
+        resumed = self._n_finished
         try:
             if self._proposer is not None:
                 self._proposer.open(None if self._folder is None else self._folder.path)
@@ -187,22 +183,20 @@ class Study:
             result = self._finish(resumed, verify)
         except BaseException as end:
             is_deliberate = isinstance(end, (KeyboardInterrupt, StoppedError))
-            self._channel.report(
-                "stopped", len(self._trials), None if is_deliberate else str(end) or type(end).__name__
-            )
+            self._channel.report("stopped", self._n_finished, None if is_deliberate else str(end) or type(end).__name__)
             raise
         finally:
             self._backend.close()
-        self._channel.finish(len(self._trials))
+        self._channel.finish(self._n_finished)
         return result
 
     def _search(self, on_model_failure: str) -> None:
-        first = len(self._trials)
+        first = self._n_finished
         self._channel.begin(first)
         self._check_model(on_model_failure)
         if self._folder is not None:
             discard_results(self._folder.path)  # those of fewer trials
-            self._config = self._folder.note_versions(self._config, self._problem.evaluator)
+            self._record.config = self._folder.note_versions(self._record.config, self._problem.evaluator)
         self._backend = self._new_backend()
         self._schedule = self._new_schedule()
         with closing(self._schedule):
@@ -212,45 +206,43 @@ class Study:
             while self._pending:
                 self._take_results(POLL_SECONDS)
 
-    def _new_backend(self) -> EvaluationBackend:
+    def _new_backend(self) -> LocalBackend | DaskBackend:
         workers, timeout = self._evaluation.workers, self._evaluation.timeout
-        if workers is not None:
-            return DaskBackend(
-                self._problem, workers, timeout, lambda note: self._report("beginning", len(self._trials), note=note)
-            )
-        return InProcessBackend(self._problem) if timeout is None else ProcessBackend(self._problem, timeout)
+        if workers is None:
+            return LocalBackend(self._problem, timeout)
+        return DaskBackend(self._problem, workers, timeout, self._report_beginning)
 
     def _check_model(self, on_model_failure: str) -> None:
         """Report what the proposals will cost, and check that the proposer works."""
         if self._proposer is None or self._requests is None:
             return
-        n_due = self._method.n_proposals - len(past_slots(self._history()))
+        n_due = self._method.n_proposals - len(self._requests.past_slots())
         if n_due <= 0:
             return
         forecast = self._proposer.forecast(self._problem, n_due)
         if forecast:
-            self._report("beginning", len(self._trials), self._proposer.name, note=forecast)
-        self._channel.report("asking", len(self._trials))
+            self._report_beginning(forecast)
+        self._channel.report("asking", self._n_finished)
         try:
             if note := self._proposer.check():
-                self._report("beginning", len(self._trials), self._proposer.name, note=note)
+                self._report_beginning(note)
         except ModelError as fault:
-            if on_model_failure == "stop" and not self._trials:
+            if on_model_failure == "stop" and not self._n_finished:
                 raise
             consequence = "the run continues"
             if fault.final is not None:
                 self._requests.stop(fault.final)
                 consequence = "no requests are made in this session"
-            self._report("beginning", len(self._trials), self._proposer.name, note=f"{fault}; {consequence}")
-            self._channel.report("evaluating", len(self._trials), str(fault))
+            self._report_beginning(f"{fault}; {consequence}")
+            self._channel.report("evaluating", self._n_finished, str(fault))
 
     def _new_schedule(self) -> Schedule:
         if self._proposer is None or self._requests is None:
             return Schedule()
         record = self._proposer.recorded_trials()
         if record:
-            return ReplaySchedule(self._requests, record, self._method, self._history)
-        return request_schedule(self._requests, self._method, self._history)
+            return ReplaySchedule(self._requests, record)
+        return request_schedule(self._requests)
 
     def _wait_for_start(self, number: int) -> None:
         """Take results until trial `number` may start; StoppedError if the watcher ended the session."""
@@ -287,15 +279,16 @@ class Study:
         optuna_trial, design, source = self._choose_design(number, slot)
         sampled = time.perf_counter()
         first = self._first_of.setdefault(design, number)
-        trial = new_trial(number, source, design, slot)
-        if first != number:
-            trial = replace(trial, duplicate_of=first)
-        pending = PendingTrial(optuna_trial, trial, slot, proposed - started, sampled - proposed)
-        self._pending[number] = pending
+        trial = FinishedTrial(number, source, design, (), **({} if slot is None else slot.fields(number)))
+        note = "" if slot is None else slot.note
+        pending = self._pending[number] = PendingTrial(
+            optuna_trial, trial, note, proposed - started, sampled - proposed
+        )
         if first == number:
             self._backend.submit(number, design)
             return
-        known = self._pending[first].trial if first in self._pending else self._trials[first]
+        pending.trial = replace(trial, duplicate_of=first)
+        known = self._pending[first].trial if first in self._pending else self._record.trials[first]
         if known.values:
             self._tell(pending, Evaluated(Outcome(known.values, known.violations, known.failure), 0.0))
 
@@ -311,15 +304,13 @@ class Study:
 
     def _choose_design(self, number: int, slot: ProposalSlot | None) -> tuple[Any, Design, str]:
         """Return Optuna's trial, the design to evaluate, and its source."""
-        source, proposal_id = RANDOM if number < self._method.n_init else BBO, None
         if slot is not None and slot.proposal is not None:
             assert self._proposer is not None
-            source, given, proposal_id = self._proposer.name, slot.proposal.design, slot.proposal.id
-        elif number < len(self._method.initial_designs):
-            source, given = INITIAL_DESIGN, Design(self._method.initial_designs[number])
-        else:
-            return *self._black_box.draw(number, source), source
-        return *self._black_box.inject(given, number, source, proposal_id), source
+            return *self._black_box.inject(slot.proposal.design, number), self._proposer.name
+        if number < len(self._method.initial_designs):
+            return *self._black_box.inject(Design(self._method.initial_designs[number]), number), INITIAL_DESIGN
+        source = RANDOM if number < self._method.n_init else BBO
+        return *self._black_box.draw(number, source), source
 
     def _take_results(self, timeout: float) -> None:
         """Pass all finished evaluations to the sampler, and record the trials that no missing one precedes.
@@ -341,70 +332,38 @@ class Study:
         """Pass the result of a trial to the sampler at once, even if earlier trials are missing."""
         started = time.perf_counter()
         outcome = evaluated.outcome
-        notes = self._black_box.tell(
-            pending.optuna_trial, outcome.values, outcome.violations, outcome.failure is not None
+        has_failed = outcome.failure is not None
+        notes = self._black_box.tell(pending.optuna_trial, outcome.values, outcome.violations, has_failed)
+        sampling = pending.sampling + time.perf_counter() - started
+        seconds = {
+            "total": pending.proposing + sampling + evaluated.seconds,
+            "sampling": sampling,
+            "evaluation": evaluated.seconds,
+            "proposing": pending.proposing,
+        }
+        pending.trial = replace(
+            pending.trial,
+            values=outcome.values,
+            violations=outcome.violations,
+            failure=outcome.failure,
+            sampler_notes=notes,
+            seconds={part: round(value, 6) for part, value in seconds.items()},
         )
-        pending.sampling += time.perf_counter() - started
-        pending.finish(evaluated, notes)
 
     def _record_ready(self) -> None:
         """Record the evaluated trials that no missing one precedes."""
-        while (pending := self._pending.get(len(self._trials))) is not None and pending.is_evaluated:
-            del self._pending[len(self._trials)]
-            self._record(pending)
+        while (pending := self._pending.get(self._n_finished)) is not None and pending.is_evaluated:
+            trial = self._pending.pop(self._n_finished).trial
+            self._record.add(trial)
+            note = pending.note or sampler_advice(self._problem, self._method, self._record.trials)
+            self._report("finished", trial.number, trial.source, fault=trial.fault, note=note, reason=trial.reason)
 
-    def _record(self, pending: PendingTrial) -> None:
-        """Write an evaluated trial, which is part of the run from now on."""
-        trial = pending.trial
-        if self._failures.add(trial) and not self._evaluation.allow_failures:
-            self._stop_failing(pending)
-        if self._folder is not None:
-            self._folder.append(trial)
-        self._trials.append(trial)
-        if trial.is_feasible:
-            self._tracker.add(trial.values)
-        if trial.fault:
-            self._faults[trial.fault] += 1
-        self._freeze_reference_point()
-        note = sampler_advice(self._problem, self._method, self._trials)
-        if pending.slot is not None and pending.slot.note:
-            note = pending.slot.note
-        self._report("finished", trial.number, trial.source, fault=trial.fault, note=note, reason=trial.reason)
+    @property
+    def _n_finished(self) -> int:
+        return len(self._record.trials)
 
-    def _stop_failing(self, pending: PendingTrial) -> None:
-        """Discard the trials, whose evaluations all failed in the same way, and raise EvaluatorError."""
-        failure = pending.trial.failure
-        assert failure is not None
-        if self._folder is not None:
-            self._folder.replace_trials([])
-        n = 1 + sum(trial.duplicate_of is None for trial in self._trials)
-        raise evaluator_error(
-            f"the first {n} evaluations all failed: {failure.description}; last design: "
-            f"{describe_design(pending.trial.design)}. Fix the evaluator and rerun the same command, or go on with "
-            "--allow-failures",
-            replace(failure, traceback=pending.traceback),
-        )
-
-    def _history(self) -> History:
-        """Return the finished trials; extends the last history, so that the cost does not grow with the trials."""
-        self._latest = self._latest.grown(tuple(self._trials), self._config.reference_point)
-        return self._latest
-
-    def _freeze_reference_point(self) -> None:
-        """Store a reference point that the task leaves open, once the random trials give it.
-
-        It follows the trials until enough of them have succeeded.
-        """
-        if self._is_frozen or len(self._trials) < self._method.n_init:
-            return
-        history = self._history()
-        self._is_frozen = history.has_reference_trials
-        reference_point = history.found_reference_point()
-        if reference_point is not None and reference_point != self._config.reference_point:
-            self._config = self._config.model_copy(update={"reference_point": reference_point})
-            self._tracker.set_reference_point(reference_point)
-            if self._folder is not None:
-                self._folder.write_config(self._config)
+    def _report_beginning(self, note: str) -> None:
+        self._report("beginning", self._n_finished, note=note)
 
     def _report_request(self, number: int) -> None:
         assert self._proposer is not None
@@ -427,33 +386,31 @@ class Study:
             Progress(
                 doing=doing,
                 number=number,
-                iteration=max(0, len(self._trials) - self._method.n_init),
+                iteration=max(0, self._n_finished - self._method.n_init),
                 n_total=self._method.n_total,
-                hypervolume=self._tracker.hypervolume,
-                front_size=self._tracker.size,
+                hypervolume=self._record.front.hypervolume,
+                front_size=self._record.front.size,
                 source=source,
                 n_in_flight=self._schedule.n_in_flight,
                 fault=fault,
-                faults=self._faults.copy(),
-                failures=self._failures.counts.copy(),
-                latest_failures=self._failures.latest.copy(),
+                faults=self._record.faults.copy(),
+                failures=self._record.failures.copy(),
+                latest_failures=self._record.latest_failures.copy(),
                 note=note,
                 reason=reason,
             )
         )
 
     def _finish(self, resumed: int, verify: bool) -> StudyResult:
-        history = self._history()
-        record = None if self._proposer is None else self._proposer.summary()
-        if self._folder is None:
-            summary = summarize(history, self._config, record, surrogate=self._surrogate_errors(history))
-            return StudyResult(history, self._config, summary, None, resumed)
-        summary = complete_summary(self._folder.path, history)
+        history, config, folder = self._record.history(), self._record.config, self._folder
+        summary = None if folder is None else complete_summary(folder.path, history)
         if summary is None:
-            verification = verify_front(history) if verify else None
-            summary = summarize(history, self._config, record, verification, self._surrogate_errors(history))
-            write_results(self._folder, history, summary, verification)
-        return StudyResult(history, self._config, summary, self._folder.path, resumed)
+            verification = verify_front(history) if verify and folder is not None else None
+            proposer = None if self._proposer is None else self._proposer.summary()
+            summary = summarize(history, config, proposer, verification, self._surrogate_errors(history))
+            if folder is not None:
+                write_results(folder, history, summary, verification)
+        return StudyResult(history, config, summary, None if folder is None else folder.path, resumed)
 
     def _surrogate_errors(self, history: History) -> dict[str, Any] | None:
         """Return the errors of the surrogate's predictions; None with another sampler."""

@@ -9,7 +9,6 @@ import armwright as aw
 from armwright.exceptions import SpaceError
 from armwright.problem.problem import Problem
 from armwright.search.surrogate import candidates
-from armwright.search.surrogate.cheap_features import CheapFeatures
 from armwright.search.surrogate.custom_inputs import CustomInputs
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
@@ -77,15 +76,6 @@ def test_parameters_of_joints_that_do_not_exist_are_zero() -> None:
 def test_space_without_custom_parameters_has_no_custom_inputs() -> None:
     space = aw.paper_space(3)
     assert CustomInputs(space)(space.matrix(space.sample(4, 0))).shape == (4, 0)
-
-
-def test_custom_parameters_are_among_the_inputs_of_the_physics() -> None:
-    def count(space: aw.DesignSpace) -> int:
-        described = CheapFeatures(Problem(TASK, space, evaluator=lag)).describe(space.matrix(space.sample(5, 0)))
-        return described.inputs["physics"].shape[1]
-
-    # cells, gear_1 to gear_3, three belts, and thin or thick oil in each joint: "thick" is the same as "not thin"
-    assert count(space_of()) - count(space_of({"kp": CUSTOM["kp"]})) == 1 + 3 + 3 + 3
 
 
 def test_objective_of_a_custom_parameter_is_predicted_with_the_physics() -> None:

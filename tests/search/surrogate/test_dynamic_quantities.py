@@ -9,8 +9,7 @@ import armwright as aw
 from armwright.arrays import Array
 from armwright.problem.evaluation import Evaluation
 from armwright.robot.arm import Arm
-from armwright.search.surrogate.cheap_features import DYNAMICS, CheapFeatures
-from armwright.search.surrogate.dynamic_quantities import DYNAMIC_QUANTITIES
+from armwright.search.surrogate.dynamic_quantities import QUANTITIES, dynamic_quantities
 from armwright.spaces.design_space import default_space
 
 TARGETS = np.array([[0.3, 0.1, 0.2], [0.1, -0.3, 0.3], [-0.2, 0.2, 0.1]])
@@ -24,7 +23,7 @@ def arms_of(task: str, n: int) -> list[Arm]:
 
 def quantities(arm: Arm) -> tuple[Evaluation, dict[str, float]]:
     evaluation = aw.evaluate(arm, TARGETS)
-    return evaluation, {q.name: float(q(evaluation)[0]) for q in DYNAMIC_QUANTITIES}
+    return evaluation, dict(zip(QUANTITIES, dynamic_quantities(evaluation)[0].tolist(), strict=True))
 
 
 def turns(postures: Array) -> Array:
@@ -94,10 +93,3 @@ def test_inertia_counts_the_payload_at_each_target() -> None:
     mixed = aw.evaluate(arm, TARGETS, payload=[0.0, 0.4, 1.0]).motor_inertia
     expected = np.stack([each[:, i] for i, each in enumerate(by_target)], axis=1)
     assert mixed == pytest.approx(expected, rel=1e-9, abs=1e-12)
-
-
-def test_custom_numbers_stand_beside_dynamics() -> None:
-    problem = aw.Problem(aw.load_task("target-1"), default_space("target-1"))
-    features = CheapFeatures(problem, lambda design: [max(design.links), design.links[-1]])
-    matrix = problem.space.matrix(problem.space.sample(5, seed=1))
-    assert features.describe(matrix).inputs[DYNAMICS].shape == (5, len(DYNAMIC_QUANTITIES) + 2)

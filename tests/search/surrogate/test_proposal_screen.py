@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import armwright as aw
-from armwright.page.repeat_command import repeat_command
 from armwright.problem.problem import Problem
 from armwright.proof.results import read_summary
 from armwright.proposers.rule_helpers import rule_of
@@ -17,12 +16,10 @@ from armwright.proposers.rules import STRUCTURE, RulesProposer
 from armwright.runs.folder import read_run
 from armwright.runs.history import BBO, History
 from armwright.runs.trial import FinishedTrial, ScreenedOut, parse_trial, trial_line
-from armwright.search.samplers import sampler_for
 from armwright.search.surrogate import candidates
 from armwright.search.surrogate.proposal_screen import LEAST_GAIN, LEAST_TRIALS, rejection
 from armwright.search.surrogate.surrogate import Observations, Surrogate
 from armwright.spaces.parameters import Design
-from armwright.study.settings import run_config, study_method
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 SETTINGS: dict[str, Any] = {"sampler": "surrogate", "n_init": 16, "n_step": 2}
@@ -83,8 +80,9 @@ def test_design_that_gains_nothing_is_rejected_with_its_prediction() -> None:
     worst = known.matrix[int(np.argmax(known.values.sum(axis=1)))]
     found = rejection(Surrogate(p), known, worst, 0)
     assert found is not None
-    assert 0.0 <= found.gain < LEAST_GAIN
-    assert found.predicted == pytest.approx(measure(p.arm(p.space.designs(worst[None])[0]), TASK), rel=0.5)
+    gain, predicted = found
+    assert 0.0 <= gain < LEAST_GAIN
+    assert predicted == pytest.approx(measure(p.arm(p.space.designs(worst[None])[0]), TASK), rel=0.5)
 
 
 def test_best_candidate_is_not_rejected() -> None:
@@ -159,20 +157,6 @@ def test_rules_count_rejected_structures_as_opened() -> None:
     history = History(p, trials, 16, run.history.reference_point, run.config.study)
     second = RulesProposer().propose(history, 1, 18)
     assert second.design.joints != first.design.joints
-
-
-@pytest.mark.slow
-def test_without_a_screen_all_proposals_are_evaluated() -> None:
-    run = aw.optimize(problem(), proposer=Repeating(), screen=False, n_total=2, **SETTINGS)
-    assert run.trials[16].source == "repeating"
-    assert "screened_out" not in run.summary
-
-
-@pytest.mark.parametrize("screen", [True, False])
-def test_repeat_command_states_that_the_screen_was_off(screen: bool) -> None:
-    p = Problem(aw.load_task("target-1"), aw.paper_space())
-    method = study_method(RulesProposer(), sampler_for(p, "surrogate"), 5, 5, 5, None, screen=screen)
-    assert ("--no-screen" in repeat_command(run_config(p, method, 0), Path("run"))) is not screen
 
 
 def test_other_samplers_screen_nothing() -> None:

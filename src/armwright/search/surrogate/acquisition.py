@@ -23,15 +23,10 @@ LONGEST_FRONT = {1: 1, 2: 200, 3: 30, 4: 14, 5: 8}  # by number of objectives; m
 
 @dataclass(frozen=True)
 class Forecast:
-    """Predicted objectives of N designs, independent.
+    """Predicted objectives of N designs, independent."""
 
-    Attributes:
-        mean: (N, M) of each objective.
-        deviation: (N, M) standard deviations.
-    """
-
-    mean: Array
-    deviation: Array
+    mean: Array  # (N, M) of each objective
+    deviation: Array  # (N, M) standard deviations
 
     def __len__(self) -> int:
         return len(self.mean)

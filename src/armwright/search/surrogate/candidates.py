@@ -22,13 +22,9 @@ CYCLE_SHARE = 0.05  # of all these numbers for tasks with a cycle, whose designs
 
 @dataclass(frozen=True)
 class Candidates:
-    """Sources of candidates for a problem.
+    """Sources of candidates for a problem."""
 
-    Attributes:
-        problem: the problem; its evaluator is never called.
-    """
-
-    problem: Problem
+    problem: Problem  # the problem; its evaluator is never called
 
     def scaled(self, n: int) -> int:
         """Return how many of n designs there is time for."""

@@ -16,7 +16,7 @@ from armwright.problem.objectives import CLEARANCE_QUANTITIES, JOINTS, QUANTITIE
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
 from armwright.search.surrogate.custom_inputs import CustomInputs
-from armwright.search.surrogate.dynamic_quantities import DYNAMIC_QUANTITIES
+from armwright.search.surrogate.dynamic_quantities import dynamic_quantities
 from armwright.spaces.parameters import CategoricalParameter, Design
 
 PHYSICS, DYNAMICS, PARAMETERS = "physics", "dynamics", "parameters"  # sets of inputs
@@ -30,19 +30,12 @@ FeatureFunction = Callable[[Design], Sequence[float]]
 
 @dataclass(frozen=True)
 class Scaling:
-    """Scaling of inputs to mean 0 and variance 1 over random designs.
+    """Scaling of inputs to mean 0 and variance 1 over random designs."""
 
-    Attributes:
-        kept: (K,) columns that differ and are no copies of others.
-        floors: (K,) added before the logarithm; NaN for columns that have none.
-        mean: (K,) after it.
-        deviation: (K,) after it.
-    """
-
-    kept: NDArray[np.intp]
-    floors: Array
-    mean: Array
-    deviation: Array
+    kept: NDArray[np.intp]  # (K,) columns that differ and are no copies of others
+    floors: Array  # (K,) added before the logarithm; NaN for columns that have none
+    mean: Array  # (K,) after it
+    deviation: Array  # (K,) after it
 
     @classmethod
     def of(cls, columns: Array) -> "Scaling":
@@ -85,15 +78,10 @@ def _logarithms(columns: Array, floors: Array) -> Array:
 
 @dataclass(frozen=True)
 class Description:
-    """What is known of N designs without evaluating them.
+    """What is known of N designs without evaluating them."""
 
-    Attributes:
-        inputs: (N, F) scaled inputs of each set: `physics`, `dynamics` and `parameters`.
-        violations: (N, C) of the constraints, which the built-in physics alone decides.
-    """
-
-    inputs: Mapping[str, Array]
-    violations: Array
+    inputs: Mapping[str, Array]  # (N, F) scaled inputs of each set: `physics`, `dynamics` and `parameters`
+    violations: Array  # (N, C) of the constraints, which the built-in physics alone decides
 
     def __getitem__(self, rows: slice | NDArray[np.intp]) -> "Description":
         """Return the description of some of the designs."""
@@ -142,8 +130,8 @@ class CheapFeatures:
         violations = np.empty((len(matrix), len(self._problem.constraints)))
         for rows in self._problem.chunks(len(matrix)):
             evaluation = self._problem.physics(matrix[rows])
-            quantities = (*self._quantities, *DYNAMIC_QUANTITIES)
-            tables.append(np.column_stack([quantity(evaluation) for quantity in quantities]))
+            physics = [quantity(evaluation) for quantity in self._quantities]
+            tables.append(np.column_stack([*physics, dynamic_quantities(evaluation)]))
             violations[rows] = self._worst_violations(matrix[rows], evaluation)
         return np.concatenate(tables), violations
 
@@ -208,22 +196,20 @@ class CheapFeatures:
 
 def _checked_features(function: FeatureFunction, designs: Sequence[Design]) -> Array:
     """Return (N, F) the custom features of designs, or raise SettingsError."""
-    rows = [_numbers(function(design)) for design in designs]
-    for row, design in zip(rows, designs, strict=True):
+    rows: list[Array] = []
+    for design in designs:
+        given: Any = function(design)
+        try:
+            row = np.atleast_1d(np.asarray(given, dtype=np.float64))
+        except (TypeError, ValueError):
+            raise SettingsError(f"features: expected numbers, got {given!r}") from None
+        rows.append(row)
         if row.shape != rows[0].shape or row.ndim != 1 or not np.all(np.isfinite(row)):
             raise SettingsError(
                 f"features: expected {rows[0].size} finite numbers for every design, got {row.tolist()} for "
                 f"{dict(design.params)}"
             )
     return np.array(rows)
-
-
-def _numbers(given: Any) -> Array:
-    """Return what a custom function returned as an array; SettingsError if it is not made of numbers."""
-    try:
-        return np.atleast_1d(np.asarray(given, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise SettingsError(f"features: expected numbers, got {given!r}") from None
 
 
 def _is_defined(quantity: Objective, evaluation: Evaluation) -> bool:

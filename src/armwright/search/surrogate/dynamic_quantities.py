@@ -8,76 +8,34 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objective import Objective
 
-
-def _largest_inertia(evaluation: Evaluation) -> Array:
-    return np.linalg.eigvalsh(evaluation.motor_inertia)[..., -1].astype(np.float64)
-
-
-def _steps(evaluation: Evaluation) -> Array:
-    """Return (N, T, D) how far the motors turn to each target [rad]."""
-    return np.diff(evaluation.q, axis=1, prepend=0.0) / evaluation.arms.travel[:, None]
-
-
-def _energy(evaluation: Evaluation) -> Array:
-    steps = _steps(evaluation)
-    return 0.5 * np.einsum("nti,ntij,ntj->nt", steps, evaluation.motor_inertia, steps)
-
-
-def _sag(evaluation: Evaluation) -> Array:
-    displacement = evaluation.motor_jacobian @ evaluation.motor_torques[..., None]
-    return np.linalg.norm(displacement[..., 0], axis=-1)
-
-
-def _sweep(evaluation: Evaluation) -> Array:
-    displacement = evaluation.motor_jacobian @ _steps(evaluation)[..., None]
-    return np.linalg.norm(displacement[..., 0], axis=-1)
-
-
-DYNAMIC_QUANTITIES = (
-    Objective(
-        name="inertia",
-        unit="kg m²",
-        description="the largest eigenvalue of the joint-space inertia matrix in the kept posture",
-        each=_largest_inertia,
-    ),
-    Objective(
-        name="worst_inertia",
-        unit="kg m²",
-        description="the largest eigenvalue of the joint-space inertia matrix in the kept posture",
-        each=_largest_inertia,
-        over="max",
-    ),
-    Objective(
-        name="joint_travel",
-        unit="rad",
-        description="the Euclidean norm of the turns of the motors from the target before, or from the straight arm",
-        each=lambda e: np.linalg.norm(_steps(e), axis=-1),
-    ),
-    Objective(
-        name="longest_turn",
-        unit="rad",
-        description="the largest turn of a motor from the target before, or from the straight arm",
-        each=lambda e: np.abs(_steps(e)).max(axis=-1),
-        over="max",
-    ),
-    Objective(
-        name="kinetic_energy_at_1_s_a_move",
-        unit="J",
-        description="the kinetic energy at the target if the turns from the target before took one second",
-        each=_energy,
-    ),
-    Objective(
-        name="sag_at_1_Nm_per_rad",
-        unit="m",
-        description="how far gravity moves the tip if every motor yields 1 rad under 1 N m, to the first order",
-        each=_sag,
-    ),
-    Objective(
-        name="tip_sweep",
-        unit="m",
-        description="how far the tip would go by the turns from the target before, were its Jacobian the target's",
-        each=_sweep,
-    ),
+QUANTITIES = (
+    "inertia",  # largest eigenvalue of the joint-space inertia matrix in the kept posture, summed over targets [kg m²]
+    "worst_inertia",  # its maximum
+    "joint_travel",  # Euclidean norm of the turns of the motors from the target before, summed [rad]
+    "longest_turn",  # of a motor from the target before [rad]
+    "kinetic_energy_at_1_s_a_move",  # at the targets if the turns from the target before took one second, summed [J]
+    "sag_at_1_Nm_per_rad",  # of the tip by gravity if every motor yields 1 rad under 1 N m, first order, summed [m]
+    "tip_sweep",  # of the tip by the turns from the target before, were its Jacobian the target's, summed [m]
 )
+
+
+def dynamic_quantities(evaluation: Evaluation) -> Array:
+    """Return (N, Q) the QUANTITIES of arms."""
+    inertia = np.linalg.eigvalsh(evaluation.motor_inertia)[..., -1].astype(np.float64)
+    turns = np.diff(evaluation.q, axis=1, prepend=0.0) / evaluation.arms.travel[:, None]  # (N, T, D) [rad]
+    energy = 0.5 * np.einsum("nti,ntij,ntj->nt", turns, evaluation.motor_inertia, turns)
+    sag, sweep = (
+        np.linalg.norm((evaluation.motor_jacobian @ motion[..., None])[..., 0], axis=-1)
+        for motion in (evaluation.motor_torques, turns)
+    )
+    columns = [
+        inertia.sum(axis=1),
+        inertia.max(axis=1),
+        np.linalg.norm(turns, axis=-1).sum(axis=1),
+        np.abs(turns).max(axis=(1, 2)),
+        energy.sum(axis=1),
+        sag.sum(axis=1),
+        sweep.sum(axis=1),
+    ]
+    return np.column_stack(columns)

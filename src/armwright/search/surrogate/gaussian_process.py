@@ -35,17 +35,11 @@ LENGTH = (2.1, 0.7)  # the mean for one input; it grows by log(F) / 2
 
 @dataclass(frozen=True)
 class Hyperparameters:
-    """Variances of a process, and the length over which each input changes the response.
+    """Variances of a process, and the length over which each input changes the response."""
 
-    Attributes:
-        amplitude: variance of the response.
-        noise: variance of what the inputs do not explain.
-        lengths: (F,) in units of the inputs.
-    """
-
-    amplitude: float
-    noise: float
-    lengths: Array
+    amplitude: float  # variance of the response
+    noise: float  # variance of what the inputs do not explain
+    lengths: Array  # (F,) in units of the inputs
 
     @property
     def logs(self) -> Array:
@@ -55,17 +49,11 @@ class Hyperparameters:
 
 @dataclass(frozen=True)
 class GaussianProcess:
-    """A process conditioned on observations.
+    """A process conditioned on observations."""
 
-    Attributes:
-        inputs: (N, F) of about unit variance.
-        observations: (N,) of mean 0 and unit variance.
-        hyperparameters: of the kernel.
-    """
-
-    inputs: Array
-    observations: Array
-    hyperparameters: Hyperparameters
+    inputs: Array  # (N, F) of about unit variance
+    observations: Array  # (N,) of mean 0 and unit variance
+    hyperparameters: Hyperparameters  # of the kernel
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Return the (K,) means and standard deviations of the response at (K, F) inputs, without noise."""

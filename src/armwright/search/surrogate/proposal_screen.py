@@ -1,7 +1,5 @@
 """The screen of proposals: which designs of others the surrogate expects too little of."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from armwright.arrays import Array
@@ -12,20 +10,9 @@ LEAST_QUALITY = 0.5  # share of the variance of each objective that is predicted
 LEAST_GAIN = 0.1  # of the best candidate's; such a proposal is worth less than a tenth of the sampler's own design
 
 
-@dataclass(frozen=True)
-class Rejection:
-    """Why a design is not worth an evaluation.
-
-    Attributes:
-        gain: its expected gain of hypervolume, as a share of the best candidate's.
-        predicted: its objectives as predicted.
-    """
-
-    gain: float
-    predicted: tuple[float, ...]
-
-
-def rejection(surrogate: Surrogate, observations: Observations, row: Array, seed: int) -> Rejection | None:
+def rejection(
+    surrogate: Surrogate, observations: Observations, row: Array, seed: int
+) -> tuple[float, tuple[float, ...]] | None:
     """Return why a design is not worth an evaluation; None if it is, or if too little is known to tell.
 
     Args:
@@ -33,6 +20,9 @@ def rejection(surrogate: Surrogate, observations: Observations, row: Array, seed
         observations: the designs so far.
         row: (P,) the design.
         seed: of the candidates that it is compared with.
+
+    Returns:
+        Its expected gain of hypervolume, as a share of the best candidate's, and its predicted objectives.
     """
     if np.count_nonzero(~observations.failed) < LEAST_TRIALS:
         return None
@@ -44,4 +34,4 @@ def rejection(surrogate: Surrogate, observations: Observations, row: Array, seed
     gain = float(screen.gain(known)[0])
     if gain >= LEAST_GAIN * best:
         return None
-    return Rejection(round(gain / best, 6), tuple(screen.predicted(known)[0].tolist()))
+    return round(gain / best, 6), tuple(screen.predicted(known)[0].tolist())

@@ -15,19 +15,12 @@ LARGEST_LOG = 700.0  # of a prediction, so that it is finite
 
 @dataclass(frozen=True)
 class Transform:
-    """Standardised values, or standardised logarithms of them.
+    """Standardised values, or standardised logarithms of them."""
 
-    Attributes:
-        is_log: whether the logarithm is taken.
-        shift: added before.
-        mean: subtracted after it.
-        deviation: divided by after that.
-    """
-
-    is_log: bool
-    shift: float
-    mean: float
-    deviation: float
+    is_log: bool  # whether the logarithm is taken
+    shift: float  # added before
+    mean: float  # subtracted after it
+    deviation: float  # divided by after that
 
     @classmethod
     def of(cls, values: Array, is_log: bool) -> "Transform":
@@ -55,19 +48,12 @@ class Transform:
 
 @dataclass(frozen=True)
 class ResponseModel:
-    """A model of one objective.
+    """A model of one objective."""
 
-    Attributes:
-        inputs: name of its set of inputs.
-        transform: of its values.
-        hyperparameters: of its process.
-        log_posterior: of its hyperparameters and the values.
-    """
-
-    inputs: str
-    transform: Transform
-    hyperparameters: Hyperparameters
-    log_posterior: float
+    inputs: str  # name of its set of inputs
+    transform: Transform  # of its values
+    hyperparameters: Hyperparameters  # of its process
+    log_posterior: float  # of its hyperparameters and the values
 
 
 def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:

@@ -15,7 +15,7 @@ from armwright.exceptions import SettingsError
 from armwright.problem.problem import Problem
 from armwright.search.callable_names import name_of
 from armwright.search.surrogate.cheap_features import FeatureFunction
-from armwright.search.surrogate.proposal_screen import Rejection, rejection
+from armwright.search.surrogate.proposal_screen import rejection
 from armwright.search.surrogate.surrogate import STARTUP, Observations, Surrogate
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import Design
@@ -23,15 +23,10 @@ from armwright.spaces.parameters import Design
 
 @dataclass(frozen=True)
 class SurrogateFactory:
-    """Makes a sampler for each trial; they share what saves time.
+    """Makes a sampler for each trial; they share what saves time."""
 
-    Attributes:
-        surrogate: of a problem.
-        name: in the settings of a run.
-    """
-
-    surrogate: Surrogate = field(repr=False)
-    name: str
+    surrogate: Surrogate = field(repr=False)  # of a problem
+    name: str  # in the settings of a run
 
     def __call__(self, seed: int) -> "SurrogateSampler":
         """Return the sampler of one trial."""
@@ -105,8 +100,8 @@ class SurrogateSampler(BaseSampler):
         """Return a random value."""
         return self._random.sample_independent(study, trial, param_name, param_distribution)
 
-    def rejection(self, study: Study, design: Design) -> Rejection | None:
-        """Return why a design from another source is not worth an evaluation; None if it is."""
+    def rejection(self, study: Study, design: Design) -> tuple[float, tuple[float, ...]] | None:
+        """Return the gain and the prediction of a design that is not worth an evaluation; None if it is."""
         space = self._surrogate.problem.space
         row = space.normalised(space.matrix([design]))[0]
         return rejection(self._surrogate, self._observations(study, None), row, self._seed)

@@ -18,14 +18,10 @@ class SuccessModel:
     """The probability that the evaluation of a design succeeds.
 
     Least-squares classification: Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, section 6.5.
-
-    Attributes:
-        inputs: name of its set of inputs.
-        process: of success (1) and failure (-1).
     """
 
-    inputs: str
-    process: GaussianProcess
+    inputs: str  # name of its set of inputs
+    process: GaussianProcess  # of success (1) and failure (-1)
 
     def probability(self, inputs: Mapping[str, Array]) -> Array:
         """Return (N,) the probabilities of designs with these inputs, (N, F) of each set."""

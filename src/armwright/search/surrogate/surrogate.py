@@ -29,19 +29,12 @@ GROWTH = 10  # models are chosen anew when the trials have grown by one tenth
 
 @dataclass(frozen=True)
 class Observations:
-    """The designs of a study so far.
+    """The designs of a study so far."""
 
-    Attributes:
-        matrix: (N, P) evaluated designs, by trial number.
-        values: (N, M) objectives, minimised.
-        failed: (N,) True if the evaluation failed, so that the values mean nothing.
-        pending: (K, P) designs that are being evaluated.
-    """
-
-    matrix: Array
-    values: Array
-    failed: NDArray[np.bool_]
-    pending: Array
+    matrix: Array  # (N, P) evaluated designs, by trial number
+    values: Array  # (N, M) objectives, minimised
+    failed: NDArray[np.bool_]  # (N,) True if the evaluation failed, so that the values mean nothing
+    pending: Array  # (K, P) designs that are being evaluated
 
     def before(self, n: int) -> "Observations":
         """Return the first n evaluated designs."""
@@ -53,14 +46,10 @@ class Surrogate:
     """Models of the objectives of a problem, and a search for the design with the largest expected gain.
 
     All results depend on the arguments only. What is kept in memory saves time.
-
-    Attributes:
-        problem: the problem; its evaluator is never called.
-        function: custom inputs of a design; None for none.
     """
 
-    problem: Problem
-    function: FeatureFunction | None = None
+    problem: Problem  # the problem; its evaluator is never called
+    function: FeatureFunction | None = None  # custom inputs of a design; None for none
     _memory: dict[str, tuple[Any, Any]] = field(default_factory=dict[str, "tuple[Any, Any]"])
     _known: dict[bytes, Description] = field(default_factory=dict[bytes, Description])
 

@@ -36,7 +36,7 @@ SAVE_SECONDS = 5.0
 SHORT = 1_200  # evaluations on tasks with a cycle: searches of fewer find more after a smaller first generation
 SHORT_FIRST_BATCH = 200  # random designs in that first generation
 N_MEASURED = (1, 4, 16, 64)  # designs that the cost of results is measured on: more, while that is quick
-NOTABLE_SHARE, LONG_SHARE = 0.02, 0.1  # of the budget
+NOTABLE_SHARE, LONG_SHARE = 0.02, 0.1  # of the time of a session
 
 
 class FrontRun(RunResult):
@@ -321,10 +321,10 @@ class DirectSearch:
             return history, self.plan.elapsed - started
 
         history, seconds = verify_best(1)
-        if not self.plan.is_above(LONG_SHARE, seconds):  # most of it may be the loading of kernels in float64
+        if seconds <= LONG_SHARE * self.plan.session:  # most of it may be the loading of kernels in float64
             for n in N_MEASURED:
                 history, seconds = verify_best(n)
-                if self.plan.is_above(NOTABLE_SHARE, seconds):
+                if seconds > NOTABLE_SHARE * self.plan.session:
                     break
         design = seconds / len(history) + files_seconds(self.problem.task)
         if not history.front:

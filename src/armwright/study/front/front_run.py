@@ -2,11 +2,10 @@
 
 search.npz    state of the search, written every few seconds; a killed search loses no more than these
 trials.jsonl  designs of the final front; the others are counted only
-proposals/    the run in which a proposer gave the initial designs, if one did
 """
 
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
+from contextlib import nullcontext
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -18,17 +17,13 @@ from armwright.exceptions import SettingsError
 from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
-from armwright.proposers.proposer import Proposer
 from armwright.runs.config import FrontMethod
-from armwright.runs.folder import PROPOSALS, SEARCH, RunFolder, read_run
+from armwright.runs.folder import SEARCH, RunFolder, read_run
 from armwright.runs.trial import FinishedTrial
 from armwright.study.front.direct_search import DirectSearch, FrontRun
 from armwright.study.front.search_budget import SearchBudget, SearchProgress
 from armwright.study.front.time_plan import TimePlan
 from armwright.study.settings import run_config
-from armwright.study.study import optimize
-
-N_PROPOSED = 20  # initial designs requested from a proposer
 
 
 def find_front(
@@ -37,7 +32,7 @@ def find_front(
     budget: str | float | TimePlan | None = None,
     evaluations: int | None = None,
     seed: int = 0,
-    initial_designs: str | Path | Proposer | None = None,
+    initial_designs: str | Path | None = None,
     stop_at_stall: bool = True,
     out: str | Path | None = None,
     watch: Callable[[SearchProgress], None] | None = None,
@@ -52,7 +47,7 @@ def find_front(
         evaluations: number of evaluations, which the last batch may exceed by up to 1000. If it ends the search, the
             result depends on the seed only.
         seed: of all random numbers.
-        initial_designs: a run folder, whose designs are all taken, or a proposer.
+        initial_designs: a run folder, whose designs are all taken.
         stop_at_stall: end early when the hypervolume hardly grows any more.
         out: run folder; a second call resumes.
         watch: called with the progress.
@@ -73,17 +68,10 @@ def find_front(
     stop_if_proven(check_instantly(problem))
     matrix, origin = _initial_matrix(problem, initial_designs)  # before a folder is made
     config = run_config(problem, FrontMethod(initial_designs=origin), seed)
-    with ExitStack() as stack:
-        folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
+    with nullcontext() if out is None else RunFolder(Path(out)) as folder:
         if folder is not None:
             config = folder.adopt(config)
-        if folder is None or not (folder.path / SEARCH).exists():
-            # A proposer is asked, and paid, only after the folder was checked.
-            if initial_designs is not None and not isinstance(initial_designs, (str, Path)):
-                matrix = _proposed_matrix(
-                    problem, initial_designs, config.seed, None if folder is None else folder.path
-                )
-            if folder is not None:
+            if not (folder.path / SEARCH).exists():
                 matrix = np.vstack([matrix, _matrix(problem, folder.open_trials(config))])
         return DirectSearch(problem, config, folder, matrix, plan, watch).run(stop_at_stall)
 
@@ -93,15 +81,10 @@ def _matrix(problem: Problem, trials: Iterable[FinishedTrial]) -> Array:
     return problem.space.matrix([trial.design for trial in trials]).reshape(-1, len(problem.space.parameters))
 
 
-def _initial_matrix(
-    problem: Problem, initial_designs: str | Path | Proposer | None
-) -> tuple[Array, dict[str, Any] | None]:
-    """Return the (N, P) designs of a run folder, and a record of their origin; none yet if a proposer gives them."""
-    nothing = _matrix(problem, ())
+def _initial_matrix(problem: Problem, initial_designs: str | Path | None) -> tuple[Array, dict[str, Any] | None]:
+    """Return the (N, P) designs of a run folder, and a record of their origin."""
     if initial_designs is None:
-        return nothing, None
-    if not isinstance(initial_designs, (str, Path)):
-        return nothing, {"proposer": {"name": initial_designs.name, **initial_designs.settings()}}
+        return _matrix(problem, ()), None
     _, run = read_run(initial_designs)
     space = run.problem.space.model_copy(update={"name": problem.space.name})
     if space != problem.space or run.problem.task.targets != problem.task.targets:
@@ -111,10 +94,3 @@ def _initial_matrix(
         )
     matrix = _matrix(problem, run)
     return matrix, {"run": str(initial_designs), "designs": len(matrix), "sha256": sha256(matrix.tobytes()).hexdigest()}
-
-
-def _proposed_matrix(problem: Problem, proposer: Proposer, seed: int, out: Path | None) -> Array:
-    """Return (N, P) designs of a proposer, from a study whose counted trials are all its own."""
-    folder = None if out is None else out / PROPOSALS
-    study = optimize(problem, proposer=proposer, n_step=1, n_total=N_PROPOSED, seed=seed, out=folder)
-    return _matrix(problem, study.history)

@@ -15,21 +15,13 @@ from armwright.search.front.selection import Indices, nearest, thinned
 
 @dataclass(frozen=True)
 class ReportedFront:
-    """K designs of a front, sorted by the first objective.
+    """K designs of a front, sorted by the first objective."""
 
-    Attributes:
-        matrix: (K, P) designs.
-        values: (K, M) objectives.
-        evaluations: Reduced designs that were evaluated.
-        reduced: Reduced designs among the K.
-        found: Designs that a user can tell apart, of which K were affordable.
-    """
-
-    matrix: Array
-    values: Array
-    evaluations: int
-    reduced: int
-    found: int
+    matrix: Array  # (K, P) designs
+    values: Array  # (K, M) objectives
+    evaluations: int  # reduced designs that were evaluated
+    reduced: int  # reduced designs among the K
+    found: int  # designs that a user can tell apart, of which K were affordable
 
 
 def reported_front(

@@ -14,15 +14,10 @@ _SECONDS = {None: 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 @dataclass(frozen=True)
 class SearchBudget:
-    """What a search may spend in all its sessions together; whichever limit is reached first ends it.
+    """What a search may spend in all its sessions together; whichever limit is reached first ends it."""
 
-    Attributes:
-        evaluations: number of evaluations, which the last batch may exceed; None for no limit.
-        seconds: wall-clock time, with verification, files and figures [s]; None for no limit.
-    """
-
-    evaluations: int | None = None
-    seconds: float | None = None
+    evaluations: int | None = None  # number of evaluations, which the last batch may exceed; None for no limit
+    seconds: float | None = None  # wall-clock time, with verification, files and figures [s]; None for no limit
 
     def __post_init__(self) -> None:
         for name, bound in (("evaluations", self.evaluations), ("seconds", self.seconds)):
@@ -54,29 +49,17 @@ def read_seconds(budget: str | float) -> float:
 
 @dataclass(frozen=True)
 class SearchProgress:
-    """Progress of a direct search.
+    """Progress of a direct search."""
 
-    Attributes:
-        evaluations: designs evaluated in all sessions.
-        seconds: search time of all sessions [s].
-        hypervolume: hypervolume of the front; None while its reference point is provisional.
-        front_size: designs on the front.
-        budget: the budget of the search.
-        seconds_left: search time that the budget leaves [s]; infinite without a limit.
-        new_evaluations: designs evaluated in this session.
-        new_seconds: search time of this session [s].
-        is_ended: whether the search has ended, and its front is verified now.
-    """
-
-    evaluations: int
-    seconds: float
-    hypervolume: float | None
-    front_size: int
+    evaluations: int  # designs evaluated in all sessions
+    seconds: float  # search time of all sessions [s]
+    hypervolume: float | None  # hypervolume of the front; None while its reference point is provisional
+    front_size: int  # designs on the front
     budget: SearchBudget
-    seconds_left: float = math.inf
-    new_evaluations: int = 0
-    new_seconds: float = 0.0
-    is_ended: bool = False
+    seconds_left: float = math.inf  # search time that the budget leaves [s]; infinite without a limit
+    new_evaluations: int = 0  # designs evaluated in this session
+    new_seconds: float = 0.0  # search time of this session [s]
+    is_ended: bool = False  # whether the search has ended, and its front is verified now
 
     @property
     def share(self) -> float:

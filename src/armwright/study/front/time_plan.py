@@ -1,8 +1,8 @@
 """Plan of the wall-clock time of a search: how much for evaluations, and how much for what follows them.
 
-Until the cost of results is measured on designs of the run, a fixed share is reserved for them. Afterwards, the reserve
-is the cost of simulating and perturbing the recommended designs, at most five, and of verifying the front, at most 300
-designs. If verification takes more than a share of the budget, fewer designs of the front are kept.
+What follows is the simulation and perturbation of at most five recommended designs, the verification of at most 300
+designs of the front, their files, figures and a page. Its cost is measured on designs of the run. If it would take more
+than a share of the time, fewer designs of the front are kept.
 """
 
 import math
@@ -15,15 +15,11 @@ from armwright.study.front.search_budget import SearchBudget
 from armwright.tasks.task import Task
 
 MAX_DESIGNS = 300  # of the front that become trials
-FEW_DESIGNS = 10  # that are verified even if they take more than their share of the budget
-SEARCH_SHARE = 0.3  # of the budget that the search gets at least
-RESULTS_SHARE = 0.2  # of the budget at most, to verify and write designs
-FEW_SHARE = 0.4  # of the budget at most, to verify and write few designs
-LATE_SECONDS = 1.0  # [s] for verifying and writing designs even if the time is up
-RECOMMENDED_SHARE = 0.2  # of the budget at most, to simulate and perturb the recommended designs
-UNKNOWN_SHARE = 0.3  # of the budget for results whose costs are unknown
+SEARCH_SHARE = 0.3  # of the time that the search gets at least
+RESULTS_SHARE = 0.3  # of the time at most for results; as much while their cost is unknown
+LATE_SECONDS, LATE_SHARE = 1.0, 0.2  # [s] for verifying and writing designs even if the time is up, or this share of it
 MEASURED_AT = 0.2  # spent share of the budget from which on costs are measured
-DRAWING_SHARE, DRAWING_SECONDS = 0.15, (2.5, 6.0)  # [s]: page and figures
+DRAWING_SECONDS = 3.0  # [s]: page and figures
 RECOMMENDED = 5  # designs
 SIMULATIONS = 3  # per recommended design: as it is, and with assumed values halved and doubled
 CHUNK_SHARE, CHUNK_SECONDS = 0.02, (0.5, 5.0)  # of the budget between two looks at the clock, and its bounds [s]
@@ -33,17 +29,11 @@ SMALLEST_CHUNK, CHUNK_GROWTH = 16, 4  # designs, of which fewer take nearly as l
 
 @dataclass(frozen=True)
 class ResultCosts:
-    """Measured cost of results.
+    """Measured cost of results."""
 
-    Attributes:
-        design: time to verify a design and write its files [s].
-        simulation: time to simulate a design [s]; None while none is feasible.
-        survival: time to evaluate the survival of a design [s].
-    """
-
-    design: float
-    simulation: float | None = None
-    survival: float = 0.0
+    design: float  # to verify a design and write its files [s]
+    simulation: float | None = None  # to simulate a design [s]; None while none is feasible
+    survival: float = 0.0  # to evaluate the survival of a design [s]
 
 
 class TimePlan:
@@ -55,11 +45,6 @@ class TimePlan:
         started: when the time began by the clock; None for now.
         clock: a clock [s].
         excluded: returns the time that does not count so far [s].
-
-    Attributes:
-        earlier: time of earlier sessions that counts [s].
-        costs: cost of results; None until measured.
-        n_found: designs on the front.
     """
 
     def __init__(
@@ -71,12 +56,11 @@ class TimePlan:
         excluded: Callable[[], float] = lambda: compilation.seconds,
     ) -> None:
         self.budget = budget
-        self.earlier = 0.0
-        self.costs: ResultCosts | None = None
-        self.n_found = MAX_DESIGNS
+        self.earlier = 0.0  # time of earlier sessions that counts [s]
+        self.costs: ResultCosts | None = None  # until measured
+        self.n_found = MAX_DESIGNS  # designs on the front
         self._limit = math.inf if budget.seconds is None else budget.seconds
-        least, most = DRAWING_SECONDS
-        self._drawing = min(most, max(least, DRAWING_SHARE * self._limit)) if drawing else 0.0
+        self._drawing = DRAWING_SECONDS if drawing else 0.0
         self._clock, self._excluded = clock, excluded
         self._started = (clock() if started is None else started) - excluded()
         self._search_started = 0.0
@@ -85,6 +69,11 @@ class TimePlan:
     def elapsed(self) -> float:
         """Time of this session [s]."""
         return self._clock() - self._started - self._excluded()
+
+    @property
+    def session(self) -> float:
+        """Time that earlier sessions left to this one [s]; infinite without a limit."""
+        return self._limit - self.earlier
 
     @property
     def spent(self) -> float:
@@ -115,8 +104,12 @@ class TimePlan:
         """Time until the search should end [s]; infinite without a limit."""
         if math.isinf(self._limit):
             return math.inf
-        at_least = SEARCH_SHARE * (self._limit - self.earlier) - self.search_seconds
-        return max(self.left_for_results - self._reserved, min(at_least, self.left))
+        reserved = RESULTS_SHARE * self.session
+        if self.costs is not None:
+            verified = min(MAX_DESIGNS, self.n_found) * self.costs.design
+            reserved = min(reserved, self._seconds_for_recommended + verified)
+        at_least = SEARCH_SHARE * self.session - self.search_seconds
+        return max(self.left_for_results - reserved, min(at_least, self.left))
 
     def should_measure(self, is_feasible: bool) -> bool:
         """Return whether it is time to measure the cost of results; is_feasible: whether a design is feasible."""
@@ -130,13 +123,9 @@ class TimePlan:
             return MAX_DESIGNS
         if self.costs is None:
             return 1
-        seconds = max(self.left_for_results - self._for_recommended, min(LATE_SECONDS, RESULTS_SHARE * self._limit))
-        affordable = seconds / max(self.costs.design, 1e-9)
-        return int(min(MAX_DESIGNS, max(1.0, affordable)))
-
-    def is_above(self, share: float, seconds: float) -> bool:
-        """Return whether a time is more than a share of what the budget leaves to this session."""
-        return seconds > share * (self._limit - self.earlier)
+        left = self.left_for_results
+        seconds = max(left / 2.0, left - self._seconds_for_recommended, min(LATE_SECONDS, LATE_SHARE * self._limit))
+        return int(min(MAX_DESIGNS, max(1.0, seconds / max(self.costs.design, 1e-9))))
 
     def has_time_for(self, simulations: int, survivals: int, after: float) -> bool:
         """Return whether there is time to simulate some designs, and to evaluate the survival of some.
@@ -149,19 +138,9 @@ class TimePlan:
         return self.left_for_results - after >= self._seconds_for(simulations, survivals)
 
     @property
-    def _reserved(self) -> float:
-        """Time for results, without page and figures [s]."""
-        if self.costs is None:
-            return UNKNOWN_SHARE * self._limit
-        all_designs = min(RESULTS_SHARE * self._limit, min(MAX_DESIGNS, self.n_found) * self.costs.design)
-        few_designs = min(FEW_SHARE * self._limit, min(FEW_DESIGNS, self.n_found) * self.costs.design)
-        return self._for_recommended + max(all_designs, few_designs)
-
-    @property
-    def _for_recommended(self) -> float:
-        """Time to simulate and perturb the recommended designs [s]."""
+    def _seconds_for_recommended(self) -> float:
         recommended = min(RECOMMENDED, self.n_found)
-        return min(RECOMMENDED_SHARE * self._limit, self._seconds_for(SIMULATIONS * recommended, recommended))
+        return self._seconds_for(SIMULATIONS * recommended, recommended)
 
     def _seconds_for(self, simulations: int, survivals: int) -> float:
         """Return the time of simulations and evaluations of survival, as far as it is known [s]."""

@@ -39,18 +39,15 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class Workers:
     """Worker processes that evaluate designs; needs the extra `distributed`.
 
-    Attributes:
-        n_workers: local processes to start, with one thread each. With a scheduler: tasks in flight, by default as
-            many as its workers have threads.
-        scheduler: address of the scheduler of an existing Dask cluster, such as tcp://192.168.0.7:8786.
-
     Raises:
         SettingsError: neither is given, or the number is out of range.
         MissingExtraError: the extra is not installed.
     """
 
+    # Local processes to start, with one thread each. With a scheduler: tasks in flight, by default as many as its
+    # workers have threads
     n_workers: int | None = None
-    scheduler: str | None = None
+    scheduler: str | None = None  # address of the scheduler of an existing Dask cluster, such as tcp://192.168.0.7:8786
 
     def __post_init__(self) -> None:
         if self.n_workers is None and not self.scheduler:

@@ -8,11 +8,11 @@ from armwright.exceptions import EvaluatorError
 from armwright.problem.problem import Problem
 from armwright.spaces.parameters import Design
 from armwright.study.workers.cluster import MAX_LOSSES, Cluster, Workers
-from armwright.study.workers.evaluation_backend import Evaluated, EvaluationBackend, describe_design, evaluate_design
+from armwright.study.workers.evaluation_backend import Evaluated, describe_design, evaluate_design
 from armwright.study.workers.evaluation_process import EvaluationProcess, pickle_problem, unpickle_problem
 
 
-class DaskBackend(EvaluationBackend):
+class DaskBackend:
     """Evaluates designs on workers, which get the problem and its evaluator by value.
 
     Args:
@@ -45,7 +45,12 @@ class DaskBackend(EvaluationBackend):
         self._cluster.submit(number, f"trial {number}", evaluate_on_worker, self._problem, design, self._timeout)
 
     def next_result(self, timeout: float) -> tuple[int, Evaluated] | None:
-        """Return a trial that finished."""
+        """Return a trial that finished, or None if none does within `timeout` [s].
+
+        Raises:
+            EvaluatorError: an evaluator cannot be loaded, or the workers that ran it were lost.
+            ClusterError: the cluster was lost.
+        """
         finished = self._cluster.wait(timeout)
         if finished is None:
             return None

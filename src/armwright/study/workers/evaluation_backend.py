@@ -1,13 +1,8 @@
-"""Where the designs of a study are evaluated: the interface, and the backends that evaluate one design at a time.
-
-`dask_backend.py` has another backend: several worker processes, local ones or those of a cluster.
-"""
+"""Evaluation of a study's designs one at a time; `dask_backend.py` evaluates them on several workers."""
 
 import json
 import time
-from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
 
 from armwright.problem.problem import Outcome, Problem
 from armwright.spaces.parameters import Design
@@ -22,108 +17,31 @@ class Evaluated:
     seconds: float
 
 
-class EvaluationBackend(Protocol):
-    """Evaluates the designs of trials, in any order.
+class LocalBackend:
+    """Evaluates designs in this process; with a timeout [s], a process of its own runs the custom evaluator."""
 
-    A backend is owned by one study, which submits no more than `capacity` designs before it takes results.
-    """
+    capacity = 1  # designs that may be in flight
 
-    @property
-    def capacity(self) -> int:
-        """Designs that may be in flight."""
-        ...
-
-    def submit(self, number: int, design: Design) -> None:
-        """Start the evaluation of trial `number`."""
-        ...
-
-    def next_result(self, timeout: float) -> tuple[int, Evaluated] | None:
-        """Return the number of a trial that finished and its outcome.
-
-        Args:
-            timeout: how long to wait for one [s].
-
-        Returns:
-            One result, or None if there is none yet.
-
-        Raises:
-            EvaluatorError: an evaluator cannot be loaded, or the workers that ran it were lost.
-            ClusterError: the cluster was lost.
-        """
-        ...
-
-    def close(self) -> None:
-        """Abandon what is in flight."""
-        ...
-
-
-class InProcessBackend(EvaluationBackend):
-    """Evaluates in this process, one design at a time."""
-
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, timeout: float | None = None) -> None:
         self._problem = problem
-        self._results: deque[tuple[int, Evaluated]] = deque()
-
-    @property
-    def capacity(self) -> int:
-        """One design."""
-        return 1
+        self._process = None if timeout is None else EvaluationProcess(pickle_problem(problem), timeout)
+        self._result: tuple[int, Evaluated] | None = None
 
     def submit(self, number: int, design: Design) -> None:
-        """Evaluate the design at once."""
-        self._results.append((number, evaluate_design(self._problem, design)))
+        """Evaluate the design of trial `number` at once."""
+        self._result = number, evaluate_design(self._problem, design, self._process)
 
     def next_result(self, timeout: float) -> tuple[int, Evaluated] | None:
-        """Return the trial that was submitted."""
-        if self._results:
-            return self._results.popleft()
-        if timeout:
+        """Return the trial that was submitted; None after `timeout` [s] if none was."""
+        result, self._result = self._result, None
+        if result is None and timeout:
             time.sleep(timeout)  # a paused study looks again then
-        return None
-
-    def close(self) -> None:
-        """Do nothing: no design is in flight."""
-
-
-class ProcessBackend(EvaluationBackend):
-    """Runs the custom evaluator in a process of its own, one design at a time, and ends it after a timeout.
-
-    Args:
-        problem: the problem.
-        timeout: for one evaluation [s].
-    """
-
-    def __init__(self, problem: Problem, timeout: float) -> None:
-        self._problem = problem
-        self._process = EvaluationProcess(pickle_problem(problem), timeout)
-        self._current: tuple[int, Design] | None = None
-        self._started = 0.0
-
-    @property
-    def capacity(self) -> int:
-        """One design."""
-        return 1
-
-    def submit(self, number: int, design: Design) -> None:
-        """Send a design to the process."""
-        self._process.submit(design)
-        self._current, self._started = (number, design), time.perf_counter()
-
-    def next_result(self, timeout: float) -> tuple[int, Evaluated] | None:
-        """Return the trial that was submitted, if it finished."""
-        if self._current is None:
-            time.sleep(timeout)  # a paused study looks again then
-            return None
-        measured = self._process.result(timeout)
-        if measured is None:
-            return None
-        (number, design), self._current = self._current, None
-        outcome = self._problem.outcomes_of([design], [measured])[0]
-        return number, Evaluated(outcome, time.perf_counter() - self._started)
+        return result
 
     def close(self) -> None:
         """End the process."""
-        self._process.close()
+        if self._process is not None:
+            self._process.close()
 
 
 def evaluate_design(problem: Problem, design: Design, process: EvaluationProcess | None = None) -> Evaluated:

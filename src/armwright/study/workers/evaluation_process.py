@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from contextlib import suppress
 from functools import lru_cache
 from multiprocessing import Pipe
@@ -69,11 +68,9 @@ class EvaluationProcess:
         self.timeout = timeout
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection[Any, Any] | None = None
-        self._design: Design | None = None
-        self._began = 0.0
 
-    def submit(self, design: Design) -> None:
-        """Start to measure a design.
+    def measure(self, design: Design) -> Measurement:
+        """Measure a design.
 
         Raises:
             EvaluatorError: the process cannot load the evaluator.
@@ -81,30 +78,14 @@ class EvaluationProcess:
         if self._process is None or self._process.poll() is not None:
             self._start()
         assert self._connection is not None
-        self._design, self._began = design, time.monotonic()
-        self._connection.send(design)
-
-    def result(self, wait: float) -> Measurement | None:
-        """Return the measurement, or None if there is none within `wait` [s]."""
-        assert self._connection is not None
-        assert self._design is not None
-        left = self._began + self.timeout - time.monotonic()
-        if self._connection.poll(max(0.0, min(wait, left))):
-            try:
+        try:
+            self._connection.send(design)
+            if self._connection.poll(self.timeout):
                 return self._connection.recv()
-            except (EOFError, OSError):
-                return self._after_end(self._design)
-        if time.monotonic() - self._began < self.timeout:
-            return None
+        except (EOFError, OSError):
+            return self._after_end(design)
         self.close()
         return Failure("timeout", f"no result within {self.timeout:g} s")
-
-    def measure(self, design: Design) -> Measurement:
-        """Measure a design and wait for the result."""
-        self.submit(design)
-        while (measured := self.result(self.timeout)) is None:
-            pass
-        return measured
 
     def close(self) -> None:
         """Kill the process and those that it started."""
@@ -137,14 +118,14 @@ class EvaluationProcess:
             self.close()
             raise EvaluatorError(failure)
 
-    def _after_end(self, design: Design) -> Measurement | None:
-        """Return how a process failed that ended while it had a design; if it was only idle, start another one."""
+    def _after_end(self, design: Design) -> Measurement:
+        """Return how a process failed that ended while it had a design; if it was only idle, try another one."""
         end = self._end()
         assert self._process is not None
-        if self._process.returncode == IDLE_EXIT:
-            self.submit(design)
-            return None
+        is_idle = self._process.returncode == IDLE_EXIT
         self.close()
+        if is_idle:
+            return self.measure(design)
         return Failure("exception", f"the process of the evaluator {end}", end)
 
     def _end(self) -> str:

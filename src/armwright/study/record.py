@@ -1,0 +1,95 @@
+"""The finished trials of a study: on disk, as a history, and counted."""
+
+from collections import Counter
+
+from armwright.pareto import FrontTracker
+from armwright.problem.evaluators import evaluator_error
+from armwright.problem.problem import Problem
+from armwright.runs.config import RunConfig
+from armwright.runs.folder import RunFolder
+from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial
+from armwright.study.workers.evaluation_backend import describe_design
+
+N_FIRST = 5  # evaluations; if they all fail with the same exception, the evaluator is at fault, not the designs
+
+
+class Record:
+    """The finished trials of a study, and its configuration, in the run folder if there is one."""
+
+    def __init__(self, problem: Problem, config: RunConfig, folder: RunFolder | None, allow_failures: bool) -> None:
+        self.config = config
+        self.trials = [] if folder is None else folder.open_trials(config)
+        self.faults: Counter[str] = Counter()  # of proposals, by kind
+        self.failures: Counter[str] = Counter()  # of evaluations, by kind
+        self.latest_failures: dict[str, str] = {}  # trial and reason of the last failure of each kind
+        self.front = FrontTracker(len(problem.objectives), config.reference_point)
+        self._folder = folder
+        self._allow_failures = allow_failures
+        self._history = History(problem, (), config.study.n_init, config.reference_point, config.study)
+        self._is_frozen = problem.reference_point is not None
+        for trial in self.trials:
+            self._count(trial)
+        self._freeze_reference_point()
+
+    def history(self) -> History:
+        """Return the finished trials; extends the last history, so that the cost does not grow with the trials."""
+        self._history = self._history.grown(tuple(self.trials), self.config.reference_point)
+        return self._history
+
+    def add(self, trial: FinishedTrial) -> None:
+        """Write an evaluated trial, which is part of the run from now on.
+
+        Raises:
+            EvaluatorError: The first evaluations all failed with the same exception; their trials are discarded.
+        """
+        if not self._allow_failures:
+            self._check_first(trial)
+        if self._folder is not None:
+            self._folder.append(trial)
+        self.trials.append(trial)
+        self._count(trial)
+        self._freeze_reference_point()
+
+    def _count(self, trial: FinishedTrial) -> None:
+        if trial.is_feasible:
+            self.front.add(trial.values)
+        if trial.fault:
+            self.faults[trial.fault] += 1
+        if trial.failure is not None:
+            self.failures[trial.failure.kind] += 1
+            self.latest_failures[trial.failure.kind] = f"trial {trial.number}: {trial.failure.description}"
+
+    def _check_first(self, trial: FinishedTrial) -> None:
+        failure = trial.failure
+        if failure is None or trial.duplicate_of is not None:
+            return
+        first = [other.failure for other in self.trials if other.duplicate_of is None]
+        if len(first) + 1 != min(N_FIRST, self.config.study.n_trials):
+            return
+        if not all(other is not None and other.is_same_exception(failure) for other in first):
+            return
+        if self._folder is not None:
+            self._folder.replace_trials([])
+        raise evaluator_error(
+            f"the first {len(first) + 1} evaluations all failed: {failure.description}; last design: "
+            f"{describe_design(trial.design)}. Fix the evaluator and rerun the same command, or go on with "
+            "--allow-failures",
+            failure,
+        )
+
+    def _freeze_reference_point(self) -> None:
+        """Store a reference point that the task leaves open, once the random trials give it.
+
+        It follows the trials until enough of them have succeeded.
+        """
+        if self._is_frozen or len(self.trials) < self.config.study.n_init:
+            return
+        history = self.history()
+        self._is_frozen = history.has_reference_trials
+        reference_point = history.found_reference_point()
+        if reference_point is not None and reference_point != self.config.reference_point:
+            self.config = self.config.model_copy(update={"reference_point": reference_point})
+            self.front.set_reference_point(reference_point)
+            if self._folder is not None:
+                self._folder.write_config(self.config)
