@@ -5,7 +5,6 @@
 
 import json
 import shutil
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -19,7 +18,6 @@ from armwright.exceptions import (
 )
 from armwright.experiments.cells import plan_cells
 from armwright.experiments.plan import load_experiment
-from armwright.llm.prompt import load_prompt
 from armwright.llm.transcript import Transcript
 from armwright.page.page import write_report
 from armwright.proof.results import read_summary
@@ -158,7 +156,7 @@ def remove_setting(run: Path, field: str) -> None:
     (run / "config.yaml").write_text("\n".join(lines), encoding="utf-8")
 
 
-@pytest.mark.parametrize("field", ["proposals", "memory", "answer", "name"])
+@pytest.mark.parametrize("field", ["memory", "answer", "name"])
 def test_config_without_a_proposer_setting_is_refused(run: Path, field: str) -> None:
     remove_setting(run, field)
     with pytest.raises(RunFolderError, match=field):
@@ -219,17 +217,3 @@ def test_hostile_urdf_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
     with pytest.raises(ArmwrightError) as refusal:
         read_urdf(file)
     assert str(refusal.value).isprintable()
-
-
-@pytest.mark.parametrize("text", ["{{ " + "(" * 300 + "1" + ")" * 300 + " }}", "{{ " + "-" * 300 + "1 }}"])
-def test_deeply_nested_template_is_read_or_refused(tmp_path: Path, text: str) -> None:
-    """Python refuses what jinja makes of it."""
-    (tmp_path / "mine.md.j2").write_text(text, encoding="utf-8")
-    with suppress(SettingsError):
-        load_prompt(tmp_path / "mine.md.j2")
-
-
-def test_template_with_too_many_digits_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "mine.md.j2").write_text("{{ " + "9" * 5000 + " }}", encoding="utf-8")
-    with pytest.raises(SettingsError, match="cannot be read: Exceeds the limit"):
-        load_prompt(tmp_path / "mine.md.j2")

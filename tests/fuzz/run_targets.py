@@ -25,7 +25,7 @@ def a_run() -> Path:
     there = folder() / "run"
     with ChatServer() as server:
         server.answer = designer
-        proposer = llm_proposer(server.url, memory="own", origin="scripted")
+        proposer = llm_proposer(server.url, memory="chat", origin="scripted")
         aw.optimize(a_problem(), proposer=proposer, n_init=3, n_step=2, n_total=4, out=there)
     write_report(there)
     (there / "existing_arms.json").write_text(

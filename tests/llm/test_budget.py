@@ -14,7 +14,7 @@ from armwright.exceptions import ModelError, ProposalError
 from armwright.llm.backend import CHECK, LlmBackend, OutputFormat, Question, Reply, Turn
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prices import ExpectedTokens, describe_cost
+from armwright.llm.prices import describe_cost
 from armwright.llm.responses import cost_of
 from armwright.llm.servers import server_of
 from armwright.llm.session import LlmSession
@@ -153,8 +153,8 @@ def test_forecast_includes_a_known_price(monkeypatch: pytest.MonkeyPatch) -> Non
     forecast = LlmProposer("openai-chat:gpt-4o").forecast(PROBLEM, 20)
     assert forecast.startswith("20 proposals: about 41 calls, ")
     assert "USD by public prices" in forecast
-    half = LlmProposer(ModelOptions(model="openai-chat:gpt-4o", answer="one-step", proposals=4)).forecast(PROBLEM, 20)
-    assert half.startswith("20 proposals: about 6 calls, ")
+    half = LlmProposer(ModelOptions(model="openai-chat:gpt-4o", answer="one-step")).forecast(PROBLEM, 20)
+    assert half.startswith("20 proposals: about 21 calls, ")
     unknown = LlmProposer("openai-chat:a-model-of-tomorrow").forecast(PROBLEM, 20)
     assert unknown.endswith("price unknown")
 
@@ -184,8 +184,7 @@ def test_model_on_a_local_server_has_no_vendor_price(chat_server: ChatServer) ->
     ],
 )
 def test_price_depends_on_the_host(model: str, address: str | None, words: str) -> None:
-    tokens = ExpectedTokens(1, 10**6, 10**6)
-    assert describe_cost(ModelOptions(model=model, base_url=address), tokens) == words
+    assert describe_cost(ModelOptions(model=model, base_url=address), 1, 10**6, 10**6) == words
     server = server_of(ModelOptions(model=model, base_url=address))
     if server is not None:
         usage = RequestUsage(input_tokens=10**6, output_tokens=10**6)

@@ -8,7 +8,7 @@ import pytest
 
 from armwright.kinematics.arms.arm_arrays import carrying, stack_arms
 from armwright.kinematics.ik.ik import solve_postures
-from armwright.llm.prompt import load_prompt
+from armwright.llm.prompt import design_prompt
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.urdf_writer import to_urdf
@@ -135,7 +135,7 @@ def test_number_is_a_point_mass_at_the_tip() -> None:
 
 def test_prompt_states_tool_and_payload() -> None:
     problem = Problem(task(tool=TOOL, payload=BOX.model_dump()), SPACE)
-    prompt = load_prompt("plus").render(History(problem, [], 1, problem.reference_point), 0)
+    prompt = design_prompt(History(problem, [], 1, problem.reference_point), 0)
     assert "The tip is 0.02, -0.03, 0.1 m from the end of the last link" in prompt
     assert "the tool has 0.7 kg, with its centre of mass at (0, 0, 0.05) m" in prompt
     assert "0.8 kg, centre at (0.02, -0.01, 0.05) m in the tip frame, a box of (0.06, 0.04, 0.1) m" in prompt

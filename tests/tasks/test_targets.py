@@ -8,7 +8,7 @@ import pinocchio
 import pytest
 
 from armwright.exceptions import ArmError, SettingsError, TaskError
-from armwright.llm.prompt import load_prompt
+from armwright.llm.prompt import design_prompt
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
 from armwright.problem.problem import Problem
@@ -181,7 +181,7 @@ def test_tools_of_arms_are_checked() -> None:
 
 
 def test_prompt_states_target_requirements() -> None:
-    text = load_prompt("plus").render(fixed_history(FixedProblem(task(), paper_space(6))), seed=0)
+    text = design_prompt(fixed_history(FixedProblem(task(), paper_space(6))), seed=0)
     for words in (
         "- target 1: axis (0, 0, -2)",
         "- target 3: orientation (1.5, 0, 1.5) rad, tolerance 2 mm, angle tolerance 2.865°, weight 2",

@@ -132,10 +132,10 @@ class Drafter(LlmSession):
 
     def forecast(self, description: str) -> str:
         """Return the model and the estimated tokens and cost, in one line."""
-        from armwright.llm.prices import ExpectedTokens, describe_cost
+        from armwright.llm.prices import describe_cost
 
         given, configured = _input_tokens(description), self.configured
-        cost = describe_cost(configured.options, ExpectedTokens(1, given, ANSWER_TOKENS))
+        cost = describe_cost(configured.options, 1, given, ANSWER_TOKENS)
         return (
             f"asking {self._by()}{configured.place}, named by {configured.named_by}: about {given:,} tokens in, "
             f"{ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
@@ -216,12 +216,12 @@ class Drafter(LlmSession):
 
     def _check_price(self, description: str) -> None:
         """Raise SettingsError if the first question alone may exceed max_cost."""
-        from armwright.llm.prices import ExpectedTokens, estimated_cost
+        from armwright.llm.prices import estimated_cost
 
         options = self.configured.options
         if options.max_cost is None:
             return
-        cost = estimated_cost(options, ExpectedTokens(1, _input_tokens(description), ANSWER_TOKENS))
+        cost = estimated_cost(options, 1, _input_tokens(description), ANSWER_TOKENS)
         if cost is None:
             raise SettingsError(f"the price of {options.model} is unknown; use max_calls instead of max_cost")
         if cost > options.max_cost:

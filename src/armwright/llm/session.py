@@ -45,6 +45,10 @@ class LlmSession:
         self._transcript = Transcript(None)
         self._over = threading.Event()  # set when no more answers are wanted in this session
 
+    def identity(self, number: int) -> str:
+        """Return the id of the question for trial `number` and of its proposal."""
+        return f"{self.name}-{number:04d}"
+
     def summary(self) -> ProposerSummary:
         """Return calls, tokens and cost of the whole run, earlier sessions included."""
         return self._summary(self._transcript.calls)

@@ -14,25 +14,14 @@ from armwright.spaces.parameters import Design
 
 @dataclass(frozen=True)
 class Proposal:
-    """A design to evaluate next.
-
-    Attributes:
-        design: the design.
-        id: unique within the run.
-        reason: one line.
-        expected: objectives that the proposer expects, if any.
-        asked: trial that it was requested for; required for proposals of an earlier session.
-        known: number of finished trials it was made from, if fewer than the proposer was given.
-        note: message for the user about its origin.
-    """
+    """A design to evaluate next."""
 
     design: Design
-    id: str
-    reason: str = ""
-    expected: tuple[float, ...] | None = None
-    asked: int = 0
-    known: int | None = None
-    note: str = ""
+    id: str  # unique within the run
+    reason: str = ""  # one line
+    asked: int = 0  # trial that it was requested for; required for proposals of an earlier session
+    known: int | None = None  # number of finished trials it was made from, if fewer than the proposer was given
+    note: str = ""  # message for the user about its origin
 
 
 class Proposer(Protocol):

@@ -85,7 +85,6 @@ class FinishedTrial:
         values: the objectives; infinite if its evaluation failed, and left out of its line.
         proposal: the proposal's id, if a proposer made the design.
         reason: why the proposer suggested it.
-        expected: objectives that the proposer expected.
         fault: why a trial that was a proposer's became a black-box one.
         asked: the trial that the proposal was asked for, if another one.
         feedback: how many finished trials the proposer knew, if not all before this one.
@@ -105,7 +104,6 @@ class FinishedTrial:
     values: _Objectives
     proposal: str | None = None
     reason: _Text = ""
-    expected: _Objectives | None = None
     fault: str | None = None
     asked: int | None = None
     feedback: int | None = None

@@ -35,7 +35,7 @@ STUDY_DB = "study.db"
 ARTIFACTS = "artifacts"
 NOTE = "dashboard:note_str:0"  # where optuna-dashboard keeps the note of a study
 NOTE_VERSION = "dashboard:note_ver"
-TRIAL_ATTRIBUTES = ("source", "proposal", "reason", "expected", "fault", "duplicate_of")
+TRIAL_ATTRIBUTES = ("source", "proposal", "reason", "fault", "duplicate_of")
 
 
 @dataclass(frozen=True)

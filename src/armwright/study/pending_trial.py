@@ -64,7 +64,6 @@ def new_trial(number: int, source: str, design: Design, slot: ProposalSlot | Non
         trial,
         proposal=None if proposal is None else proposal.id,
         reason="" if proposal is None else proposal.reason,
-        expected=None if proposal is None else proposal.expected,
         fault=slot.fault,
         screened=slot.screened,
         asked=None if slot.asked == number else slot.asked,

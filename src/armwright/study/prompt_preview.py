@@ -7,7 +7,7 @@ from typing import Any
 
 from armwright.exceptions import SettingsError
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import estimated_tokens, load_prompt
+from armwright.llm.prompt import estimated_tokens
 from armwright.llm.replay_backend import ReplayBackend
 from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
@@ -75,15 +75,11 @@ def preview_after(
         raise SettingsError(f"{run} is a run of another task: {config.task.name}")
     if space is not None and space != config.space:
         raise SettingsError(f"{run} is a run of another space: {config.space.name}")
-    own, recorded = recorded_options(config)
     stated = {} if options is None else options.given
     given = {name: value for name, value in stated.items() if name in PromptOptions.model_fields}
-    asked = recorded.model_copy(update=given)
-    prompt = load_prompt(asked.prompt) if own is None or "prompt" in given else own
+    asked = recorded_options(config).model_copy(update=given)
     settings = config.study.proposer or {}
-    proposer = PromptedProposer(
-        ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm", prompt=prompt
-    )
+    proposer = PromptedProposer(ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm")
     proposer.open_read_only(run)
     requests = ProposalRequests(proposer, config.seed)
     if number is not None:

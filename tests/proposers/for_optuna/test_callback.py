@@ -436,7 +436,7 @@ def test_proposer_refuses_two_studies_at_once(thinker: ChatServer) -> None:
     assert origins(study) == [0.01]
 
 
-def test_recorded_calls_of_a_study_are_reused(thinker: ChatServer, tmp_path: Path) -> None:
+def test_calls_of_a_study_are_recorded_in_its_own_folder(thinker: ChatServer, tmp_path: Path) -> None:
     storage = InMemoryStorage()
 
     def go_on(n_trials: int) -> optuna.Study:
@@ -444,26 +444,21 @@ def test_recorded_calls_of_a_study_are_reused(thinker: ChatServer, tmp_path: Pat
         study = optuna.create_study(
             storage=storage, study_name="my/arms", directions=["minimize"] * 2, load_if_exists=True
         )
-        llm = llm_proposer(thinker.url, proposals=2)
+        llm = llm_proposer(thinker.url)
         return arms(PROBLEM, study, n_trials, ProposalCallback(llm, 4, problem=PROBLEM, folder=tmp_path / "calls"))
 
-    def pair(request: Request) -> Answer:
-        if not wants_design(request):
-            return "two of them"
-        return json.dumps({"designs": [{**GOOD_DESIGN, "origin_x": x} for x in (0.1, 0.2)]})
-
-    thinker.answer = pair
     go_on(4)
-    assert len(thinker.requests) == 2
-    study = go_on(4)
-    assert (origins(study), len(thinker.requests)) == ([0.1, 0.2], 2)
+    go_on(4)
     (folder,) = (tmp_path / "calls").iterdir()
     assert folder.name.startswith("my_arms-2")
     calls = Transcript(folder / "transcripts.jsonl").calls
-    assert [(call.proposal, call.step) for call in calls] == [("llm-0003", "reasoning"), ("llm-0003", "parameters")]
+    assert [(call.proposal, call.step) for call in calls] == [
+        (f"llm-{number:04d}", step) for number in (3, 7) for step in ("reasoning", "parameters")
+    ]
     optuna.delete_study(study_name="my/arms", storage=storage)
-    assert origins(go_on(4)) == [0.1]  # another study of the same name: asked anew
-    assert len(thinker.requests) == 4
+    go_on(4)
+    assert len(list((tmp_path / "calls").iterdir())) == 2  # another study of the same name
+    assert len(thinker.requests) == 6
     with pytest.raises(SettingsError, match="folder calls goes with problem"):
         ProposalCallback(Told(), folder="calls")
 

@@ -171,16 +171,6 @@ def test_one_step_answer_needs_one_call(chat_server: ChatServer) -> None:
     assert study.trials[9].user_attrs["source"] == "scripted"
 
 
-def test_memory_shows_expected_and_actual_values(chat_server: ChatServer) -> None:
-    chat_server.answer = answering(expected={"value": "0.5"})
-    study = study_of(20, ProposalCallback(proposer(chat_server, memory="own"), every=10))
-    assert study.trials[9].user_attrs["expected"] == [0.5]
-    memory = chat_server.prompts()[2].split("## Your earlier proposals")[1]
-    assert f"EXPECTED: value = 0.5  CAME OUT: value = {study.trials[9].value:.6g}\n" in memory
-    assert "REASON: a usual start\n" in memory
-    assert "## Your earlier proposals" not in chat_server.prompts()[0]
-
-
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -289,9 +279,9 @@ def test_invalid_settings_are_refused(chat_server: ChatServer, settings: dict[st
         proposer(chat_server, **settings)
 
 
-def shown(study: optuna.Study, seed: int, memory: str = "none") -> str:
+def shown(study: optuna.Study, seed: int) -> str:
     parameters = study_parameters(observed_space(study), study.trials)
-    return study_prompt(study, study.trials, parameters, "d", seed, PromptOptions(memory=memory), "llm")
+    return study_prompt(study, study.trials, parameters, "d", seed, PromptOptions())
 
 
 def test_shown_trials_depend_only_on_the_seed() -> None:
@@ -304,14 +294,11 @@ def test_long_prompt_shows_fewer_trials() -> None:
     study = optuna.create_study(sampler=TPESampler(seed=0, n_startup_trials=100))
     space = {f"x{i}": FloatDistribution(0.0, 1.0) for i in range(150)}
     for number in range(40):
-        trial = study.ask(space)
-        for name, value in {"source": "llm", "proposal": f"llm-{number}", "reason": "why " * 70}.items():
-            trial.set_user_attr(name, value)
-        study.tell(trial, float(number))
-    text = shown(study, 0, memory="own")
+        study.tell(study.ask(space), float(number))
+    text = shown(study, 0)
     assert MAX_TOKENS / 2 < estimated_tokens(text) <= MAX_TOKENS
     assert text.count("\n- x") == 150
-    assert len(re.findall(r"## The best trials\n\nTrial 0 ", text)) == 1
+    assert len(re.findall(r"## The best trials\n\nTrial 0\n", text)) == 1
 
 
 def completed(values: list[float], constraint: float | None = None) -> optuna.trial.FrozenTrial:

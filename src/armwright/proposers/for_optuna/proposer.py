@@ -29,19 +29,11 @@ N_REFERENCE = 10  # first complete trials, which give the reference point if the
 
 @dataclass(frozen=True)
 class StudyProposal:
-    """Parameters to evaluate next; the study's sampler draws those that are missing.
+    """Parameters to evaluate next; the study's sampler draws those that are missing."""
 
-    Attributes:
-        params: values by parameter name.
-        id: unique within the study.
-        reason: one line.
-        expected: the values that the proposer expects, if any.
-    """
-
-    params: Mapping[str, Any]
-    id: str
-    reason: str = ""
-    expected: tuple[float, ...] | None = None
+    params: Mapping[str, Any]  # values by parameter name
+    id: str  # unique within the study
+    reason: str = ""  # one line
 
 
 class StudyProposer(Protocol):
@@ -109,7 +101,7 @@ class ArmProposer(StudyProposer):
                 proposal, *rest = [made] if isinstance(made, Proposal) else list(made)
                 self._ready.extend(rest)
         design = self.problem.space.design(proposal.design.params)
-        return StudyProposal(dict(design.params), proposal.id, proposal.reason, proposal.expected)
+        return StudyProposal(dict(design.params), proposal.id, proposal.reason)
 
     @contextmanager
     def _opened(self, study: optuna.Study, history: History) -> Generator[None]:
@@ -183,7 +175,6 @@ def study_history(study: optuna.Study, problem: Problem) -> History:
 
 def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTrial:
     attributes = trial.user_attrs
-    expected = attributes.get("expected")
     missing = [
         constraint.description for constraint in problem.constraints if constraint.description not in trial.constraints
     ]
@@ -199,6 +190,5 @@ def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTria
         tuple(trial.values),
         proposal=attributes.get("proposal"),
         reason=str(attributes.get("reason", "")),
-        expected=None if expected is None else tuple(expected),
         violations=tuple(trial.constraints[constraint.description] for constraint in problem.constraints),
     )
