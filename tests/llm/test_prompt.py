@@ -37,7 +37,6 @@ from tests.support.fixed_problem import (
     SIX_AXIS,
     SMALL,
     THREE_OBJECTIVES,
-    TWO_JOINTS,
     FixedProblem,
     fixed_history,
     grid_task,
@@ -116,18 +115,6 @@ BOUNDED = ("worst_error <= 0.3", "length >= 0.7")
 # For each case what its prompt says, and what it does not say.
 Facts = tuple[Callable[[], str], tuple[str, ...], tuple[str, ...]]
 FACTS: dict[str, Facts] = {
-    "minus": (
-        lambda: rendered(fixed_history(PAPER), "minus"),
-        (
-            "The arm has D = 4 joints connected in series",
-            "14 designs have been evaluated; 2 of them are Pareto-optimal.",
-            "## Both Pareto-optimal designs, by rising E_pos",
-            "## 5 of the 12 other designs, drawn at random",
-            "Propose one new design, different from all above, that enlarges the hypervolume most.",
-            "End your answer with the new design, in these lines:",
-        ),
-        ("Step 1", "BROKEN", "REASON", "workshop"),
-    ),
     "six joints, ranges of one value, tubes": (
         lambda: rendered(fixed_history(SIX_JOINTS), "minus"),
         (
@@ -149,11 +136,6 @@ FACTS: dict[str, Facts] = {
             "Write your thoughts into `reasoning` first; then give the new design and the main reason for it",
         ),
         ("End your answer",),
-    ),
-    "text": (
-        lambda: rendered(fixed_history(PAPER), "minus", answer="text"),
-        ("End your answer", "REASON: the main reason for this design, in one sentence\n"),
-        ("`reasoning`",),
     ),
     "no reference point": (
         lambda: rendered(fixed_history(FixedProblem(grid_task(3)), n=4), "minus"),
@@ -186,23 +168,6 @@ FACTS: dict[str, Facts] = {
         ),
         ("Pareto", "hypervolume", "conflict"),
     ),
-    "three objectives": (
-        lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES))),
-        (
-            "The 3 objectives are the sums over all targets, E_ALL = (E_pos, E_torque, E_length). All are minimised.",
-            "E_EACH: (E_pos_i, E_torque_i, E_length_i) for each target",
-            "Which part of the front is empty: low E_pos, low E_torque, low E_length, or the middle?",
-        ),
-        (),
-    ),
-    "obstacles": (
-        lambda: rendered(fixed_history(FixedProblem(IN_THE_WAY)), "minus"),
-        (
-            "In the way are 5 obstacles, which are solid; positions and lengths in [m]:",
-            "The inverse kinematics steers around nothing: whether the kept posture is free follows from the design.",
-        ),
-        ("do not matter", "drives a cycle"),
-    ),
     "workspace": (
         lambda: rendered(fixed_history(FixedProblem(COVERING)), "minus"),
         (
@@ -228,16 +193,6 @@ FACTS: dict[str, Facts] = {
         ),
         ("## The other", "other designs"),
     ),
-    "two joints, two designs": (
-        lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
-        (
-            "JOINTS = (joint_1, joint_2):",
-            "2 designs have been evaluated; 1 of them is Pareto-optimal.",
-            "## The Pareto-optimal design",
-            "## The other design",
-        ),
-        ("drawn at random",),
-    ),
     "no design yet": (
         lambda: rendered(fixed_history(PAPER, n=0), "minus"),
         (
@@ -261,19 +216,6 @@ FACTS: dict[str, Facts] = {
             "- target 1: tolerance 5 mm",
             "- E_pos_i [m]: the distance between the tip and the target in the kept posture, beyond the stated "
             "tolerance, else 0.",
-        ),
-        (),
-    ),
-    "constraints": (
-        lambda: rendered(fixed_history(bounded(*BOUNDED))),
-        (
-            "A design must keep all of these constraints:",
-            "- E_worst <= 0.3 [m], where E_worst is the largest over all targets of the distance",
-            "- E_length >= 0.7 [m], where E_length is the sum of the lengths of all links.",
-            "0 of them are feasible; 0 of them are Pareto-optimal.",
-            "## No design is feasible; these 5 break the constraints least",
-            "BROKEN: E_worst = 0.4909, not <= 0.3; E_length = 0.635, not >= 0.7\n",
-            "Propose one new feasible design",
         ),
         (),
     ),

@@ -57,28 +57,17 @@ Model = TypeVar("Model", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Draft:
-    """A drafted task and design space.
-
-    Attributes:
-        space: None if the default fits.
-        assumptions: What the model assumed, one sentence each.
-        questions: What the model would like to know, one sentence each.
-        task_yaml: Content of the task's file, without the comment at its top.
-        space_yaml: The same of the space; empty if there is none.
-        by: Who answered.
-        usage: Calls, tokens and cost.
-        files: Where it was written; empty if it was not.
-    """
+    """A drafted task and design space."""
 
     task: Task
-    space: DesignSpace | None
-    assumptions: tuple[str, ...]
-    questions: tuple[str, ...]
-    task_yaml: str
-    space_yaml: str
-    by: str
-    usage: ProposerSummary
-    files: tuple[Path, ...] = ()
+    space: DesignSpace | None  # None if the default fits
+    assumptions: tuple[str, ...]  # what the model assumed, one sentence each
+    questions: tuple[str, ...]  # what the model would like to know, one sentence each
+    task_yaml: str  # content of the task's file, without the comment at its top
+    space_yaml: str  # the same of the space; empty if there is none
+    by: str  # who answered
+    usage: ProposerSummary  # calls, tokens and cost
+    files: tuple[Path, ...] = ()  # where it was written; empty if it was not
 
     @property
     def problem(self) -> Problem:

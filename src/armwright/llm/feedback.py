@@ -33,19 +33,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Digits:
-    """Numbers of decimals in a prompt: three, or more if the problem's scale is small.
+    """Numbers of decimals in a prompt: three, or more if the problem's scale is small."""
 
-    Attributes:
-        length: of lengths and positions [m].
-        torque: of torques [N m].
-        objectives: of each objective.
-        shares: of each objective that has a value per target.
-    """
-
-    length: int
-    torque: int
-    objectives: tuple[int, ...]
-    shares: tuple[int, ...]
+    length: int  # of lengths and positions [m]
+    torque: int  # of torques [N m]
+    objectives: tuple[int, ...]  # of each objective
+    shares: tuple[int, ...]  # of each objective that has a value per target
 
     @classmethod
     def of(cls, history: History) -> "Digits":

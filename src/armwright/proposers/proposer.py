@@ -25,17 +25,11 @@ class Proposal:
 
 
 class Proposer(Protocol):
-    """Proposes one design for every n_step trials; subclass it and implement `propose`.
+    """Proposes one design for every n_step trials; subclass it and implement `propose`."""
 
-    Attributes:
-        name: the `source` of its trials.
-        per_call: number of designs per call of `propose`, at most.
-        overlaps: True if other threads may call it while black-box trials run (`in_flight`).
-    """
-
-    name: str
-    per_call: int = 1
-    overlaps: bool = True
+    name: str  # the `source` of its trials
+    per_call: int = 1  # number of designs per call of `propose`, at most
+    overlaps: bool = True  # true if other threads may call it while black-box trials run (`in_flight`)
 
     def settings(self) -> Mapping[str, Any]:
         """Return what is needed to repeat the proposals, for config.yaml; no secrets."""
