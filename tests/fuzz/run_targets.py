@@ -98,8 +98,7 @@ def replayed(proposer: Any) -> None:
         history = History(problem, trials[:n], 3, problem.reference_point)
         try:
             proposer.unused(history)
-            for proposal in proposer.propose(history, 0, n):
-                problem.arm(proposal.design)
+            problem.arm(proposer.propose(history, 0, n).design)
         except ArmwrightError:
             if n == 5:
                 raise
@@ -127,6 +126,7 @@ def run_replay(data: bytes) -> None:
 
     place = folder() / "record"
     place.mkdir(exist_ok=True)
+    (place / "config.yaml").write_bytes((a_run() / "config.yaml").read_bytes())
     (place / "transcripts.jsonl").write_bytes(data)
     replayed(ReplayProposer(place))
 

@@ -83,15 +83,13 @@ class PromptedProposer(LlmSession, Proposer):
 
     def question(self, history: History, seed: int, number: int) -> Question:
         """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
-        identity = self.identity(number)
-        in_steps = self.options.form == "then-schema"
-        thoughts = self._transcript.answered(identity, "reasoning") if in_steps else None
+        thoughts = self._transcript.answered(self.identity(number), "reasoning")
         if thoughts is not None:
             prompt = parameters_prompt(history.problem, thoughts.answer)
-            return Question(identity, "parameters", prompt, thoughts.known)
+            return Question(self.identity(number), "parameters", prompt, thoughts.known)
         hints = self.next_hints(number)
         prompt = self.prompt_for(history, seed, number, hints)
-        return Question(identity, "reasoning" if in_steps else "answer", prompt, len(history), hints=hints)
+        return self._first_question(number, self.options, prompt, len(history), hints)
 
     def next_hints(self, number: int) -> tuple[Hint, ...]:
         """Return the hints for a question about trial `number` that is asked now.

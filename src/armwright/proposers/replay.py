@@ -45,8 +45,9 @@ class ReplayProposer(PromptedProposer):
             folder = Path(source)
             file = folder / TRANSCRIPTS
             if not os.path.isfile(file):
+                missing = file if folder.is_dir() else folder
                 raise ReplayError(
-                    f"there is no {file} to replay.{did_you_mean(folder.name, shipped_recordings())} Give a run "
+                    f"there is no {missing} to replay.{did_you_mean(folder.name, shipped_recordings())} Give a run "
                     f"folder, or a recording: {', '.join(shipped_recordings())}"
                 )
             calls, config = Transcript(file, read_only=True).calls, read_config(folder)

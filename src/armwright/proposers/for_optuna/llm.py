@@ -9,7 +9,7 @@ from typing import Any
 import optuna
 
 from armwright.exceptions import ProposalError, SettingsError
-from armwright.llm.backend import OutputFormat, Question
+from armwright.llm.backend import OutputFormat
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.session import LlmSession
@@ -59,9 +59,8 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             raise ProposalError("space", "no trial has shown a parameter yet; give StudyLlmProposer(space=…)")
         prompt = study_prompt(study, trials, parameters, self.description, seed, self.options)
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
-        step = "reasoning" if self.options.form == "then-schema" else "answer"
         text = self._ask(
-            Question(self.identity(number), step, self._part_to_ask(prompt, number), known),
+            self._first_question(number, self.options, self._part_to_ask(prompt, number), known),
             self._output_format(parameters),
             partial(parameters_prompt, parameters),
         )
