@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
     print(f"Optuna alone:    {result(search(options.n_trials, options.seed))}")
-    given = aw.ModelOptions(model=options.model, base_url=options.base_url, origin=options.origin, memory="own")
+    given = aw.ModelOptions(model=options.model, base_url=options.base_url, origin=options.origin)
     model = configured_model(given)
     if model is None:
         print("No language model is configured (--model, ARMWRIGHT_MODEL): built-in rules propose instead.")

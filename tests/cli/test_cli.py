@@ -260,16 +260,11 @@ def test_optimize_shows_its_options_in_groups() -> None:
             ("target-1", "--model", "m", *model_options(base_url="http://127.0.0.1:9"), "--prompt", "x"),
             'unknown prompt "x"',
         ),
-        (("target-1", *model_options(memory="owm")), 'Did you mean "own"?'),
         (("target-1", "--memory", "chta"), 'unknown memory "chta". Did you mean "chat"?'),
         (("target-1", *model_options(answer="onestep")), 'Did you mean "one-step"?'),
         (
             ("target-1", "--model", "m", *model_options(answer="text", base_url="http://127.0.0.1:9")),
             "is for manual answers",
-        ),
-        (
-            ("target-1", *model_options(proposals=0)),
-            "--model-options: proposals: expected a number of at least 1, got 0",
         ),
         (("target-1", "--max-cost", "1"), "max_cost = 1.0 needs a language model, and none is configured"),
         (("target-1", *model_options(memory="none")), "memory = none needs a language model, and none is configured"),

@@ -112,16 +112,13 @@ def test_zdt1_example_runs(chat_server: ChatServer) -> None:
         if "response_format" not in request:
             return "All but the first at 0."
         parameters = {f"x{i:02d}": 0.0 for i in range(1, 31)} | {"x01": 0.25}
-        return json.dumps({"parameters": parameters, "reason": "g = 1", "expected": {"value_1": 0.25, "value_2": 0.5}})
+        return json.dumps({"parameters": parameters, "reason": "g = 1"})
 
     chat_server.answer = answer
     text = run("optuna_zdt1.py", "--n-trials", "40", *told(chat_server))
     alone, proposed = (float(volume) for volume in re.findall(r"hypervolume ([\d.]+)", text))
     assert proposed > alone
     assert "4 proposals by test-model, 4 of them on the front, faults: none" in text
-    assert (
-        "EXPECTED: value_1 = 0.25, value_2 = 0.5  CAME OUT: value_1 = 0.25, value_2 = 0.5" in chat_server.prompts()[-2]
-    )
 
 
 @pytest.mark.slow

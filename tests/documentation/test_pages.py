@@ -63,7 +63,6 @@ MAX_WAIT = 900.0  # [s] for a command; only one that waits forever takes this lo
 # What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
 SHORT = "--n-total 40 --no-figures"
 POINTS = {"points.csv": "x,y,z\n400,-200,100\n400,200,100\n100,350,500\n"}
-TEMPLATE = '{% extends "proposal.md.j2" %}\n{% block analysis %}\nSay which lengths are in stock.\n{% endblock %}\n'
 FILES = {
     "docs/tasks.md": POINTS,
     "docs/spaces.md": {
@@ -72,8 +71,7 @@ FILES = {
         "arm.json": '{"params": {"origin_x": 0.0, "origin_y": 0.0, "origin_z": 0.0, "joint_1": "Y", "joint_2": "P", '
         '"link_1": 0.2, "link_2": 0.25}}',
     },
-    "docs/experiments.md": {"shelf.yaml": "name: rack\ntargets: [[0.3, 0.0, 0.2]]\n", "my-prompt.md.j2": TEMPLATE,
-                            "six-axis.yaml": "joints: 6\n"},
+    "docs/experiments.md": {"shelf.yaml": "name: rack\ntargets: [[0.3, 0.0, 0.2]]\n", "six-axis.yaml": "joints: 6\n"},
 }  # fmt: skip
 BEFORE = {
     "docs/inverse-kinematics.md": [f"armwright optimize target-1 {SHORT} --out runs/mine",
@@ -284,9 +282,6 @@ def follow(page: str, shown: Sequence[Block], in_folder: Path) -> None:
         if block.language == "python" and page not in PROGRAMS_RUN_IN:
             (in_folder / "program.py").write_text(block.text, encoding="utf-8")
             said = shell("python program.py", in_folder, block.where)
-        if block.language == "jinja":
-            (in_folder / "shown.md.j2").write_text(block.text, encoding="utf-8")
-            shell("armwright prompt target-1 --prompt shown.md.j2", in_folder, block.where)
         if block.language == "text":
             assert letters(block.text.splitlines()[0]) in letters(said), block.where
 

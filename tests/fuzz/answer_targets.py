@@ -21,35 +21,34 @@ def answer_seeds() -> list[bytes]:
     for problem in (plain, rich):
         designs = [dict(design.params) for design in problem.space.sample(3, 2)]
         found += [json.dumps(design) for design in designs]
-        found.append(json.dumps({"reasoning": "so", "designs": [{**design, "reason": "why"} for design in designs]}))
+        found.append(json.dumps({"reasoning": "so", **designs[0], "reason": "why"}))
         found.append(f"I think so.\n```json\n{json.dumps(designs[0], indent=2)}\n```\nThat is it.")
     found.append(
         "<think>hm</think>\nORIGIN: (0.1, -0.2, 0.0) m\nJOINTS: Y, P, R, P\nLINKS: 0.1 0.2 0.3 0.1 m\nREASON: x"
     )
-    found.append("**ORIGIN** = [0, 0, 0]; JOINTS = YPRP; LINKS = L1 = 0.1, L2 = 0.1, L3: .2, L4: 0.25\nEXPECTED: 1, 2")
-    found.append('{"origin": [0, 0.1, 0], "joints": "YPRP", "links": ["0.1 m", 0.2, "0.3", 0.1], "expected": [1, 2]}')
+    found.append("**ORIGIN** = [0, 0, 0]; JOINTS = YPRP; LINKS = L1 = 0.1, L2 = 0.1, L3: .2, L4: 0.25")
+    found.append('{"origin": [0, 0.1, 0], "joints": "YPRP", "links": ["0.1 m", 0.2, "0.3", 0.1]}')
     return [text.encode() for text in found]
 
 
 def run_answer(data: bytes) -> None:
-    from armwright.llm.answer import last_json_object, read_answers, read_text, written_answers
+    from armwright.llm.answer import last_json_object, read_answer, read_text, written_answer
 
     text = data.decode("utf-8", "surrogateescape")
     last_json_object(text)
     found: list[Callable[[], object]] = []
     for problem in (a_problem(), rich_problem()):
-        for proposals in (1, 4):
 
-            def read(problem: Problem = problem, proposals: int = proposals) -> None:
-                answers = read_text(text, problem, proposals)
-                if read_text(written_answers(answers, problem), problem, proposals) != answers:
-                    raise DefectError(f"answers that are read back as others: {answers}")
+        def read(problem: Problem = problem) -> None:
+            answer = read_text(text, problem)
+            if read_text(written_answer(answer), problem) != answer:
+                raise DefectError(f"an answer that is read back as another: {answer}")
 
-            found.append(read)
+        found.append(read)
         with suppress(ValueError, RecursionError):
             content = json.loads(text)
             if isinstance(content, dict):
-                found.append(lambda problem=problem, content=content: read_answers(content, problem))
+                found.append(lambda problem=problem, content=content: read_answer(content, problem))
     any_of(found)
 
 

@@ -92,7 +92,7 @@ def n_postures(problem: Problem) -> int:
 
 def used(problem: Problem) -> None:
     """Sample, evaluate, export and prompt as every run does."""
-    from armwright.llm.prompt import load_prompt
+    from armwright.llm.prompt import design_prompt
     from armwright.robot.urdf_writer import to_urdf
 
     designs = problem.space.sample(2, 0)
@@ -103,7 +103,7 @@ def used(problem: Problem) -> None:
             raise DefectError(f"a design that is not in its space: {design.params}")
     if n_postures(problem) <= MAX_POSTURES:
         problem.evaluate(designs)
-    load_prompt("plus").render(History(problem, [], 1, problem.reference_point), 0)
+    design_prompt(History(problem, [], 1, problem.reference_point), 0)
 
 
 def same_when_kept(value: Task | DesignSpace) -> None:

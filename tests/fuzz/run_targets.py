@@ -36,7 +36,7 @@ def a_run() -> Path:
 
     there = folder() / "run"
     with ChatServer() as server:
-        proposer = llm_proposer(server.url, memory="own", origin="scripted")
+        proposer = llm_proposer(server.url, memory="chat", origin="scripted")
         aw.optimize(a_problem(), proposer=proposer, n_init=3, n_step=2, n_total=4, out=there)
     write_report(there)
     control = {"paused": True, "stop": False, "hints": HINTS}
@@ -111,8 +111,7 @@ def replayed(proposer: Any) -> None:
         history = History(problem, trials[:n], 3, problem.reference_point)
         try:
             proposer.unused(history)
-            for proposal in proposer.propose(history, 0, n):
-                problem.arm(proposal.design)
+            problem.arm(proposer.propose(history, 0, n).design)
         except ArmwrightError:
             if n == 5:
                 raise
@@ -123,6 +122,7 @@ def run_replay(data: bytes) -> None:
 
     place = folder() / "record"
     place.mkdir(exist_ok=True)
+    (place / "config.yaml").write_bytes((a_run() / "config.yaml").read_bytes())
     (place / "transcripts.jsonl").write_bytes(data)
     replayed(ReplayProposer(place))
 

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armwright.arrays import LARGEST_OBJECTIVE
 from armwright.exceptions import DesignError
-from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
+from armwright.llm.answer import Answer, answer_schema, read_answer, read_text, written_answer
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
@@ -21,11 +20,9 @@ from tests.support.chat_server import GOOD_DESIGN
 PROBLEM = Problem(load_task("target-1"))
 DESIGN = PROBLEM.space.design({name: value for name, value in GOOD_DESIGN.items() if name != "reason"})
 OTHER = PROBLEM.space.clipped((0.5, 0.25, -1.0), "PPYR", (0.05, 0.1, 0.15, 0.3))
-THIRD = PROBLEM.space.clipped((-0.5, 0.0, 0.125), "RYYP", (0.25, 0.1, 0.2, 0.3))
 JSON = json.dumps(GOOD_DESIGN)
 LINES = "ORIGIN: (0, 0.01, -0.1)\nJOINTS: (Y, P, R, P)\nLINKS: (0.2, 0.2, 0.2, 0.2)\n"
 OTHER_LINES = "ORIGIN: (0.5, 0.25, -1)\nJOINTS: (P, P, Y, R)\nLINKS: (0.05, 0.1, 0.15, 0.3)\n"
-THIRD_LINES = "ORIGIN: (-0.5, 0, 0.125)\nJOINTS: (R, Y, Y, P)\nLINKS: (0.25, 0.1, 0.2, 0.3)\n"
 
 
 def changed(**values: Any) -> dict[str, Any]:
@@ -33,51 +30,34 @@ def changed(**values: Any) -> dict[str, Any]:
 
 
 def one(text: str) -> Answer:
-    (answer,) = read_text(text, PROBLEM)
-    return answer
-
-
-finite = st.floats(-LARGEST_OBJECTIVE, LARGEST_OBJECTIVE)
-reasons = st.text(max_size=400)
+    return read_text(text, PROBLEM)
 
 
 @given(
-    joints=st.integers(1, 8),
-    n=st.integers(1, 4),
-    seed=st.integers(0, 2**31),
-    reason=reasons,
-    expected=st.one_of(st.none(), st.tuples(finite, finite)),
-    thoughts=st.text(max_size=50),
+    joints=st.integers(1, 8), seed=st.integers(0, 2**31), reason=st.text(max_size=400), thoughts=st.text(max_size=50)
 )
-def test_written_answers_are_read_back(
-    joints: int, n: int, seed: int, reason: str, expected: tuple[float, float] | None, thoughts: str
-) -> None:
+def test_written_answers_are_read_back(joints: int, seed: int, reason: str, thoughts: str) -> None:
     problem = Problem(load_task("target-2"), paper_space(joints))
-    answers = [Answer(design, reason, expected) for design in problem.space.sample(n, seed)]
-    once = read_answers(json.loads(written_answers(answers, problem, thoughts)), problem, n)
-    assert [answer.design for answer in once] == [answer.design for answer in answers]
-    assert [answer.expected for answer in once] == [expected] * n
-    assert all(len(answer.reason) <= 300 and answer.reason == " ".join(answer.reason.split()) for answer in once)
-    assert read_text(written_answers(once, problem, thoughts), problem, n) == once
-    assert read_text(f"My answer:\n```json\n{written_answers(once, problem)}\n```\n", problem, n)[0].design
+    (design,) = problem.space.sample(1, seed)
+    once = read_answer(json.loads(written_answer(Answer(design, reason), thoughts)), problem)
+    assert once.design == design
+    assert len(once.reason) <= 300
+    assert once.reason == " ".join(once.reason.split())
+    assert read_text(written_answer(once, thoughts), problem) == once
+    assert read_text(f"My answer:\n```json\n{written_answer(once)}\n```\n", problem).design == design
 
 
-@given(joints=st.integers(1, 8), proposals=st.integers(1, 3), expected=st.booleans(), reasoning=st.booleans())
-def test_schema_describes_accepted_answers(joints: int, proposals: int, expected: bool, reasoning: bool) -> None:
+@given(joints=st.integers(1, 8), reasoning=st.booleans())
+def test_schema_describes_accepted_answers(joints: int, reasoning: bool) -> None:
     problem = Problem(load_task("target-2"), paper_space(joints))
-    told = (1.0, 2.0) if expected else None
-    answers = [Answer(design, "so", told) for design in problem.space.sample(proposals, 1)]
-    content = json.loads(written_answers(answers, problem, "thoughts" if reasoning else ""))
-    answer, memory = "one-step" if reasoning else "two-step", "own" if expected else "none"
-    schema = answer_schema(problem, PromptOptions(answer=answer, memory=memory, proposals=proposals))
+    answer = Answer(problem.space.sample(1, 1)[0], "so")
+    content = json.loads(written_answer(answer, "thoughts" if reasoning else ""))
+    schema = answer_schema(problem, PromptOptions(answer="one-step" if reasoning else "two-step"))
     assert list(content) == schema["required"] == list(schema["properties"])
-    fields = schema["properties"]["designs"]["items"] if proposals > 1 else schema
-    for design in content["designs"] if proposals > 1 else [content]:
-        assert list(design) == fields["required"] == list(fields["properties"])
-        for name, field in fields["properties"].items():
-            assert isinstance(design[name], {"number": float, "string": str}[field["type"]])
-            assert design[name] in field.get("enum", [design[name]])
-    assert read_answers(content, problem, proposals) == answers
+    for name, field in schema["properties"].items():
+        assert isinstance(content[name], {"number": float, "string": str}[field["type"]])
+        assert content[name] in field.get("enum", [content[name]])
+    assert read_answer(content, problem) == answer
 
 
 @pytest.mark.parametrize(
@@ -90,17 +70,15 @@ def test_schema_describes_accepted_answers(joints: int, proposals: int, expected
         changed(joint_1="y", joint_2=" p ", joint_3="'R'", joint_4='"P"'),
         changed(joint_1="yaw", joint_2="Pitch", joint_3="ROLL"),
         {key.upper(): value for key, value in GOOD_DESIGN.items()},
-        {"designs": [GOOD_DESIGN]},
         {"reasoning": "so it is", **GOOD_DESIGN},
         {"origin": [0, 0.01, -0.1], "joints": ["Y", "P", "R", "P"], "links": [0.2, 0.2, 0.2, "0.2 m"]},
         {"ORIGIN": "(0, 0.01, -0.1)", "JOINTS": "YPRP", "LINKS": "0.2, 0.2, 0.2, 0.2"},
         changed(reason=None),
         changed(reason=["a", "b"]),
-        changed(expected_position_error="so so", expected_torque=None),
     ],
 )
 def test_equivalent_forms_are_read_alike(content: dict[str, Any]) -> None:
-    assert read_answers(content, PROBLEM)[0].design == DESIGN
+    assert read_answer(content, PROBLEM).design == DESIGN
     assert one(json.dumps(content)).design == DESIGN
 
 
@@ -159,9 +137,6 @@ def test_refusals_name_parameter_and_range(change: str, message: str) -> None:
         ("[]", "no design found"),
         ("null", "no design found"),
         ("{" * 100_000, "no design found"),
-        ('{"designs": []}', "designs: expected a list of objects"),
-        ('{"designs": 7}', "designs: expected a list of objects"),
-        ('{"designs": [7]}', "expected an object with one value per parameter"),
         (json.dumps({k: v for k, v in GOOD_DESIGN.items() if k != "link_4"}), "missing: link_4"),
         (LINES.replace("0.2)", "0.2, 0.2)"), 'unknown parameter "link_5"'),
         (LINES.replace("-0.1)", "-0.1, 3)"), 'unknown parameter "origin_4"'),
@@ -243,47 +218,16 @@ def test_design_is_found_in_free_text(text: str) -> None:
     assert one(text).design == DESIGN
 
 
-def test_reason_and_expectation_are_read_from_lines() -> None:
-    answer = one(LINES + "EXPECTED: (1.25, 3.5)\nREASON: a shoulder\x1b[31m in   the centre" + " far" * 200)
-    assert answer.expected == (1.25, 3.5)
+def test_reason_is_read_from_its_line() -> None:
+    answer = one(LINES + "REASON: a shoulder\x1b[31m in   the centre" + " far" * 200)
     assert answer.reason.startswith("a shoulder in the centre far")
     assert len(answer.reason) <= 300
-    for words in ("(1.25 m, 3.5)", "E_pos = 1.25, E_torque = 3.5", "1.25, 3.5", "**(1.25, 3.5)**"):
-        assert one(f"{LINES}EXPECTED: {words}").expected == (1.25, 3.5)
-    for words in ("less than before", "(1.25)", "(1.25, nan)", "(1, 2, 3)"):
-        assert one(f"{LINES}EXPECTED: {words}").expected is None
-    assert one(json.dumps(changed(expected=[1.25, 3.5]))).expected == (1.25, 3.5)
-    assert one(json.dumps(changed(expected_position_error="1.25", expected_torque=3.5))).expected == (1.25, 3.5)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        LINES + OTHER_LINES + THIRD_LINES,
-        "A draft:\n" + OTHER_LINES + LINES + OTHER_LINES + "REASON: light\n" + THIRD_LINES,
-        json.dumps({"designs": [dict(d.params) for d in (DESIGN, OTHER, THIRD)]}),
-        json.dumps([dict(d.params) for d in (DESIGN, OTHER, THIRD)]),
-        "\n".join(f"```json\n{json.dumps(d.params)}\n```" for d in (THIRD, DESIGN, OTHER, THIRD)),
-        json.dumps({"designs": [dict(d.params) for d in (DESIGN, OTHER, THIRD, THIRD)]}),
-    ],
-)
-def test_several_designs_are_read(text: str) -> None:
-    assert [answer.design for answer in read_text(text, PROBLEM, 3)] == [DESIGN, OTHER, THIRD]
-
-
-def test_refused_design_among_several_is_named() -> None:
-    for text in (
-        LINES + OTHER_LINES.replace("0.05", "5"),
-        json.dumps({"designs": [dict(DESIGN.params), {**OTHER.params, "link_1": 5}]}),
-    ):
-        with pytest.raises(DesignError, match=r"^design 2: link_1 = 5 m is outside"):
-            read_text(text, PROBLEM, 2)
 
 
 PIECES = (
     *'{}[]":,()\n \\',
     *("NaN", "null", "true", "1e999", "-", "−", "0.2", "<think>", "</think>", "```json", "ORIGIN:", "JOINTS:"),
-    *("LINKS:", "EXPECTED:", "REASON:", '"origin_x"', '"designs"', "link_1", "link_", "(Y, P, R, P)"),
+    *("LINKS:", "REASON:", '"origin_x"', "link_1", "link_", "(Y, P, R, P)"),
     *("\x00", "\ud800", "𝟛", "²"),
     *(LINES, JSON, OTHER_LINES, "//", "**", "  " * 9),
 )  # fmt: skip
@@ -293,39 +237,37 @@ def garbled(chance: random.Random) -> str:
     """A string of pieces, or a good answer with some pieces in wrong places."""
     if chance.random() < 0.4:
         return "".join(chance.choices(PIECES, k=chance.randrange(40)))
-    text = chance.choice((JSON, LINES, json.dumps({"designs": [GOOD_DESIGN] * 2}), LINES + JSON))
+    text = chance.choice((JSON, LINES, LINES + JSON))
     for _ in range(chance.randrange(1, 5)):
         start = chance.randrange(len(text) + 1)
         text = text[:start] + chance.choice(PIECES) + text[start + chance.randrange(4) :]
     return text
 
 
-def read_or_refuse(text: str, proposals: int) -> bool:
-    refused = ""
-    answers: list[Answer] = []
+def read_or_refuse(text: str) -> bool:
+    refused, answer = "", None
     try:
-        answers = read_text(text, PROBLEM, proposals)
+        answer = one(text)
     except DesignError as refusal:
         refused = str(refusal)
     assert "\n" not in refused
     assert len(refused) < 1000
-    if refused:
+    if answer is None:
         return False
-    assert 1 <= len(answers) <= proposals
-    assert all(PROBLEM.space.design(answer.design.params) == answer.design for answer in answers)
-    assert read_text(written_answers(answers, PROBLEM), PROBLEM, proposals) == answers
+    assert PROBLEM.space.design(answer.design.params) == answer.design
+    assert one(written_answer(answer)) == answer
     return True
 
 
 def test_garbled_answers_are_read_or_refused() -> None:
     chance = random.Random(0)
-    outcomes = [read_or_refuse(garbled(chance), chance.choice((1, 3))) for _ in range(1500)]
+    outcomes = [read_or_refuse(garbled(chance)) for _ in range(1500)]
     assert 0.05 < sum(outcomes) / len(outcomes) < 0.95
 
 
-@given(text=st.text(), proposals=st.integers(1, 3))
-def test_arbitrary_text_is_read_or_refused(text: str, proposals: int) -> None:
-    read_or_refuse(text, proposals)
+@given(text=st.text())
+def test_arbitrary_text_is_read_or_refused(text: str) -> None:
+    read_or_refuse(text)
 
 
 @pytest.mark.parametrize(
@@ -351,13 +293,13 @@ def test_arbitrary_text_is_read_or_refused(text: str, proposals: int) -> None:
         "//" * 50_000,
         "\\a" * 50_000,
         "JOINTS: " + "Y(" * 50_000,
-        '{"designs": [' + ", ".join([JSON] * 400) + "]}",
+        JSON * 400,
         '{"a": ' + "9" * 90_000 + "}",
     ],
     ids=range(22),
 )
 def test_long_answers_are_read_quickly(text: str) -> None:
     started = time.process_time()
-    read_or_refuse(text, 1)
-    read_or_refuse(LINES.replace("\n", "\n" + text[:3000] + "\n"), 3)
+    read_or_refuse(text)
+    read_or_refuse(LINES.replace("\n", "\n" + text[:3000] + "\n"))
     assert time.process_time() - started < 20  # quadratic ones took minutes

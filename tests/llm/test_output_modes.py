@@ -12,7 +12,6 @@ from armwright.llm import client as chat
 from armwright.llm.backend import CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
-from armwright.proposers.replay import ReplayProposer
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
@@ -175,14 +174,6 @@ def test_resumed_run_keeps_its_mode(chat_server: ChatServer, tmp_path: Path) -> 
     assert not any("does not support output" in progress.note for progress in seen)
 
 
-def test_replay_states_the_recorded_mode(chat_server: ChatServer, tmp_path: Path) -> None:
-    chat_server.answer = refusing(*STRUCTURED)
-    first = run(llm_proposer(chat_server.url), tmp_path / "run")
-    again = run(ReplayProposer(tmp_path / "run", strict=True), None)
-    assert [trial.values for trial in again.trials] == [trial.values for trial in first.trials]
-    assert again.summary["proposer"]["output_mode"] == "prompted"
-
-
 @pytest.mark.parametrize("output", ["tool", "native"])
 def test_refused_mode_of_the_user_is_an_error(chat_server: ChatServer, tmp_path: Path, output: str) -> None:
     chat_server.answer = refusing(*STRUCTURED)
@@ -201,13 +192,6 @@ def test_other_faults_are_not_refusals(
     with pytest.raises(ModelError):
         run(proposer(wire, chat_server, monkeypatch), None)
     assert len(chat_server.requests) == 1
-
-
-def test_server_that_refuses_everything_is_an_error_with_its_reason(chat_server: ChatServer, tmp_path: Path) -> None:
-    chat_server.answer = lambda request: FAULTS["rejected"]["rejected"]
-    with pytest.raises(ModelError, match="Unsupported value: 'temperature'"):
-        run(llm_proposer(chat_server.url, temperature=0.0), tmp_path / "run")
-    assert [call.fault for call in Transcript(tmp_path / "run" / "transcripts.jsonl").calls] == ["rejected"]
 
 
 def test_question_without_a_check_finds_the_mode_once(chat_server: ChatServer) -> None:

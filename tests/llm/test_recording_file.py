@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from armwright.exceptions import ReplayError
-from armwright.llm.recording_file import ENDING, find_recording, pack_recording, read_recording, shipped_recordings
+from armwright.llm.recording_file import ENDING, find_recording, read_recording, shipped_recordings
 
 
 def lines_of(name: str) -> list[bytes]:
@@ -32,14 +32,6 @@ def test_shipped_recordings_are_complete_and_small() -> None:
         assert all(call.prompt and call.answer and call.origin == "model" for call in recording.calls)
         assert "Its name and settings are not stated" in recording.provenance
         assert name.endswith(f"seed{recording.config.seed}")
-
-
-def test_packed_recording_equals_the_original(tmp_path: Path) -> None:
-    recording = find_recording("target-2-plus-seed1")
-    assert recording is not None
-    file = tmp_path / f"target-2-plus-seed1{ENDING}"
-    file.write_bytes(pack_recording(recording))
-    assert find_recording(str(file)) == recording
 
 
 def test_damaged_and_missing_lines_are_one_error(tmp_path: Path) -> None:

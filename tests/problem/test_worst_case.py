@@ -70,15 +70,15 @@ def test_run_records_its_worst_case_settings(tmp_path: Path) -> None:
 
 
 def test_prompt_states_the_worst_case_settings() -> None:
-    from armwright.llm.prompt import load_prompt
+    from armwright.llm.prompt import design_prompt
     from tests.support.fixed_problem import FixedProblem, fixed_history
 
-    told = load_prompt("plus").render(fixed_history(FixedProblem(ROBUST), n=12), 0)
+    told = design_prompt(fixed_history(FixedProblem(ROBUST), n=12), 0)
     assert (
         "the worst of the task as it stands, of payloads 0, 1.5 times as heavy, and of targets that are all 4 mm"
         in told
     )
-    assert "may come otherwise" not in load_prompt("plus").render(fixed_history(FixedProblem(PLAIN), n=12), 0)
+    assert "may come otherwise" not in design_prompt(fixed_history(FixedProblem(PLAIN), n=12), 0)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ import pytest
 from armwright.exceptions import AnswerPendingError, SettingsError
 from armwright.llm.backend import Turn
 from armwright.llm.conversation import RESULTS, conversation, new_part
-from armwright.llm.model_options import ModelOptions, PromptOptions
-from armwright.llm.prompt import PROMPTS, load_prompt
+from armwright.llm.model_options import PROMPTS, ModelOptions, PromptOptions
+from armwright.llm.prompt import design_prompt
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.for_optuna.callback import ProposalCallback
@@ -190,14 +190,6 @@ def test_oldest_turns_are_dropped_beyond_the_context(server: ChatServer, tmp_pat
     assert [(call.prompt, call.fault) for call in played] == [(call.prompt, call.fault) for call in calls]
 
 
-def test_transcript_alone_is_replayed_as_a_chat(server: ChatServer, tmp_path: Path) -> None:
-    first = run(chat(server), tmp_path / "run")
-    alone = tmp_path / "alone.jsonl"
-    (tmp_path / "run" / "transcripts.jsonl").rename(alone)
-    again = run(ReplayProposer(alone, strict=True, options=PromptOptions(memory="chat")))
-    assert [trial.values for trial in again.trials] == [trial.values for trial in first.trials]
-
-
 def test_dropping_stays_within_the_requests_of_a_question(server: ChatServer, tmp_path: Path) -> None:
     run(chat(server), tmp_path / "run", n_total=10, n_step=1)
     server.requests.clear()
@@ -257,7 +249,7 @@ def test_manual_questions_of_a_chat_contain_what_is_new(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", PROMPTS)
 def test_built_in_prompts_change_below_their_results_only(name: str) -> None:
     history = optimize(PROBLEM, proposer="rules", n_init=5, n_total=20, seed=0).history
-    early, late = (load_prompt(name).render(history.before(n), n) for n in (5, 25))
+    early, late = (design_prompt(history.before(n), n, PromptOptions(prompt=name)) for n in (5, 25))
     turns = (Turn(early, "so be it"),)
     assert early.count(f"\n{RESULTS}\n") == late.count(f"\n{RESULTS}\n") == 1
     part = new_part(late, turns)
@@ -290,20 +282,6 @@ def test_conversation_of_a_repeated_question_holds_its_last_answer() -> None:
     ]
     assert [turn.answer for turn in conversation(calls).turns] == ["one", "three", "four"]
     assert conversation(calls, 10).turns == conversation(calls[:-1]).turns  # as it was then
-
-
-@pytest.mark.parametrize(
-    ("model", "words"),
-    [
-        ("openai-chat:gpt-4o", r"; about 2\.\d\d USD by public prices, 3\.\d\d USD if the provider caches no earlier"),
-        ("openai-chat:gpt-4", r"; about \d+\.\d\d USD by public prices \(at full price: none is known for cached"),
-        ("openai-chat:a-model-of-tomorrow", "; price unknown$"),
-    ],
-)
-def test_forecast_counts_the_growing_conversation(monkeypatch: pytest.MonkeyPatch, model: str, words: str) -> None:
-    monkeypatch.setenv("OPENAI_API_KEY", "sk-test-of-a-forecast")
-    forecast = LlmProposer(ModelOptions(model=model, memory="chat")).forecast(PROBLEM, 20)
-    assert re.search(words, forecast), forecast
 
 
 def test_forecast_of_input_grows_with_the_square(server: ChatServer, tmp_path: Path) -> None:

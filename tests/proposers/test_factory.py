@@ -17,8 +17,6 @@ from armwright.proposers.factory import choose_proposer
         ("prompt", "minus"),
         ("memory", "none"),
         ("answer", "two-step"),
-        ("proposals", 1),
-        ("others", "off-front"),
         ("temperature", 0.0),
         ("seed", 0),
         ("output", "auto"),
@@ -34,17 +32,9 @@ from armwright.proposers.factory import choose_proposer
 def test_option_without_effect_is_refused(tmp_path: Path, name: str, option: str, value: Any) -> None:
     """This holds even if it states the default."""
     chosen, options = name.replace("x", str(tmp_path / "x")), ModelOptions(**{option: value})
-    if name == "manual:x" and option in ("prompt", "memory", "proposals", "others", "wait"):
+    if name == "manual:x" and option in ("prompt", "memory", "wait"):
         assert choose_proposer(chosen, options).proposer is not None
-    elif name == "replay:x" and option in (
-        "prompt",
-        "memory",
-        "answer",
-        "proposals",
-        "others",
-        "in_flight",
-        "replay_strict",
-    ):  # checked against the record
+    elif name == "replay:x" and option in ("in_flight", "replay_strict"):
         with pytest.raises(ReplayError, match="to replay"):
             choose_proposer(chosen, options)
     else:

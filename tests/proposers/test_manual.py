@@ -167,25 +167,15 @@ def test_empty_answer_file_is_pending(tmp_path: Path) -> None:
     assert (tmp_path / "ask" / "004-answer.md").exists()
 
 
-def test_manual_answer_may_hold_several_designs_and_expectations(tmp_path: Path) -> None:
-    waits = pending(tmp_path / "ask", tmp_path / "run", memory="own")
-    assert "EXPECTED: (E_pos, E_torque) that you expect of it" in waits.question.read_text(encoding="utf-8")
-    waits.answer.write_text(LINES + "EXPECTED: (1.25, 3.5)\n", encoding="utf-8")
-    waits = pending(tmp_path / "ask", tmp_path / "run", memory="own")
-    told = waits.question.read_text(encoding="utf-8")
-    assert "EXPECTED: (1.250, 3.500)" in told
-    assert "REASON: a shoulder in the middle" in told
-
-
 def test_only_pending_files_are_announced(tmp_path: Path) -> None:
-    """Answered questions and trials with a ready design are not announced."""
-    proposer = ManualProposer(tmp_path / "ask", PromptOptions(proposals=2), wait=False)
+    """Answered questions are not announced."""
+    proposer = ManualProposer(tmp_path / "ask", wait=False)
     notes: list[str] = []
-    for text in (LINES + LINES.replace("0.01", "0.02"), ""):
+    for text in (LINES, ""):
         with pytest.raises(AnswerPendingError) as waits:
-            run(proposer, tmp_path / "run", n_total=12, watch=lambda progress: notes.append(progress.note))
+            run(proposer, tmp_path / "run", watch=lambda progress: notes.append(progress.note))
         waits.value.answer.write_text(text, encoding="utf-8")
-    files = [(tmp_path / "ask" / f"{n}-prompt.md", tmp_path / "ask" / f"{n}-answer.md") for n in ("004", "010")]
+    files = [(tmp_path / "ask" / f"{n}-prompt.md", tmp_path / "ask" / f"{n}-answer.md") for n in ("004", "007")]
     assert [note for note in notes if note] == [f"{asked} waits for your answer in {answer}" for asked, answer in files]
 
 

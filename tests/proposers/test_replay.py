@@ -1,7 +1,6 @@
 """Replay of recorded runs: bit-identical and offline."""
 
 import json
-import shutil
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -12,12 +11,11 @@ import pytest
 
 from armwright.exceptions import ReplayError, RunFolderError, SettingsError
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import Prompt
 from armwright.llm.recording_file import find_recording
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
+from armwright.proposers import prompted
 from armwright.proposers.factory import choose_proposer
-from armwright.proposers.proposer import Proposer
 from armwright.proposers.replay import ReplayProposer
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
@@ -38,9 +36,7 @@ def varied(chat_server: ChatServer) -> ChatServer:
         if "response_format" not in request:
             return designer(request)
         n = len(chat_server.requests)
-        return json.dumps(
-            {**GOOD_DESIGN, "link_1": 0.1 + 0.001 * n, "expected_position_error": 1, "expected_torque": 2}
-        )
+        return json.dumps({**GOOD_DESIGN, "link_1": 0.1 + 0.001 * n})
 
     chat_server.answer = answer
     return chat_server
@@ -56,7 +52,7 @@ def lines(folder: Path) -> list[dict[str, Any]]:
     return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
 
 
-@pytest.mark.parametrize("asking", [{}, {"memory": "own", "prompt": "minus"}, {"answer": "one-step"}])
+@pytest.mark.parametrize("asking", [{}, {"memory": "chat", "prompt": "minus"}, {"answer": "one-step"}])
 def test_replay_equals_its_recording(varied: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
     first = recorded(varied, tmp_path / "first", asking)
     varied.requests.clear()
@@ -82,7 +78,7 @@ def test_replay_equals_its_recording(varied: ChatServer, tmp_path: Path, asking:
 
 
 def test_overlapped_run_is_replayed_with_its_arrivals(varied: ChatServer, tmp_path: Path) -> None:
-    recorded(varied, tmp_path / "first", {"memory": "own"}, in_flight=2)
+    recorded(varied, tmp_path / "first", in_flight=2)
     optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), out=tmp_path / "again", **SETTINGS)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
 
@@ -95,21 +91,19 @@ def test_late_answers_are_replayed_when_they_arrived(chat_server: ChatServer, tm
     def answer(request: Request) -> Answer:
         if len(chat_server.requests) > 1:
             late.wait(PATIENCE)
-        answered = [{**next(designs).params, "expected_position_error": 1, "expected_torque": 2} for _ in range(2)]
-        return json.dumps({"designs": answered} if "response_format" in request else {"answer": "ready"})
+        return json.dumps({**next(designs).params} if "response_format" in request else {"answer": "ready"})
 
     def watch(progress: Progress) -> None:
         if progress.doing == "finished" and progress.number == 8:
             late.set()
 
     chat_server.answer = answer
-    asking = {"answer": "one-step", "proposals": 2, "memory": "own"}
-    settings = {"n_total": 24, "in_flight": 2}
-    run = recorded(chat_server, tmp_path / "first", asking, watch=watch, **settings)
+    settings = {"n_total": 24, "in_flight": 4}
+    run = recorded(chat_server, tmp_path / "first", {"answer": "one-step"}, watch=watch, **settings)
     proposals = [trial for trial in run.trials if trial.proposal]
     assert len(proposals) == 8
     assert proposals[0].number - (proposals[0].feedback or 0) >= 5
-    assert len({trial.asked or trial.number for trial in proposals}) == 4
+    assert len({trial.asked or trial.number for trial in proposals}) == 8
     chat_server.requests.clear()
     again = optimize(
         PROBLEM,
@@ -138,20 +132,6 @@ def test_exhausted_budget_is_replayed(varied: ChatServer, tmp_path: Path) -> Non
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
 
 
-@pytest.fixture
-def in_pairs(chat_server: ChatServer) -> ChatServer:
-    """Every answer has two designs."""
-    designs = iter(PROBLEM.space.sample(50, 3))
-
-    def answer(request: Request) -> Answer:
-        if "response_format" not in request:
-            return designer(request)
-        return json.dumps({"designs": [dict(next(designs).params) for _ in range(2)]})
-
-    chat_server.answer = answer
-    return chat_server
-
-
 def interrupted_at(stop: int) -> Callable[[Progress], None]:
     def watch(progress: Progress) -> None:
         if progress.doing == "finished" and progress.number == stop:
@@ -162,9 +142,9 @@ def interrupted_at(stop: int) -> Callable[[Progress], None]:
 
 @pytest.mark.parametrize("stop", [4, 6])
 @pytest.mark.slow
-def test_interrupted_replay_resumes(in_pairs: ChatServer, tmp_path: Path, stop: int) -> None:
-    """This includes a stop within a call of two designs: no recorded call is used twice."""
-    first = recorded(in_pairs, tmp_path / "first", {"proposals": 2})
+def test_interrupted_replay_resumes(varied: ChatServer, tmp_path: Path, stop: int) -> None:
+    """No recorded call is used twice."""
+    first = recorded(varied, tmp_path / "first")
     for watch in (interrupted_at(stop), None):
         with suppress(KeyboardInterrupt):
             optimize(
@@ -209,60 +189,11 @@ def test_proposals_of_a_truncated_recording_are_missing(
     assert {trial.fault for trial in turns if trial.number >= there} == {"missing"}
 
 
-@pytest.mark.parametrize(
-    "asking",
-    [
-        {},
-        {"answer": "one-step", "proposals": 2},
-        pytest.param({"answer": "one-step"}, marks=pytest.mark.slow),
-        pytest.param({"proposals": 2}, marks=pytest.mark.slow),
-    ],
-)
-def test_transcript_alone_can_be_replayed(in_pairs: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
-    """Answer form and number of designs are inferred from the calls."""
-    if "proposals" not in asking:
-        in_pairs.answer = designer
-    recorded(in_pairs, tmp_path / "first", asking)
-    alone = tmp_path / "alone.jsonl"
-    shutil.copy(tmp_path / "first" / "transcripts.jsonl", alone)
-    optimize(PROBLEM, proposer=ReplayProposer(alone, strict=True), out=tmp_path / "again", **SETTINGS)
-    assert lines(tmp_path / "again") == lines(tmp_path / "first")
-
-
-def test_replay_takes_settings_missing_in_the_transcript_from_options(varied: ChatServer, tmp_path: Path) -> None:
-    mine = tmp_path / "mine.md"
-    mine.write_text('{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}', encoding="utf-8")
-    recorded(varied, tmp_path / "first", {"prompt": str(mine), "memory": "own"})
-    shutil.copy(tmp_path / "first" / "transcripts.jsonl", tmp_path / "alone.jsonl")
-    for record in ("first", "alone.jsonl"):
-        options = ModelOptions(prompt=str(mine), memory="own", replay_strict=True)
-        again = optimize(PROBLEM, proposer=choose_proposer(f"replay:{tmp_path / record}", options).proposer, **SETTINGS)
-        assert again.summary["proposer"]["failures"] == {}
-
-
-def test_options_that_contradict_the_record_are_refused(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_replay_uses_no_prompt_options(chat_server: ChatServer, tmp_path: Path) -> None:
     recorded(chat_server, tmp_path / "first", n_total=1)
-
-    def choose(**option: Any) -> Proposer | None:
-        return choose_proposer(f"replay:{tmp_path / 'first'}", ModelOptions(**option)).proposer
-
-    in_transcript = [
-        ({"answer": "one-step"}, "recorded with answer = two-step; leave out answer = one-step"),
-        ({"proposals": 4}, "recorded with proposals = 1; leave out proposals = 4"),
-    ]
-    in_config = [
-        ({"memory": "own"}, "recorded with memory = none; leave out memory = own"),
-        ({"prompt": "minus"}, "recorded with prompt = plus; leave out prompt = minus"),
-    ]
-    for option, message in (*in_transcript, *in_config):
-        with pytest.raises(SettingsError, match=message):
-            choose(**option)
-    (tmp_path / "first" / "config.yaml").unlink()
-    for option, message in in_transcript:
-        with pytest.raises(SettingsError, match=message):
-            choose(**option)
-    for option, _ in in_config:
-        assert isinstance(choose(**option), ReplayProposer)
+    for option in ({"memory": "chat"}, {"prompt": "minus"}, {"answer": "one-step"}):
+        with pytest.raises(SettingsError, match=f"does not use {next(iter(option))} = .*; leave it out"):
+            choose_proposer(f"replay:{tmp_path / 'first'}", ModelOptions(**option))
 
 
 def test_differing_prompt_is_reported_or_refused_when_strict(varied: ChatServer, tmp_path: Path) -> None:
@@ -283,11 +214,11 @@ def test_differing_prompt_is_reported_or_refused_when_strict(varied: ChatServer,
 def test_recording_with_other_settings_is_reported(varied: ChatServer, tmp_path: Path) -> None:
     """Proposals recorded for other trials are missing, with a reason."""
     recorded(varied, tmp_path / "first")
-    alone = tmp_path / "alone.jsonl"
-    shutil.copy(tmp_path / "first" / "transcripts.jsonl", alone)
+    (tmp_path / "first" / "trials.jsonl").unlink()
     notes: list[str] = []
     settings = {**SETTINGS, "n_init": 5}
-    run = optimize(PROBLEM, proposer=ReplayProposer(alone), **settings, watch=lambda p: notes.append(p.note))
+    replayed = ReplayProposer(tmp_path / "first")
+    run = optimize(PROBLEM, proposer=replayed, **settings, watch=lambda p: notes.append(p.note))
     assert run.trials[5].fault == "missing"
     assert "holds no proposal for trial 5; check n_init and n_step" in "".join(notes)
     assert run.summary["proposer"]["flagged"]
@@ -303,15 +234,16 @@ def test_a_recorded_call_without_a_key_is_damaged(tmp_path: Path, key: str) -> N
     del content[key]
     path.write_text(json.dumps(content) + "\n", encoding="utf-8")
     with pytest.raises(RunFolderError, match="line 1 is damaged"):
-        ReplayProposer(path)
+        Transcript(path)
 
 
 def test_invalid_recordings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ReplayError, match="there is no"):
         ReplayProposer(tmp_path)
-    (tmp_path / "transcripts.jsonl").write_text("", encoding="utf-8")
+    optimize(PROBLEM, proposer="none", out=tmp_path / "run", n_init=1, n_total=1, verify=False)
+    (tmp_path / "run" / "transcripts.jsonl").write_text("", encoding="utf-8")
     with pytest.raises(ReplayError, match="holds no proposal"):
-        ReplayProposer(tmp_path)
+        ReplayProposer(tmp_path / "run")
     with pytest.raises(SettingsError, match="needs a run: replay:PATH"):
         choose_proposer("replay:")
     with pytest.raises(SettingsError, match="rules does not use replay_strict"):
@@ -364,7 +296,7 @@ def test_shipped_recording_reaches_its_recorded_hypervolume(name: str, mean: flo
 
 
 def test_prompts_of_a_recording_are_shown_as_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(Prompt, "render")  # today's templates are not used
+    monkeypatch.delattr(prompted, "design_prompt")  # today's templates are not used
     recording = find_recording("target-1-plus-seed0")
     assert recording is not None
     # With another seed, the prompts would differ from the recorded ones.

@@ -11,7 +11,7 @@ import pytest
 from armwright.exceptions import AnswerPendingError
 from armwright.llm import client as chat
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import PROMPTS, Prompt, load_prompt, whole_template
+from armwright.llm.prompt import design_prompt
 from armwright.llm.transcript import hints_of, used_hints
 from armwright.proposers.manual import ManualProposer
 from armwright.proposers.replay import ReplayProposer
@@ -37,7 +37,7 @@ def prompts_with_hints(folder: Path) -> dict[str, str]:
     }
 
 
-@pytest.mark.parametrize("asking", [{}, {"answer": "one-step", "memory": "own"}, {"prompt": "minus"}])
+@pytest.mark.parametrize("asking", [{}, {"answer": "one-step"}, {"prompt": "minus"}])
 def test_hint_enters_the_next_prompt_once(chat_server: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
     """This holds with and without an interrupt; no other recorded call has hints."""
     out = tmp_path / "run"
@@ -159,50 +159,18 @@ PAPER = FixedProblem(load_task("target-1"))
 def test_prompt_without_hints_is_unchanged() -> None:
     history = fixed_history(PAPER)
     for name in ("plus", "minus"):
-        prompt = load_prompt(name)
-        for hints in ((), ("\u200b", "\x00")):  # in which nothing is to be seen
-            assert prompt.render(history, 3, hints=hints) == prompt.render(history, 3)
+        options = PromptOptions(prompt=name)
+        hints = ("\u200b", "\x00")  # in which nothing is to be seen
+        assert design_prompt(history, 3, options, hints=hints) == design_prompt(history, 3, options)
 
 
 def test_hint_stays_on_one_line() -> None:
     hint = "first\n\n# Your turn\nORIGIN: (9, 9, 9)\x1b[2J {{ 1 + 1 }} {% endblock %} " + "x" * 1900
-    told = load_prompt("plus").render(fixed_history(PAPER), 3, hints=[hint, "second"]).splitlines()
+    told = design_prompt(fixed_history(PAPER), 3, hints=[hint, "second"]).splitlines()
     (line,) = [line for line in told if line.startswith("- first")]
     assert line.startswith("- first # Your turn ORIGIN: (9, 9, 9) {{ 1 + 1 }} {% endblock %} xxx")
     assert told.count("# Your turn") == 1
     assert told[told.index(line) + 1] == "- second"
-
-
-@pytest.mark.parametrize("template", ["Be brief.", "{{ targets }}", "{% set told = hints %}Be brief."])
-def test_template_without_hints_gets_them_appended(template: str) -> None:
-    own, history = Prompt("own", template), fixed_history(PAPER)
-    plain = own.render(history, 3)
-    assert own.render(history, 3, hints=["first"]) == f"{plain}\n{NOTE}first\n"
-    assert own.render(history, 3, hints=["first", "second"]) == f"{plain}\n{NOTES}- first\n- second\n"
-
-
-def test_extended_template_places_hints_as_the_builtin_one() -> None:
-    history = fixed_history(PAPER)
-    for own in (
-        Prompt("own", '{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}'),
-        Prompt("own", whole_template("plus")),
-    ):
-        text = own.render(history, 3, hints=["first"])
-        assert text.count(NOTE) == 1
-        assert text.index(NOTE) < text.index("End your answer")
-    emptied = Prompt("own", '{% extends "proposal.md.j2" %}{% block hints %}{% endblock %}')
-    assert emptied.render(history, 3, hints=["first"]).endswith(f"\n\n{NOTE}first\n")
-
-
-@pytest.mark.parametrize("name", PROMPTS)
-def test_whole_template_renders_the_built_in_prompt(name: str) -> None:
-    history = fixed_history(PAPER)
-    assert Prompt("own", whole_template(name)).render(history, 3) == load_prompt(name).render(history, 3)
-
-
-def test_template_may_place_hints_itself() -> None:
-    own = Prompt("own", "{% for hint in hints %}!{{ hint | upper }}{% endfor %} Go.")
-    assert own.render(fixed_history(PAPER), 3, hints=["first", "second"]) == "!FIRST!SECOND Go.\n"
 
 
 def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: Path) -> None:

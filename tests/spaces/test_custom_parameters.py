@@ -12,9 +12,9 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 import armwright as aw
 from armwright.exceptions import DesignError, SettingsError, SpaceError
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.llm.answer import answer_schema, read_answers, read_text
+from armwright.llm.answer import answer_schema, read_answer, read_text
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import load_prompt
+from armwright.llm.prompt import design_prompt
 from armwright.problem.checks.instant import check_instantly
 from armwright.problem.conditions import read_condition
 from armwright.problem.reduction import without_joints
@@ -232,7 +232,7 @@ def test_prompts_describe_parameters_and_answers_are_read() -> None:
     problem = aw.Problem(TASK, space_of(), evaluator=measure)
     run = aw.optimize(problem, n_init=5, n_total=5)
     for name in ("plus", "minus", "full"):
-        text = load_prompt(name).render(run.history, 0, PromptOptions(answer="text"))
+        text = design_prompt(run.history, 0, PromptOptions(prompt=name, answer="text"))
         assert "- GEAR = (gear_1, ..., gear_3): of each joint, 1 <= gear_j <= 3." in text
         assert "- KP: of the whole arm [N m/rad], 1 <= kp <= 200, on a logarithmic scale." in text
         assert "- CELLS: of the whole arm, a whole number, 1 <= cells <= 4." in text
@@ -242,7 +242,7 @@ def test_prompts_describe_parameters_and_answers_are_read() -> None:
     properties = answer_schema(problem, PromptOptions())["properties"]
     assert properties["cells"] == {"type": "integer", "description": "1 <= cells <= 4"}
     assert properties["belt"] == {"type": "string", "enum": ["gt2", "htd3"]}
-    assert read_answers(dict(design.params), problem)[0].design == design
+    assert read_answer(dict(design.params), problem).design == design
     lines = """ORIGIN: (0.1, 0, 0.2)
 JOINTS: (Y, P, P)
 LINKS: (0.1, 0.2, 0.2)
@@ -251,13 +251,13 @@ KP: 40 N m/rad
 CELLS: 2
 BELT: HTD3
 REASON: soft"""
-    (answer,) = read_text(lines, problem)
+    answer = read_text(lines, problem)
     params = answer.design.params
     assert [params[f"gear_{j}"] for j in (1, 2, 3)] == [1.5, 2.0, 3.0]
     assert (params["kp"], params["cells"], params["belt"]) == (40.0, 2, "htd3")
     groups = json.loads(
         '{"origin": [0, 0, 0], "joints": "YPP", "links": [0.1, 0.1, 0.1], "gear": [1, 2, 3], "kp": "5"}'
     )
-    assert read_answers(groups | {"cells": 1, "belt": "gt2"}, problem)[0].design.params["gear_3"] == 3.0
+    assert read_answer(groups | {"cells": 1, "belt": "gt2"}, problem).design.params["gear_3"] == 3.0
     with pytest.raises(DesignError, match="kp = 300"):
         read_text(lines.replace("40 N m/rad", "300"), problem)

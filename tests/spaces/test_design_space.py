@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError, SpaceError
 from armwright.kinematics.arms.arm_arrays import FLOATS, stack_arms
-from armwright.llm.prompt import load_prompt
+from armwright.llm.prompt import design_prompt
 from armwright.problem.problem import Problem
 from armwright.robot.tubes import MATERIALS
 from armwright.runs.folder import read_run
@@ -223,7 +223,7 @@ def test_restricted_space_is_respected_by_a_run(tmp_path: Path) -> None:
     assert read_run(tmp_path / "run")[0].space == space
     found = find_front(problem, evaluations=1500)
     assert {member.design.joints[0] for member in found.front} == {"Y"}
-    prompt = load_prompt("plus").render(run.history, 0)
+    prompt = design_prompt(run.history, 0)
     assert "origin_z = 0 (fixed); joint_1 = Y; joint_2 is one of R, P; 0.1 <= link_1 <= 0.2." in prompt
 
 

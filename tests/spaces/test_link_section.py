@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.llm.answer import Answer, read_answers, read_text, written_answers
-from armwright.llm.answer_format import designs_in_lines
+from armwright.llm.answer import Answer, read_answer, read_text, written_answer
+from armwright.llm.answer_format import design_in_lines
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import load_prompt
+from armwright.llm.prompt import design_prompt
 from armwright.problem.objectives import MASS, PRICE
 from armwright.problem.problem import Problem
 from armwright.robot.mjcf import to_mjcf
@@ -129,7 +129,7 @@ def test_search_varies_tubes_and_keeps_ties() -> None:
     ],
 )
 def test_answers_name_tubes(lines: str, values: dict[str, str]) -> None:
-    _, (design,) = designs_in_lines(f"ORIGIN: (0, 0, 0)\n{lines}")
+    _, design = design_in_lines(f"ORIGIN: (0, 0, 0)\n{lines}")
     assert {name: value for name, value in design.items() if name.startswith("tube")} == values
 
 
@@ -137,16 +137,16 @@ def test_answers_name_tubes(lines: str, values: dict[str, str]) -> None:
 def test_prompts_ask_for_tubes_and_read_them_back(per_link: bool) -> None:
     searched = space(link_section={**TUBES, "per_link": per_link})
     problem = FixedProblem(load_task("target-1"), searched)
-    text = load_prompt("plus").render(fixed_history(problem), 3, PromptOptions(answer="text"))
+    text = design_prompt(fixed_history(problem), 3, PromptOptions(answer="text"))
     assert "by its outer diameter and wall in millimetres: 20x1.5, 30x2." in text
     assert ("\nTUBES: (tube_1, ..., tube_3)\n" if per_link else "\nTUBE: tube\n") in text
-    answers = [Answer(design, "so") for design in searched.sample(3, 1)]
-    assert read_answers(json.loads(written_answers(answers, problem)), problem, 3) == answers
+    for answer in (Answer(design, "so") for design in searched.sample(3, 1)):
+        assert read_answer(json.loads(written_answer(answer)), problem) == answer
     (design,) = searched.sample(1, 2)
     origin, links = (", ".join(map(repr, values)) for values in (design.origin, design.links))
     tubes = f"TUBES: ({', '.join(design.tubes)})" if per_link else f"TUBE: {design.tubes[0]}"
     lines = f"ORIGIN: ({origin})\nJOINTS: ({', '.join(design.joints)})\nLINKS: ({links})\n{tubes}\n"
-    assert read_text(lines, problem)[0].design == design
+    assert read_text(lines, problem).design == design
 
 
 def test_files_show_the_radius_and_the_tube_of_each_link() -> None:

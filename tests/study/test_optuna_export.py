@@ -49,7 +49,7 @@ class Talker(Proposer):
     name = "talker"
 
     def propose(self, history: History, seed: int, number: int) -> Proposal:
-        return Proposal(history.problem.space.sample(1, seed)[0], f"talker-{number}", REASON, expected=(0.1, 2.0, 0.5))
+        return Proposal(history.problem.space.sample(1, seed)[0], f"talker-{number}", REASON)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,6 @@ def test_exported_trials_equal_those_of_the_run(which: str, request: pytest.Fixt
                 "joints": ours.design.joints,
                 "proposal": ours.proposal,
                 "reason": ours.reason or None,
-                "expected": None if ours.expected is None else list(ours.expected),
                 "fault": ours.fault,
                 "failure": ours.failure or None,
                 "duplicate_of": ours.duplicate_of,
@@ -132,7 +131,7 @@ def test_exported_runs_cover_all_trial_fields(run: Path) -> None:
     with opened(run / STUDY_DB) as study:
         assert len({len(trial.params) for trial in study.trials}) > 1
         names = {name for trial in study.trials for name in trial.user_attrs}
-        assert names >= {"source", "joints", "proposal", "reason", "expected", "verdict"}
+        assert names >= {"source", "joints", "proposal", "reason", "verdict"}
         assert any(not all(value <= 0 for value in trial.constraints.values()) for trial in study.trials)
         assert any("generation" in name for trial in study.trials for name in trial.system_attrs)
 

@@ -9,8 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.exceptions import ArmwrightError, RunConflictError
-from armwright.llm.prompt_values import VARIABLES
+from armwright.exceptions import ArmwrightError
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
@@ -23,7 +22,6 @@ from tests.support.fixed_problem import SIX_AXIS
 from tests.support.wire_formats import llm_proposer, model_options
 
 PROBLEM = Problem(load_task("target-1"))
-OWN = '{% extends "proposal.md.j2" %}{% block role %}Only {{ n_finished }} designs so far.{% endblock %}'
 
 
 def shown(*args: str) -> tuple[str, str]:
@@ -59,30 +57,13 @@ def asked(out: Path) -> list[Call]:
     return [call for call in Transcript(out / "transcripts.jsonl").calls if call.step in ("reasoning", "answer")]
 
 
-@pytest.mark.parametrize(
-    "how",
-    [
-        {},
-        {"prompt": "minus", "memory": "own"},
-        {"answer": "one-step", "memory": "own"},
-        {"prompt": "file"},
-        {"memory": "chat"},
-    ],
-    ids=["plus", "minus-own", "one-step", "file", "chat"],
-)
+@pytest.mark.parametrize("how", [{}, {"prompt": "minus", "answer": "one-step"}, {"memory": "chat"}])
 def test_printed_prompt_is_the_prompt_sent(chat_server: ChatServer, in_folder: Path, how: dict[str, Any]) -> None:
     out = in_folder / "run"
-    if how.get("prompt") == "file":
-        (in_folder / "own.md").write_text(OWN, encoding="utf-8")
-        how = {"prompt": str(in_folder / "own.md")}
     run(out, 3, llm_proposer(chat_server.url, **how))
-    (in_folder / "own.md").unlink(missing_ok=True)  # the run has it
     before, words = shown("--after", "run")
     assert words.startswith("about ")
     assert words.endswith("tokens; for trial 7\n")
-    if (in_folder / "run" / "config.yaml").read_text(encoding="utf-8").count("template:"):
-        (in_folder / "own.md").write_text(OWN, encoding="utf-8")
-        assert before.startswith("Only 7 designs so far.")
     run(out, 4, llm_proposer(chat_server.url, **how))
     first, second = asked(out)
     assert before == second.prompt
@@ -96,14 +77,13 @@ def test_printed_prompt_is_the_prompt_sent(chat_server: ChatServer, in_folder: P
 
 
 def test_options_override_those_of_the_run(chat_server: ChatServer, in_folder: Path) -> None:
-    run(in_folder / "run", 3, llm_proposer(chat_server.url, prompt="minus", memory="own"))
+    run(in_folder / "run", 3, llm_proposer(chat_server.url, prompt="minus"))
     told = shown("--after", "run")[0]
     assert "Step 1" not in told
-    assert "Your earlier proposals" in told
-    told = shown("--after", "run", "--prompt", "plus", "--memory", "none", *model_options(proposals=2))[0]
+    assert "`reasoning`" not in told
+    told = shown("--after", "run", "--prompt", "plus", *model_options(answer="one-step"))[0]
     assert "Step 1" in told
-    assert "Your earlier proposals" not in told
-    assert "2 new designs" in told
+    assert "`reasoning`" in told
 
 
 def test_prompt_of_a_new_run(chat_server: ChatServer, in_folder: Path) -> None:
@@ -123,12 +103,6 @@ def test_prompt_after_a_run_without_a_model(in_folder: Path) -> None:
 def test_preview_is_of_the_next_request(chat_server: ChatServer, in_folder: Path) -> None:
     run(in_folder / "run", 2, llm_proposer(chat_server.url))
     assert shown("--after", "run")[1].endswith("for trial 7\n")
-    designs = [json.loads(json.dumps(dict(design.params))) for design in PROBLEM.space.sample(3, 1)]
-    chat_server.answer = lambda request: json.dumps({"designs": designs}) if "response_format" in request else "so"
-    run(in_folder / "many", 3, llm_proposer(chat_server.url, proposals=3))
-    assert shown("--after", "many")[1].endswith("for trial 13\n")
-    run(in_folder / "many", 10, llm_proposer(chat_server.url, proposals=3))
-    assert [call.proposal for call in asked(in_folder / "many")] == ["llm-0004", "llm-0013"]
 
 
 def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: Path) -> None:
@@ -185,10 +159,6 @@ def test_prompt_after_the_reasoning_requests_the_parameters(
     assert shown("--after", "run", "--number", "4")[0] == asked(in_folder / "run")[0].prompt
 
 
-def test_template_variables_are_listed() -> None:
-    assert [line.partition(":")[0] for line in shown("--variables")[0].splitlines()] == list(VARIABLES)
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder that holds a finished run and a space file."""
@@ -205,10 +175,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["target-9"], 'unknown task "target-9"'),
         (["target-1", "--number", "4"], "--number 4 needs --after RUN"),
         (["target-1", "--prompt", "pluss"], 'unknown prompt "pluss". Did you mean "plus"?'),
-        (["target-1", "--prompt", "."], "prompt . is a folder, not a template file"),
-        (["target-1", *model_options(memory="onw")], 'unknown memory "onw". Did you mean "own"?'),
         (["target-1", *model_options(answer="two")], 'unknown answer "two"'),
-        (["target-1", *model_options(proposals=0)], "proposals: expected a number of at least 1, got 0"),
         (["--after", "nowhere"], "nowhere is not a run folder"),
         (["target-1", "--after", "run"], "TASK target-1 is for a new run; run has its own"),
         (["--after", "run", "--space", "space.yaml"], "--space space.yaml is for a new run; run has its own"),
@@ -227,15 +194,3 @@ def test_invalid_arguments_are_refused(
         shown(*args)
     assert message in str(refusal.value)
     assert "\n" not in str(refusal.value)
-
-
-def test_changed_template_is_refused_in_one_line(chat_server: ChatServer, in_folder: Path) -> None:
-    own = in_folder / "own.md"
-    for text in (OWN, OWN.replace("Only", "\n".join("Just"))):
-        own.write_text(text, encoding="utf-8")
-        if text == OWN:
-            run(in_folder / "run", 1, llm_proposer(chat_server.url, prompt=str(own)))
-    with pytest.raises(RunConflictError, match=r"proposer\.template: .* stored, .* requested") as refusal:
-        run(in_folder / "run", 1, llm_proposer(chat_server.url, prompt=str(own)))
-    assert "\n" not in str(refusal.value)
-    assert len(str(refusal.value)) < 400

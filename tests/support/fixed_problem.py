@@ -108,13 +108,12 @@ def fixed_history(problem: Problem, n: int = 14, n_init: int = 10, proposals: Se
             source="llm",
             proposal=f"llm-{place:04d}",
             reason=trial.reason,
-            expected=trial.expected,
         )
     return History(problem, trials, n_init, reference)
 
 
-def proposal(design: Design, reason: str = "", expected: tuple[float, ...] | None = None) -> FinishedTrial:
-    return FinishedTrial(0, "llm", design, (), reason=reason, expected=expected)
+def proposal(design: Design, reason: str = "") -> FinishedTrial:
+    return FinishedTrial(0, "llm", design, (), reason=reason)
 
 
 SIX_AXIS = DesignSpace(

@@ -70,7 +70,7 @@ ModelName = Annotated[
 PromptName = Annotated[
     str | None,
     typer.Option(
-        help="Prompt: plus (with analysis instructions), minus, full (whole front, mechanics), or a template file.",
+        help="Prompt: plus (with analysis instructions), minus, or full (whole front, mechanics).",
         show_default="plus",
         rich_help_panel=MODEL,
     ),
@@ -78,8 +78,7 @@ PromptName = Annotated[
 MemoryName = Annotated[
     str | None,
     typer.Option(
-        help="What the model remembers of a run: none (every question is new), own (a list of its proposals) or chat "
-        "(the whole conversation).",
+        help="What the model remembers of a run: none (every question is new) or chat (the whole conversation).",
         show_default="none",
         rich_help_panel=MODEL,
     ),

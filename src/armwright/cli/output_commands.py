@@ -151,43 +151,31 @@ def prompt(
     evaluator: EvaluatorName = None,
     prompt: Annotated[
         str | None,
-        typer.Option(help="Prompt: plus, minus, full, or a template file.", show_default="the run's, else plus"),
+        typer.Option(help="Prompt: plus, minus or full.", show_default="the run's, else plus"),
     ] = None,
     memory: Annotated[
-        str | None, typer.Option(help="Memory: none, own or chat.", show_default="the run's, else none")
+        str | None, typer.Option(help="Memory: none or chat.", show_default="the run's, else none")
     ] = None,
     model_options: Annotated[
         str | None,
         typer.Option(
             metavar="FILE",
-            help="answer, proposals and others, in a YAML file or in place, such as '{proposals: 2}'.",
+            help="Options in a YAML file or in place, such as '{answer: one-step}'.",
             show_default="the run's",
         ),
     ] = None,
     n_init: Annotated[int | None, typer.Option(help="Random trials of the new run.", show_default="10")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the new run.", show_default="0")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the answer's JSON schema instead.")] = False,
-    template: Annotated[
-        bool, typer.Option("--template", help="Print the template of --prompt instead, as a basis for a custom one.")
-    ] = False,
-    variables: Annotated[bool, typer.Option("--variables", help="Print the variables of templates instead.")] = False,
 ) -> None:
-    """Print exactly what would be sent to a model for TASK, or what a custom prompt needs."""
+    """Print exactly what would be sent to a model for TASK."""
     from armwright.llm.configuration import load_model_options
-    from armwright.llm.prompt import whole_template
-    from armwright.llm.prompt_values import VARIABLES
     from armwright.study.prompt_preview import preview, preview_after
 
-    if variables:
-        print_text("\n".join(f"{name}: {description}" for name, description in VARIABLES.items()))
-        return
-    if template:
-        print_text(whole_template(prompt or "plus"), end="")
-        return
     options = load_model_options(model_options, prompt=prompt, memory=memory)
     if after is None:
         if task is None:
-            raise SettingsError("expected a TASK, --after RUN, --template or --variables")
+            raise SettingsError("expected a TASK, or --after RUN")
         if number is not None:
             raise SettingsError(f"--number {number} needs --after RUN")
         n_init = 10 if n_init is None else n_init

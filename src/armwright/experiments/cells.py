@@ -11,7 +11,6 @@ from typing import Any
 from armwright.exceptions import SettingsError, TaskError
 from armwright.experiments.plan import ExperimentPlan, MethodPlan
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import BUILTIN_PROMPTS
 from armwright.llm.recording_file import shipped_recordings
 from armwright.llm.servers import SERVER_KEY
 from armwright.llm.transcript import TRANSCRIPTS
@@ -106,9 +105,8 @@ def plan_cells(
         raise SettingsError(f"expected tasks with different names, got {', '.join(sorted(names))}")
     ready: list[Cell] = []
     skipped: list[Skipped] = []
-    methods = {key: _with_prompt(method, folder) for key, method in plan.methods.items()}
     # By seed first: an experiment that is stopped early then has results of every method.
-    for seed, (task, task_name), (key, method) in itertools.product(plan.seed_list, tasks, methods.items()):
+    for seed, (task, task_name), (key, method) in itertools.product(plan.seed_list, tasks, plan.methods.items()):
         seeds = plan.seeds_of(key)
         if seed not in seeds:
             continue
@@ -163,15 +161,6 @@ def _task(name: str, folder: Path) -> tuple[str, str]:
             raise TaskError(f"there is no file {file}, which the experiment names as a task")
         return str(file.resolve()), load_task(file).name
     return name, load_task(name).name
-
-
-def _with_prompt(method: MethodPlan, folder: Path) -> MethodPlan:
-    """Return the method with the path of its prompt file made absolute."""
-    options = method.model_options
-    if options.prompt in BUILTIN_PROMPTS:
-        return method
-    options = options.model_copy(update={"prompt": str((folder / options.prompt).resolve())})
-    return method.model_copy(update={"model_options": options})
 
 
 def _program() -> list[str]:

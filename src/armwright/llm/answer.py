@@ -1,4 +1,4 @@
-"""A model's answer: its JSON schema, and the designs read from it.
+"""A model's answer: its JSON schema, and the design read from it.
 
 Reading is lenient about form (numbers as text, lower-case joint letters, code fences, thoughts before the answer) and
 strict about content: nothing is guessed, and errors are those of the design space.
@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, cast
 
-from armwright.arrays import LARGEST_OBJECTIVE
 from armwright.exceptions import DesignError
-from armwright.llm.answer_format import JOINT_NAMES, designs_in_lines, expand_lists, plain_number
+from armwright.llm.answer_format import JOINT_NAMES, design_in_lines, expand_lists, plain_number
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
@@ -30,53 +29,38 @@ MAX_VALUE_LENGTH = 60  # characters of a value or a name in an error
 
 @dataclass(frozen=True)
 class Answer:
-    """A design, the reason for it, and the expected objectives if they were asked for."""
+    """A design and the reason for it."""
 
     design: Design
     reason: str = ""
-    expected: tuple[float, ...] | None = None
 
 
 def answer_schema(problem: Problem, options: PromptOptions) -> dict[str, Any]:
-    """Return the JSON schema of an answer: one property per parameter and the reason, or a list of such designs.
+    """Return the JSON schema of an answer: one property per parameter, and the reason.
 
     Ranges are described but not enforced: the design space can say what is wrong.
-
-    Args:
-        problem: gives the parameters and the objectives.
-        options: form of the answer, number of designs, and whether objectives are expected.
     """
     fields: dict[str, Any] = {parameter.name: _property(parameter) for parameter in problem.space.parameters}
-    if options.expects:
-        for objective in problem.objectives:
-            unit = objective.unit_in_brackets
-            text = f"the {objective.symbol} that you expect of this design, summed over all targets{unit}"
-            fields[f"expected_{objective.name}"] = {"type": "number", "description": text}
-    fields["reason"] = {"type": "string", "description": "the main reason for this design, in one sentence"}
-    if options.proposals > 1:
-        text = f"{options.proposals} designs, each different from the others"
-        content = {"designs": {"type": "array", "description": text, "items": object_schema(fields)}}
-    else:
-        content = fields
-    return response_schema("NewDesign" if options.proposals == 1 else "NewDesigns", content, options)
+    return response_schema("NewDesign", fields, "this design", options)
 
 
-def read_answers(content: Mapping[str, Any], problem: Problem, proposals: int = 1) -> list[Answer]:
-    """Return the designs of an answer, at most `proposals`.
+def read_answer(content: Mapping[str, Any], problem: Problem) -> Answer:
+    """Return the design of an answer; raises DesignError if it is invalid."""
+    lower = {one_line(str(key), MAX_VALUE_LENGTH).lower(): value for key, value in content.items()}
+    lower.pop("reasoning", None)
+    content = expand_lists(lower, per_joint(problem.space))
+    reason = short_reason(content.pop("reason", None))
+    kinds = {parameter.name: parameter for parameter in problem.space.parameters}
+    params = {name: _value(kinds.get(name), value) for name, value in content.items()}
+    n_joints = kinds.get("n_joints")
+    if n_joints is not None and "n_joints" not in params:  # given by the length of a list
+        params["n_joints"] = str(sum(name.startswith("joint_") for name in params))
+    return Answer(problem.space.design(params), reason)
 
-    Raises:
-        DesignError: A design is invalid.
-    """
-    designs: Any = content.get("designs", [{key: value for key, value in content.items() if key != "reasoning"}])
-    if not isinstance(designs, list) or not designs:
-        raise DesignError("designs: expected a list of objects, one per design")
-    return _read_all(cast("list[Any]", designs)[:proposals], problem)
 
-
-def written_answers(answers: Sequence[Answer], problem: Problem, reasoning: str = "") -> str:
-    """Return answers as JSON, which `read_text` reads without loss."""
-    designs = [_content(answer, problem) for answer in answers]
-    return answer_json(designs[0] if len(designs) == 1 else {"designs": designs}, reasoning)
+def written_answer(answer: Answer, reasoning: str = "") -> str:
+    """Return an answer as JSON, which `read_text` reads without loss."""
+    return answer_json({**answer.design.params, "reason": answer.reason}, reasoning)
 
 
 def answer_json(content: Mapping[str, Any], reasoning: str) -> str:
@@ -84,8 +68,13 @@ def answer_json(content: Mapping[str, Any], reasoning: str) -> str:
     return json.dumps({**({"reasoning": reasoning} if reasoning else {}), **content}, ensure_ascii=False)
 
 
-def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
-    """Return the last `proposals` designs of a free answer, from JSON objects or ORIGIN, JOINTS and LINKS lines.
+def short_reason(reason: Any) -> str:
+    """Return the reason of an answer on one line."""
+    return one_line(_as_text(reason or ""), MAX_REASON_LENGTH)
+
+
+def read_text(text: str, problem: Problem) -> Answer:
+    """Return the last design of a free answer, from a JSON object or from ORIGIN, JOINTS and LINKS lines.
 
     Raises:
         DesignError: There is no valid design, or the last JSON object is incomplete; earlier ones were not the answer.
@@ -93,24 +82,17 @@ def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
     with suppress(ValueError, RecursionError):  # JSON only, such as a recorded answer
         content = _decoder.decode(text.strip())
         if isinstance(content, dict):
-            return read_answers(cast("dict[str, Any]", content), problem, proposals)
+            return read_answer(cast("dict[str, Any]", content), problem)
     text = without_thoughts(text)[-MAX_ANSWER_LENGTH:]
-    names = {"designs", "origin", "joints", "links", *(parameter.name for parameter in problem.space.parameters)}
-    objects, incomplete = _objects(text, names)
-    last_object = objects[-1][0] if objects else -1
-    last_line, lines = designs_in_lines(text, per_joint(problem.space))
+    last_object, content, incomplete = _last_object(text, {parameter.name for parameter in problem.space.parameters})
+    last_line, line_content = design_in_lines(text, per_joint(problem.space))
     if incomplete > max(last_line, last_object):
         raise DesignError("the last JSON object is incomplete: give one value per parameter, and close its braces")
-    if last_line > last_object:
-        return _read_all(lines[-proposals:], problem)
-    if not objects:
+    if max(last_line, last_object) < 0:
         raise DesignError(
             "no design found: give JSON with one value per parameter, or the lines ORIGIN, JOINTS and LINKS"
         )
-    last = objects[-1][1]
-    if "designs" in last:
-        return read_answers(last, problem, proposals)
-    return _read_all([content for _, content in objects if "designs" not in content][-proposals:], problem)
+    return read_answer(line_content if last_line > last_object else content, problem)
 
 
 def last_json_object(text: str) -> str:
@@ -130,17 +112,17 @@ def per_joint(space: DesignSpace) -> dict[str, bool]:
     return {name: custom.per is not None for name, custom in space.custom}
 
 
-def _property(parameter: Parameter) -> dict[str, Any]:
-    if isinstance(parameter, CategoricalParameter):
-        return {"type": "string", "enum": list(parameter.choices)}
-    description = f"{exact(parameter.low)} <= {parameter.name} <= {exact(parameter.high)} {parameter.unit}".rstrip()
-    if parameter.step > 0.0 and not (parameter.integer and parameter.step == 1.0):
-        description += f", in steps of {exact(parameter.step)}"
-    return {"type": "integer" if parameter.integer else "number", "description": description}
+def response_schema(title: str, fields: Mapping[str, Any], of: str, options: PromptOptions) -> dict[str, Any]:
+    """Return the JSON schema of a whole answer, with the model's analysis first if there is no call before it.
 
-
-def response_schema(title: str, fields: Mapping[str, Any], options: PromptOptions) -> dict[str, Any]:
-    """Return the JSON schema of a whole answer, with the model's analysis first if there is no call before it."""
+    Args:
+        title: Name of the schema.
+        fields: Schemas of the values.
+        of: What the reason is the reason of.
+        options: Form of the answer.
+    """
+    reason = {"type": "string", "description": f"the main reason for {of}, in one sentence"}
+    fields = {**fields, "reason": reason}
     if options.form == "schema":
         fields = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **fields}
     return {"title": title, "description": "What to evaluate next.", **object_schema(fields)}
@@ -152,38 +134,13 @@ def object_schema(fields: Mapping[str, Any], required: Sequence[str] | None = No
     return {"type": "object", "properties": dict(fields), "required": needed, "additionalProperties": False}
 
 
-def _read_all(designs: Sequence[Any], problem: Problem) -> list[Answer]:
-    """Read each design; if there are several, errors name the design."""
-    answers: list[Answer] = []
-    for number, design in enumerate(designs, start=1):
-        try:
-            if not isinstance(design, Mapping):
-                raise DesignError("expected an object with one value per parameter")
-            answers.append(_read(cast("Mapping[str, Any]", design), problem))
-        except DesignError as error:
-            if len(designs) == 1:
-                raise
-            raise DesignError(f"design {number}: {error}") from error
-    return answers
-
-
-def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
-    lower = {one_line(str(key), MAX_VALUE_LENGTH).lower(): value for key, value in content.items()}
-    content = expand_lists(lower, per_joint(problem.space))
-    reason = one_line(_as_text(content.pop("reason", None) or ""), MAX_REASON_LENGTH)
-    names = [f"expected_{objective.name}" for objective in problem.objectives]
-    values: Any = content.pop("expected", None)  # a list in place of the single values
-    if isinstance(values, (list, tuple)) and len(cast("list[Any]", values)) == len(names):
-        content |= dict(zip(names, cast("list[Any]", values), strict=True))
-    expected = [_number(content.pop(name, None)) for name in names]
-    kinds = {parameter.name: parameter for parameter in problem.space.parameters}
-    params = {name: _value(kinds.get(name), value) for name, value in content.items()}
-    n_joints = kinds.get("n_joints")
-    if n_joints is not None and "n_joints" not in params:  # given by the length of a list
-        params["n_joints"] = str(sum(name.startswith("joint_") for name in params))
-    design = problem.space.design(params)
-    known = [value for value in expected if isinstance(value, float) and abs(value) <= LARGEST_OBJECTIVE]
-    return Answer(design, reason, tuple(known) if len(known) == len(expected) else None)
+def _property(parameter: Parameter) -> dict[str, Any]:
+    if isinstance(parameter, CategoricalParameter):
+        return {"type": "string", "enum": list(parameter.choices)}
+    description = f"{exact(parameter.low)} <= {parameter.name} <= {exact(parameter.high)} {parameter.unit}".rstrip()
+    if parameter.step > 0.0 and not (parameter.integer and parameter.step == 1.0):
+        description += f", in steps of {exact(parameter.step)}"
+    return {"type": "integer" if parameter.integer else "number", "description": description}
 
 
 def _value(parameter: Parameter | None, value: Any) -> Any:
@@ -198,7 +155,7 @@ def _value(parameter: Parameter | None, value: Any) -> Any:
     return _number(value, "" if parameter is None else parameter.unit)
 
 
-def _number(value: Any, unit: str = "") -> Any:
+def _number(value: Any, unit: str) -> Any:
     """Return the number of a text (`"0.25"`, `"0.25 m"`), or the value itself."""
     if isinstance(value, int) and not isinstance(value, bool):
         try:
@@ -225,13 +182,6 @@ def _as_text(value: Any) -> str:
         return "a list in a list in a list, and so on"
 
 
-def _content(answer: Answer, problem: Problem) -> dict[str, Any]:
-    content: dict[str, Any] = dict(answer.design.params)
-    for objective, value in zip(problem.objectives, answer.expected or (), strict=False):
-        content[f"expected_{objective.name}"] = value
-    return {**content, "reason": answer.reason}
-
-
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return an object. A repeated name gets a value that the design space refuses."""
     content: dict[str, Any] = {}
@@ -245,15 +195,18 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 _decoder = json.JSONDecoder(object_pairs_hook=_without_repeats)
 
 
-def _objects(text: str, names: set[str]) -> tuple[list[tuple[int, dict[str, Any]]], int]:
-    """Return the outermost JSON objects that have one of `names`, and the position of an incomplete one or -1."""
+def _last_object(text: str, names: set[str]) -> tuple[int, dict[str, Any], int]:
+    """Return the last outermost JSON object with a parameter, after its position, before that of an incomplete one.
+
+    Positions are -1 if there is none.
+    """
+    names = {"origin", "joints", "links", *names}
     # Trailing commas and comments are common; blanks in their place keep the positions.
     text = "\n".join(map(_without_comment, text.split("\n")))
     text = re.sub(r",(?=\s*[}\]])", " ", text)
-    braces = [match.start() for match in re.finditer(r'\{\s*"', text)][-MAX_OBJECTS:]
-    objects: list[tuple[int, dict[str, Any]]] = []
+    last, found = -1, dict[str, Any]()
     end, incomplete = 0, -1
-    for position in braces:
+    for position in [match.start() for match in re.finditer(r'\{\s*"', text)][-MAX_OBJECTS:]:
         if position < end:
             continue
         try:
@@ -264,8 +217,8 @@ def _objects(text: str, names: set[str]) -> tuple[list[tuple[int, dict[str, Any]
                 incomplete = position
             continue
         if names & {str(name).lower() for name in content}:
-            objects.append((position, content))
-    return objects, incomplete
+            last, found = position, content
+    return last, found, incomplete
 
 
 def _without_comment(line: str) -> str:

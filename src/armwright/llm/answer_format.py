@@ -43,7 +43,7 @@ def _names(custom: Collection[str]) -> re.Pattern[str]:
 
     It is at the start of a line with any list marker or emphasis; in capitals also within the line.
     """
-    names = [*(group.upper() for group in (*GROUPS, *custom)), "EXPECTED", "REASON"]
+    names = [*(group.upper() for group in (*GROUPS, *custom)), "REASON"]
     keywords = "|".join(sorted(names, key=len, reverse=True) if custom else names)
     return re.compile(
         rf"(?:^[ \t>*_#`|•–-]{{0,20}}(?:\d+[.)] ?)?[*_`]{{0,3}}(?P<first>(?i:{keywords}))"
@@ -61,8 +61,8 @@ def module_lists(names: Collection[str]) -> dict[str, str]:
     return {group: kind for group, kind in LISTS.items() if group not in ("joints", "links") and f"{kind}_1" in names}
 
 
-def designs_in_lines(text: str, custom: Mapping[str, bool] = NO_CUSTOM) -> tuple[int, list[dict[str, Any]]]:
-    """Return the position of the last design or -1, and the parameters of each design in order.
+def design_in_lines(text: str, custom: Mapping[str, bool] = NO_CUSTOM) -> tuple[int, dict[str, Any]]:
+    """Return the position of the last design or -1, and its parameters.
 
     A design begins with its ORIGIN, so that an unfinished one takes no values from another.
 
@@ -70,7 +70,7 @@ def designs_in_lines(text: str, custom: Mapping[str, bool] = NO_CUSTOM) -> tuple
         text: an answer.
         custom: whether each custom parameter has a value per joint.
     """
-    designs: list[dict[str, Any]] = []
+    design: dict[str, Any] = {}
     last = -1
     for position, name, line in _named_lines(text, tuple(custom)):
         if len(line) > MAX_LINE_LENGTH:
@@ -79,14 +79,13 @@ def designs_in_lines(text: str, custom: Mapping[str, bool] = NO_CUSTOM) -> tuple
         if values is None:
             continue
         if name == "origin":
-            designs.append({})
-            last = position
-        if designs:
+            design, last = {}, position
+        if last >= 0:
             for key, value in values.items():
-                before = designs[-1].setdefault(key, value)
-                if repr(before) != repr(value) and (name in GROUPS or name in custom):  # contradictory: refused later
-                    designs[-1][key] = f"{before} and {value}"
-    return last, designs
+                before = design.setdefault(key, value)
+                if repr(before) != repr(value) and name != "reason":  # contradictory: refused later
+                    design[key] = f"{before} and {value}"
+    return last, design
 
 
 def expand_lists(content: Mapping[str, Any], custom: Mapping[str, bool] = NO_CUSTOM) -> dict[str, Any]:
@@ -161,19 +160,15 @@ def _values(name: str, text: str) -> dict[str, Any] | None:
     elif name == "links":
         text = re.sub(r"(?<!\w)[lL]_?(\d+)\s*[:=]", r"link_\1 =", text)
     named = _NAMED.findall(text)
-    if named and name != "expected":
+    if named:
         rest = _LEFT_OVER.fullmatch(_NAMED.sub("", text))
         return {key.lower(): _with_unit(number, unit) for key, number, unit in named} if rest else None
     text = _in_brackets(_NAMES_ALONE.sub("", text), _HAS_NUMBER)
     if name in ("strokes", "ranges"):
         text = re.sub(r"(?<!\S)-(?!\S)", "nan", _spaced(text))
-    if name == "expected":
-        text = re.sub(r"[A-Za-z]\w{0,40}\s*[:=]", "", text)
     items = _ITEM.findall(text)
     if not items or not _LEFT_OVER.fullmatch(_ITEM.sub("", text)):
         return None
-    if name == "expected":
-        return {"expected": [float(number) for number, _ in items]}
     if name in ("strokes", "ranges"):
         return _listed(name, [NOTHING if number == "nan" else _with_unit(number, unit) for number, unit in items])
     return {_parameter(name, i): _with_unit(*item) for i, item in enumerate(items)}

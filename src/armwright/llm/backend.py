@@ -18,21 +18,16 @@ Amount = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 @dataclass(frozen=True)
 class Question:
-    """A question.
+    """A question."""
 
-    Attributes:
-        proposal: Id of the proposal it is for, made of the source and the trial's number; empty for a check.
-        step: `check` (is the model available), `reasoning` (the free answer), `parameters` (that answer as values),
-            `answer` (both at once) or `draft` (a task and a space).
-        known: Number of finished trials that the prompt was made from.
-        hints: Hints of the user in the prompt.
-    """
-
+    # id of the proposal it is for, made of the source and the trial's number; empty for a check
     proposal: Annotated[str, Field(pattern=r"^(.*-\d{1,9})?$")]
+    # `check` (is the model available), `reasoning` (the free answer), `parameters` (that answer as values), `answer`
+    # (both at once) or `draft` (a task and a space)
     step: str
     prompt: str
-    known: Count = 0
-    hints: tuple[Hint, ...] = ()
+    known: Count = 0  # number of finished trials that the prompt was made from
+    hints: tuple[Hint, ...] = ()  # hints of the user in the prompt
 
     @property
     def trial(self) -> int:
@@ -53,21 +48,15 @@ CHECK = Question("", "check", "Answer with one word: ready")
 
 @dataclass(frozen=True)
 class Reply:
-    """An answer and its cost.
-
-    Attributes:
-        requests: Requests that the server answered; above 1 if an answer was invalid.
-        cost_usd: None if the price is unknown.
-        output_mode: How the answer was held to its schema: `tool`, `native` or `prompted`; empty for free text.
-    """
+    """An answer and its cost."""
 
     answer: str = ""
-    requests: Count = 0
+    requests: Count = 0  # requests that the server answered; above 1 if an answer was invalid
     input_tokens: Count = 0
     output_tokens: Count = 0
-    cost_usd: Amount | None = None
+    cost_usd: Amount | None = None  # None if the price is unknown
     seconds: Amount = 0.0
-    output_mode: str = ""
+    output_mode: str = ""  # how the answer was held to its schema: `tool`, `native` or `prompted`; empty for free text
 
     def plus(self, other: "Reply") -> "Reply":
         """Return another reply with the cost of both."""
@@ -84,14 +73,10 @@ class Reply:
 
 @dataclass(frozen=True)
 class OutputFormat:
-    """The form of an answer that is not free text.
+    """The form of an answer that is not free text."""
 
-    Attributes:
-        schema: JSON schema.
-        read: Turns an answer, as JSON or as text, into the text to record; UsageError refuses it.
-    """
-
-    schema: Mapping[str, Any]
+    schema: Mapping[str, Any]  # JSON schema
+    # turns an answer, as JSON or as text, into the text to record; UsageError refuses it
     read: Callable[[Mapping[str, Any] | str], str]
 
 
@@ -114,17 +99,11 @@ class Interrupted(KeyboardInterrupt):
 
 
 class LlmBackend(Protocol):
-    """Answer questions; several threads may ask at a time.
+    """Answer questions; several threads may ask at a time."""
 
-    Attributes:
-        model: Who answers, for the user.
-        origin: What answers: `model`, `manual` (a person) or `scripted` (a stand-in).
-        note: Message for the user about the last check; empty for none.
-    """
-
-    model: str
-    origin: str
-    note: str = ""
+    model: str  # who answers, for the user
+    origin: str  # what answers: `model`, `manual` (a person) or `scripted` (a stand-in)
+    note: str = ""  # message for the user about the last check; empty for none
 
     def begin(self) -> None:
         """Start a session; an earlier cancellation no longer counts. Does nothing by default."""

@@ -28,9 +28,9 @@ from armwright.llm.backend import (
     Turn,
 )
 from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
-from armwright.llm.redaction import WithoutKeys, redacted
+from armwright.llm.redaction import WithoutKeys, redacted, redacted_line
 from armwright.llm.servers import server_of
-from armwright.text import map_text, one_line
+from armwright.text import map_text
 
 with requires_extra("llm", "a language model"):
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
@@ -239,7 +239,9 @@ class ModelClient(LlmBackend):
                 raise _FormError(fault.kind, str(fault), fault.reply) from fault
             if fault.kind != "limit" or not refusals:
                 raise
-            message = f"{self.model}: max_calls leaves no request after an invalid answer ({_one_line(refusals[-1])})"
+            message = (
+                f"{self.model}: max_calls leaves no request after an invalid answer ({redacted_line(refusals[-1])})"
+            )
             raise CallError(fault.kind, message, fault.reply) from fault
         return replace(reply, answer=accepted[-1])
 
@@ -271,7 +273,7 @@ class ModelClient(LlmBackend):
                 raise Interrupted(self._reply(messages[len(past) :], started)) from fault
             except CALL_FAULTS as fault:
                 reason = only_reasoning(messages) if isinstance(fault, faults.UnexpectedModelBehavior) else ""
-                message = f"{self.model}: {_one_line(reason or describe_fault(fault))}"
+                message = f"{self.model}: {redacted_line(reason or describe_fault(fault))}"
                 raise CallError(kind_of_fault(fault), message, self._reply(messages[len(past) :], started)) from fault
         return self._reply(messages[len(past) :], started)
 
@@ -320,10 +322,6 @@ def _messages(turns: Sequence[Turn]) -> list[ModelMessage]:
             ModelResponse([TextPart(turn.answer)]),
         )
     ]
-
-
-def _one_line(text: object) -> str:
-    return one_line(redacted(str(text)), 300).rstrip(".")
 
 
 @cache

@@ -14,10 +14,9 @@ from pydantic_ai.providers import infer_provider_class
 from pydantic_ai.providers.openai_compatible import OpenAICompatibleProvider
 
 from armwright.exceptions import MissingExtraError, SettingsError
-from armwright.llm.redaction import redacted
+from armwright.llm.redaction import redacted_line
 from armwright.llm.servers import Server
 from armwright.llm.transport import guard
-from armwright.text import one_line
 
 # Chat templates of Qwen, Gemma and Mistral refuse a system message after the first; a user message they all accept.
 _SYSTEM_FIRST = ModelProfile(supports_inline_system_prompts=False)
@@ -34,10 +33,10 @@ def vendor_model(name: str, seconds: float) -> Model:
         model = infer_model(name)
     except faults.UserError as fault:
         key = re.search(r"\b[A-Z_]+_(?:API_KEY|ENDPOINT)\b", str(fault))
-        reason = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {_one_line(fault)}"
+        reason = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {redacted_line(fault)}"
         raise SettingsError(f"model {name} {reason}") from fault
     except ImportError as fault:
-        raise MissingExtraError(f"model {name} needs another package: {_one_line(fault)}") from fault
+        raise MissingExtraError(f"model {name} needs another package: {redacted_line(fault)}") from fault
     package = "" if model.provider is None else type(model.provider.client).__module__.partition(".")[0]
     if package not in _PACKAGES or vendor.startswith("gateway/"):
         return model  # over the vendor's own client, which follows no redirects
@@ -63,7 +62,3 @@ def model_on(server: Server, seconds: float) -> Model:
 def _http_client(seconds: float) -> httpx2.AsyncClient:
     """Return a guarded client; the deadline of a request is its `request_timeout`, which no other limit may cut."""
     return guard(create_async_httpx2_client(timeout=httpx2.Timeout(max(seconds, DEFAULT_HTTP_TIMEOUT), connect=5.0)))
-
-
-def _one_line(fault: Exception) -> str:
-    return one_line(redacted(str(fault)), 300).rstrip(".")

@@ -12,15 +12,10 @@ RESULTS = "# Results so far"  # heading in a prompt; all that changes from quest
 
 @dataclass(frozen=True)
 class Conversation:
-    """The turns that are sent with a question.
+    """The turns that are sent with a question."""
 
-    Attributes:
-        turns: The turns in their order.
-        n_dropped: Number of turns that were dropped because they exceeded the model's context.
-    """
-
-    turns: tuple[Turn, ...]
-    n_dropped: int = 0
+    turns: tuple[Turn, ...]  # the turns in their order
+    n_dropped: int = 0  # number of turns that were dropped because they exceeded the model's context
 
 
 def conversation(calls: Iterable[Call], trial: int | None = None) -> Conversation:

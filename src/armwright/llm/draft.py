@@ -57,28 +57,17 @@ Model = TypeVar("Model", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Draft:
-    """A drafted task and design space.
-
-    Attributes:
-        space: None if the default fits.
-        assumptions: What the model assumed, one sentence each.
-        questions: What the model would like to know, one sentence each.
-        task_yaml: Content of the task's file, without the comment at its top.
-        space_yaml: The same of the space; empty if there is none.
-        by: Who answered.
-        usage: Calls, tokens and cost.
-        files: Where it was written; empty if it was not.
-    """
+    """A drafted task and design space."""
 
     task: Task
-    space: DesignSpace | None
-    assumptions: tuple[str, ...]
-    questions: tuple[str, ...]
-    task_yaml: str
-    space_yaml: str
-    by: str
-    usage: ProposerSummary
-    files: tuple[Path, ...] = ()
+    space: DesignSpace | None  # None if the default fits
+    assumptions: tuple[str, ...]  # what the model assumed, one sentence each
+    questions: tuple[str, ...]  # what the model would like to know, one sentence each
+    task_yaml: str  # content of the task's file, without the comment at its top
+    space_yaml: str  # the same of the space; empty if there is none
+    by: str  # who answered
+    usage: ProposerSummary  # calls, tokens and cost
+    files: tuple[Path, ...] = ()  # where it was written; empty if it was not
 
     @property
     def problem(self) -> Problem:
@@ -132,10 +121,10 @@ class Drafter(LlmSession):
 
     def forecast(self, description: str) -> str:
         """Return the model and the estimated tokens and cost, in one line."""
-        from armwright.llm.prices import ExpectedTokens, describe_cost
+        from armwright.llm.prices import describe_cost
 
         given, configured = _input_tokens(description), self.configured
-        cost = describe_cost(configured.options, ExpectedTokens(1, given, ANSWER_TOKENS))
+        cost = describe_cost(configured.options, 1, given, ANSWER_TOKENS)
         return (
             f"asking {self._by()}{configured.place}, named by {configured.named_by}: about {given:,} tokens in, "
             f"{ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
@@ -216,12 +205,12 @@ class Drafter(LlmSession):
 
     def _check_price(self, description: str) -> None:
         """Raise SettingsError if the first question alone may exceed max_cost."""
-        from armwright.llm.prices import ExpectedTokens, estimated_cost
+        from armwright.llm.prices import estimated_cost
 
         options = self.configured.options
         if options.max_cost is None:
             return
-        cost = estimated_cost(options, ExpectedTokens(1, _input_tokens(description), ANSWER_TOKENS))
+        cost = estimated_cost(options, 1, _input_tokens(description), ANSWER_TOKENS)
         if cost is None:
             raise SettingsError(f"the price of {options.model} is unknown; use max_calls instead of max_cost")
         if cost > options.max_cost:

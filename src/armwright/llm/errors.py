@@ -83,7 +83,8 @@ def may_refuse_output(kind: str, message: str) -> bool:
     No code says so, hence any refusal counts. A status with another meaning (404 of OpenRouter, 500 of llama-server)
     counts if the message is about tools or schemas.
     """
-    return kind in ("rejected", "settings") or (kind in ("unknown_model", "server") and _is_about_output(message))
+    about_output = _OUTPUT_WORDS.search(message) is not None
+    return kind in ("rejected", "settings") or (kind in ("unknown_model", "server") and about_output)
 
 
 def describe_fault(fault: Exception) -> str:
@@ -109,10 +110,6 @@ def _is_about_length(fault: Exception) -> bool:
     """Return whether a refusal is about the length of a prompt; several servers say so by their message alone."""
     is_too_large = isinstance(fault, faults.ModelHTTPError) and fault.status_code == 413
     return is_too_large or _LENGTH_WORDS.search(describe_fault(fault)) is not None
-
-
-def _is_about_output(message: str) -> bool:
-    return _OUTPUT_WORDS.search(message) is not None
 
 
 def _message(body: Any) -> str | None:

@@ -22,7 +22,6 @@ from armwright.text import one_line
 
 N_PARETO = 5  # front members shown
 N_RANDOM = 5  # other finished designs shown
-MAX_PROPOSED, MIN_PROPOSED = 20, 4  # earlier proposals shown
 N_LATEST = 3  # of the proposer's own designs, the latest ones shown
 FINE = 4  # decimals of lengths [m]: a base 1 mm off a symmetry plane may lead to another posture
 LARGE = 1e6  # from which numbers are written with an exponent
@@ -34,19 +33,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Digits:
-    """Numbers of decimals in a prompt: three, or more if the problem's scale is small.
+    """Numbers of decimals in a prompt: three, or more if the problem's scale is small."""
 
-    Attributes:
-        length: of lengths and positions [m].
-        torque: of torques [N m].
-        objectives: of each objective.
-        shares: of each objective that has a value per target.
-    """
-
-    length: int
-    torque: int
-    objectives: tuple[int, ...]
-    shares: tuple[int, ...]
+    length: int  # of lengths and positions [m]
+    torque: int  # of torques [N m]
+    objectives: tuple[int, ...]  # of each objective
+    shares: tuple[int, ...]  # of each objective that has a value per target
 
     @classmethod
     def of(cls, history: History) -> "Digits":
@@ -80,11 +72,11 @@ class Feedback:
         digits: decimals of all numbers.
     """
 
-    def __init__(self, history: History, seed: int, name: str = "", others: str = "off-front") -> None:
+    def __init__(self, history: History, seed: int, name: str = "") -> None:
         rng = np.random.default_rng(seed)
         front = [member.number for member in history.front] or history.nearest(N_PARETO)
         on_front = set(front)
-        drawn_from = [trial.number for trial in history if others == "all" or trial.number not in on_front]
+        drawn_from = [trial.number for trial in history if trial.number not in on_front]
         self.n_others = len(drawn_from)
         self.front = draw_in_order(front, N_PARETO, rng)
         self.others = draw_in_order(drawn_from, N_RANDOM, rng)
@@ -130,24 +122,6 @@ class Feedback:
         arm = self._history.problem.arm(self._history.trials[number].design)
         reasons = [unreached_reason(arm, self._evaluation, row, target) for target in shown]
         return "; ".join(f"target {k} by {why}" for k, why in enumerate(reasons, start=1) if why) or "none"
-
-
-def proposal_records(history: History, name: str) -> list[Record]:
-    """Return the earlier designs of the proposer `name`, with expectations, results and reasons."""
-    front = {member.number for member in history.front}
-    at = Digits.of(history)
-    return [
-        {
-            **_parameters(history, trial.number, at.length),
-            "expected": "not said" if trial.expected is None else vector(trial.expected, at.objectives),
-            "e_all": _objectives(trial, at),
-            "violated": _violated(history, trial.number),
-            "on_front": trial.number in front,
-            "reason": one_line(trial.reason, MAX_REASON_LENGTH) or "not said",
-        }
-        for trial in history
-        if trial.source == name
-    ]
 
 
 def design_lines(history: History, numbers: Sequence[int], name: str) -> list[Record]:

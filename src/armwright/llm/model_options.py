@@ -11,20 +11,19 @@ from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, field_valida
 
 from armwright.exceptions import did_you_mean
 
-MEMORIES = ("none", "own", "chat")
-OTHERS = ("off-front", "all")
+PROMPTS = ("plus", "minus", "full")
+MEMORIES = ("none", "chat")
 # Form of the answer in the prompt: free text and a second call, JSON only, or free text alone.
 ANSWERS = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
 OUTPUTS = ("auto", "tool", "native", "prompted")
 ORIGINS = ("model", "scripted")
 ON_FAILURE = ("stop", "continue")
-MAX_PROPOSALS = 100  # per call
 MODEL_SECONDS = 120.0  # default timeout
 DIRECT = ("model", "prompt", "memory", "max_cost")  # fields with a command-line option of their own
 
 _CHOICES: Mapping[str, tuple[str, ...]] = {
+    "prompt": PROMPTS,
     "memory": MEMORIES,
-    "others": OTHERS,
     "answer": tuple(ANSWERS),
     "output": OUTPUTS,
     "origin": ORIGINS,
@@ -33,23 +32,13 @@ _CHOICES: Mapping[str, tuple[str, ...]] = {
 
 
 class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """How designs are asked for.
+    """How designs are asked for."""
 
-    Attributes:
-        prompt: "plus" (with instructions on how to analyse the parameters), "minus", "full" (also with the whole front,
-            the gains of its own designs, joint angles and mechanics), or a template file.
-        memory: "none" (every call is new), "own" (show the earlier proposals of the run), or "chat" (send the earlier
-            questions and answers of the run as one conversation).
-        answer: "two-step" (free reasoning, then a second call into the schema), "one-step", or "text" (manual answers).
-        proposals: Designs per call.
-        others: Source of the five designs shown beside the front: "off-front" (designs off the front) or "all".
-    """
-
+    # "plus" (with instructions on how to analyse the parameters), "minus", or "full" (also with the whole front, the
+    # gains of its own designs, joint angles and mechanics)
     prompt: str = "plus"
-    memory: str = "none"
-    answer: str = "two-step"
-    proposals: int = Field(default=1, ge=1, le=MAX_PROPOSALS)
-    others: str = "off-front"
+    memory: str = "none"  # "none" (every call is new), or "chat" (all proposals of a run are one conversation)
+    answer: str = "two-step"  # free reasoning, then a second call into the schema; "one-step"; "text" (manual answers)
 
     @model_validator(mode="before")
     @classmethod
@@ -77,50 +66,30 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
         return ANSWERS[self.answer]
 
     @property
-    def expects(self) -> bool:
-        """True if answers state the expected objectives, from which memory lets a model learn."""
-        return self.memory == "own"
-
-    @property
     def given(self) -> dict[str, Any]:
         """The fields that were set, in the order of their declaration."""
         return {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
 
 
 class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=False):
-    """Which language model answers, what it is asked, how it is called, what it may spend.
+    """Which language model answers, what it is asked, how it is called, what it may spend."""
 
-    Attributes:
-        model: Vendor and name: `openai-chat:gpt-4o`, `anthropic:...`, `google:...`, `azure:...`, `openrouter:...`,
-            `ollama:...`, `vllm:...`; None for the configured one.
-        base_url: Address of an OpenAI-compatible server, in place of the vendor's.
-        temperature: Sent only if set.
-        seed: Sent only if set.
-        output: How an answer is held to a schema: "tool", "native" or "prompted"; "auto" takes the first of them that
-            the server accepts.
-        timeout: Limit of one request, retries included [s].
-        in_flight: Calls in flight while black-box trials run; None to wait for each answer.
-        max_calls: Limit of requests in the whole run.
-        max_cost: Limit of the cost of the whole run [USD].
-        on_failure: If the model fails before the first trial: "stop", or "continue" without it.
-        origin: "scripted" if a stand-in answers instead of a model. It is recorded with every call.
-        replay_strict: With replay:RUN, treat a prompt that differs from the recorded one as an error.
-        wait: With manual:DIR, wait for each answer; if false, exit at the first open question.
-    """
-
+    # Vendor and name (`openai-chat:gpt-4o`, `anthropic:...`, `google:...`, `azure:...`, `openrouter:...`, `ollama:...`,
+    # `vllm:...`); None for the configured one
     model: str | None = None
-    base_url: str | None = None
-    temperature: float | None = Field(default=None, ge=0.0)
-    seed: int | None = None
+    base_url: str | None = None  # address of an OpenAI-compatible server, in place of the vendor's
+    temperature: float | None = Field(default=None, ge=0.0)  # sent only if set
+    seed: int | None = None  # sent only if set
+    # How an answer is held to a schema: "tool", "native" or "prompted"; "auto" takes the first that the server accepts
     output: str = "auto"
-    timeout: float = Field(default=MODEL_SECONDS, gt=0.0)
-    in_flight: int | None = Field(default=None, ge=1)
-    max_calls: int | None = Field(default=None, ge=1)
-    max_cost: float | None = Field(default=None, gt=0.0)
-    on_failure: str = "stop"
-    origin: str = "model"
-    replay_strict: bool = False
-    wait: bool = True
+    timeout: float = Field(default=MODEL_SECONDS, gt=0.0)  # limit of one request, retries included [s]
+    in_flight: int | None = Field(default=None, ge=1)  # calls while black-box trials run; None to wait for each answer
+    max_calls: int | None = Field(default=None, ge=1)  # limit of requests in the whole run
+    max_cost: float | None = Field(default=None, gt=0.0)  # limit of the cost of the whole run [USD]
+    on_failure: str = "stop"  # if the model fails before the first trial; or "continue" without it
+    origin: str = "model"  # recorded with every call; "scripted" if a stand-in answers instead of a model
+    replay_strict: bool = False  # with replay:RUN, treat a prompt that differs from the recorded one as an error
+    wait: bool = True  # with manual:DIR, wait for each answer; if false, exit at the first open question
     _named_in: str = PrivateAttr(default="")  # the file that names base_url, if it may be somebody else's
 
     @property

@@ -1,7 +1,5 @@
 """Expected cost of calls, by public prices."""
 
-from dataclasses import dataclass
-
 from armwright.extras import requires_extra
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.servers import server_of
@@ -10,43 +8,19 @@ with requires_extra("llm", "a language model"):
     from genai_prices import Usage, calc_price
 
 
-@dataclass(frozen=True)
-class ExpectedTokens:
-    """Expected tokens of requests.
-
-    Attributes:
-        requests: Number of requests; prices may depend on the length of each.
-        input: Tokens of all prompts.
-        output: Tokens of all answers.
-        conversation: Tokens of prompts that a provider is asked to cache; part of `input`.
-        repeated: Tokens that the cache holds already; part of `conversation`.
-    """
-
-    requests: int
-    input: int
-    output: int
-    conversation: int = 0
-    repeated: int = 0
-
-
-def estimated_cost(options: ModelOptions, tokens: ExpectedTokens, cached: bool = False) -> float | None:
+def estimated_cost(options: ModelOptions, requests: int, given: int, written: int) -> float | None:
     """Return about what requests cost [USD], by the prices that calls are accounted with; None if unknown.
 
     Args:
         options: The model and its server.
-        tokens: The requests, which count as equally long.
-        cached: Whether the provider's cache holds what is repeated.
+        requests: Number of requests, which count as equally long: prices may depend on the length of each.
+        given: Tokens of all prompts; none of them is taken from a provider's cache.
+        written: Tokens of all answers.
     """
     server = server_of(options)
     vendor, _, name = (options.model or "").partition(":")
-    n = max(1, tokens.requests)
-    read = tokens.repeated if cached else 0
-    usage = Usage(
-        input_tokens=tokens.input / n,
-        output_tokens=tokens.output / n,
-        cache_read_tokens=read / n,
-        cache_write_tokens=(tokens.conversation - read) / n,
-    )
+    n = max(1, requests)
+    usage = Usage(input_tokens=given / n, output_tokens=written / n)
     try:
         if server is None:
             price = calc_price(usage, model_ref=name, provider_id=vendor.removesuffix("-chat"))
@@ -57,16 +31,11 @@ def estimated_cost(options: ModelOptions, tokens: ExpectedTokens, cached: bool =
     return n * float(price.total_price)
 
 
-def describe_cost(options: ModelOptions, tokens: ExpectedTokens) -> str:
+def describe_cost(options: ModelOptions, requests: int, given: int, written: int) -> str:
     """Return the estimated cost in one phrase."""
-    cost = estimated_cost(options, tokens)
-    cached = estimated_cost(options, tokens, cached=True)
-    if cost is not None and cached is not None:
-        if not tokens.repeated:
-            return f"about {cost:.2f} USD by public prices"
-        if cached < cost:
-            return f"about {cached:.2f} USD by public prices, {cost:.2f} USD if the provider caches no earlier turns"
-        return f"about {cost:.2f} USD by public prices (at full price: none is known for cached turns)"
+    cost = estimated_cost(options, requests, given, written)
+    if cost is not None:
+        return f"about {cost:.2f} USD by public prices"
     server = server_of(options)
     if server is None:
         return "price unknown"

@@ -1,196 +1,71 @@
-"""Prompts for a language model, rendered from templates in templates/ or from a file."""
+"""Prompts for a language model, rendered from the templates in templates/."""
 
-import os
 import re
-import traceback
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from armwright.exceptions import SettingsError, did_you_mean
-from armwright.files import read_text
-from armwright.llm.feedback import Feedback, proposal_records
+from armwright.llm.feedback import Feedback
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt_values import VARIABLES, Limits, common_values, shown_values
-from armwright.llm.template_sandbox import Sandbox, render
+from armwright.llm.prompt_values import Limits, common_values, shown_values
 from armwright.problem.problem import Problem
 from armwright.runs.control import MAX_HINT_LENGTH
 from armwright.runs.history import History
+from armwright.spaces.parameters import exact
 from armwright.text import end_of, fence, one_line, without_thoughts
 
-PROMPTS = ("plus", "minus", "full")
-VARIANTS = ("plus-reworded-1", "plus-reworded-2", "plus-reordered")  # of the experiment prompt-sensitivity
-BUILTIN_PROMPTS = (*PROMPTS, *VARIANTS)
-
-MAX_TOKENS = 12_000  # longer prompts show fewer designs, earlier proposals and targets
+MAX_TOKENS = 12_000  # longer prompts show fewer designs and targets
 MAX_ANALYSIS_LENGTH = 40_000  # characters from the end of a free answer that the second call reads
-MAX_TEMPLATE = 256 * 1024  # [bytes]
 DEFAULTS = PromptOptions()
 
+T = TypeVar("T")
 
-@dataclass(frozen=True)
-class Prompt:
-    """A prompt's name and its Jinja template.
 
-    Raises:
-        SettingsError: The template is invalid, or names unknown variables or templates.
+def design_prompt(
+    history: History, seed: int, options: PromptOptions = DEFAULTS, *, name: str = "llm", hints: Sequence[str] = ()
+) -> str:
+    """Return the prompt for the next design.
+
+    Fewer designs, then fewer targets are shown until the prompt has at most about MAX_TOKENS, unless hints and the
+    template itself are longer.
+
+    Args:
+        history: the finished trials.
+        seed: of the draw of the designs that are shown.
+        options: prompt and form of the answer.
+        name: name of the proposer, whose own designs are marked.
+        hints: the user's notes.
     """
-
-    name: str
-    template: str
-
-    def __post_init__(self) -> None:
-        try:
-            tree = _sandbox().parse(self.template)
-            _sandbox().from_string(self.template)  # filters and tests, too
-        except TemplateSyntaxError as error:
-            raise SettingsError(f"prompt {self.name}, line {error.lineno}: {error.message}") from error
-        except (RecursionError, SyntaxError) as error:  # SyntaxError: of the Python code that Jinja generates
-            raise SettingsError(f"prompt {self.name} is nested too deeply") from error
-        except ValueError as error:  # of Python, for a number of thousands of digits
-            raise SettingsError(f"prompt {self.name} cannot be read: {str(error)[:80]}") from error
-        known = {*VARIABLES, *_sandbox().globals, *_exported(tree)}
-        for other in set(meta.find_referenced_templates(tree)) - {None}:
-            templates = _sandbox().list_templates()
-            if other not in templates:
-                raise SettingsError(
-                    f'prompt {self.name} uses the template "{other}", which does not exist.'
-                    f"{did_you_mean(str(other), templates)} Templates: {', '.join(templates)}"
-                )
-            known |= _exported(_sandbox().parse(builtin_template(str(other))))
-        for name in sorted(meta.find_undeclared_variables(tree) - known):
-            raise SettingsError(
-                f'prompt {self.name} uses "{name}", which does not exist.{did_you_mean(name, VARIABLES)} '
-                f"Names: {', '.join(VARIABLES)}"
-            )
-
-    def render(
-        self,
-        history: History,
-        seed: int,
-        options: PromptOptions = DEFAULTS,
-        *,
-        name: str = "llm",
-        hints: Sequence[str] = (),
-    ) -> str:
-        """Return the prompt for the next design.
-
-        Fewer designs, then fewer targets are shown until the prompt has at most about MAX_TOKENS, unless hints and
-        the template itself are longer.
-
-        Args:
-            history: the finished trials.
-            seed: of the draw of the designs that are shown.
-            options: memory, form of the answer and number of designs.
-            name: name of the proposer, whose earlier proposals are shown if the memory is "own".
-            hints: the user's notes; appended if the template ignores them.
-
-        Raises:
-            SettingsError: The template fails, or renders to nothing.
-        """
-        proposed = proposal_records(history, name) if options.expects else []
-        feedback = Feedback(history, seed, name, options.others)
-        common = common_values(history, options) | {
-            "n_proposed": len(proposed),
-            "hints": [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))],  # visible ones
-        }
-        most = Limits()
-        while True:
-            text = self._with_hints({**common, **shown_values(history, feedback, proposed, most)})
-            if estimated_tokens(text) <= MAX_TOKENS or most == most.fewer():
-                return text
-            most = most.fewer()
-
-    def _with_hints(self, values: Mapping[str, Any]) -> str:
-        text = self._render(values)
-        if not values["hints"] or text != self._render({**values, "hints": []}):
-            return text
-        return text + "\n" + rendered("hints.md.j2", values)
-
-    def _render(self, values: Mapping[str, Any]) -> str:
-        try:
-            text = _tidy(render(_sandbox().from_string(self.template), values))
-        except _TEMPLATE_ERRORS as error:
-            lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == "<template>"]
-            line = f", line {lines[-1]}" if lines else ""
-            message = one_line(str(error), 300) or type(error).__name__
-            raise SettingsError(f"prompt {self.name}{line} cannot be rendered: {message}") from error
-        if not text.strip():
-            raise SettingsError(f"prompt {self.name} is empty")
-        return text
+    feedback = Feedback(history, seed, name)
+    common = common_values(history, options)
+    common["hints"] = [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))]  # visible ones
+    return shortened(
+        lambda most: rendered(f"{options.prompt}.md.j2", {**common, **shown_values(history, feedback, most)}),
+        Limits(),
+        Limits.fewer,
+    )
 
 
-# Errors that a template can cause.
-_TEMPLATE_ERRORS = (
-    TemplateError, TypeError, ValueError, ArithmeticError, LookupError, AttributeError, NameError, RecursionError,
-    MemoryError
-)  # fmt: skip
-
-
-def load_prompt(name: str | Path) -> Prompt:
-    """Return a built-in prompt by its name, or that of a template file."""
-    if str(name) in BUILTIN_PROMPTS:
-        return _builtin_prompt(str(name))
-    path = Path(name)
-    if os.path.isdir(path):
-        raise SettingsError(f"prompt {path} is a folder, not a template file")
-    if not os.path.isfile(path):
-        raise SettingsError(
-            f'unknown prompt "{name}".{did_you_mean(str(name), PROMPTS)} Prompts: {", ".join(PROMPTS)}, or a file'
-        )
-    text = read_text(path, MAX_TEMPLATE, SettingsError)
-    # A file called "plus" must not pass for the built-in prompt.
-    return Prompt(path.name if path.name not in BUILTIN_PROMPTS else f"./{path.name}", text)
-
-
-@cache
-def _builtin_prompt(name: str) -> Prompt:
-    return Prompt(name, builtin_template(f"{name}.md.j2" if name in PROMPTS else f"variants/{name}.md.j2"))
-
-
-def builtin_template(name: str) -> str:
-    """Return the text of a built-in template."""
-    loader = _sandbox().loader
-    assert loader is not None
-    return loader.get_source(_sandbox(), name)[0]
-
-
-def whole_template(name: str) -> str:
-    """Return the template of a prompt as one text, with the template that built-in prompts extend."""
-    template = load_prompt(name).template
-    if name not in PROMPTS:
-        return template
-    own = dict(_blocks(template))
-    between = "".join(text for name, text in _blocks(template) if not name)
-    macros = between.partition('{% extends "proposal.md.j2" %}\n')[2].rstrip() + "\n"
-    whole = "".join(own.get(name, text) if name else text for name, text in _blocks(builtin_template("proposal.md.j2")))
-    return whole.replace("{% block role %}", macros.lstrip("\n") + "{% block role %}", 1)
-
-
-def _blocks(template: str) -> list[tuple[str, str]]:
-    """Return the blocks of a template with their names, and the texts between them with empty ones."""
-    first, *others = re.split(r"{% block (\w+) %}\n", template)
-    pieces = [("", first)]
-    for name, text in zip(others[::2], others[1::2], strict=True):
-        body, end, after = text.partition("{% endblock %}\n")
-        pieces += [(name, f"{{% block {name} %}}\n{body}{end}"), ("", after)]
-    return pieces
-
-
-def parameters_prompt(problem: Problem, answer: str, options: PromptOptions = DEFAULTS) -> str:
+def parameters_prompt(problem: Problem, answer: str) -> str:
     """Return the prompt of the second call, which extracts the parameters from a free answer."""
-    values = {
-        "parameters": problem.space.parameters,
-        "symbols": " and ".join(objective.symbol for objective in problem.objectives),
-        "proposals": options.proposals,
-        "expected": options.expects,
-        **fenced(answer),
-    }
-    return rendered("parameters.md.j2", values)
+    return rendered("parameters.md.j2", {"parameters": problem.space.parameters, **fenced(answer)})
+
+
+def shortened(render: Callable[[T], str], most: T, fewer: Callable[[T], T]) -> str:
+    """Return a prompt of at most about MAX_TOKENS, or the shortest one.
+
+    Args:
+        render: Returns the prompt that shows so much.
+        most: How much it shows at most.
+        fewer: Returns the next smaller limits, or the same if they are the smallest.
+    """
+    while True:
+        text, less = render(most), fewer(most)
+        if estimated_tokens(text) <= MAX_TOKENS or less == most:
+            return text
+        most = less
 
 
 def fenced(answer: str) -> dict[str, str]:
@@ -200,8 +75,9 @@ def fenced(answer: str) -> dict[str, str]:
 
 
 def rendered(name: str, values: Mapping[str, Any]) -> str:
-    """Render a built-in template."""
-    return _tidy(render(_sandbox().get_template(name), values))
+    """Render a template, without blanks at line ends and repeated empty lines."""
+    text = _environment().get_template(name).render(values)
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(line.rstrip(" \t") for line in text.split("\n"))).strip() + "\n"
 
 
 def estimated_tokens(text: str) -> int:
@@ -209,19 +85,10 @@ def estimated_tokens(text: str) -> int:
     return len(re.findall(r"[0-9]{1,3}|[A-Za-z]{1,5}|\S", text))
 
 
-def _tidy(text: str) -> str:
-    """Remove blanks at line ends and repeated empty lines."""
-    return re.sub(r"\n{3,}", "\n\n", "\n".join(line.rstrip(" \t") for line in text.split("\n"))).strip() + "\n"
-
-
-def _exported(tree: nodes.Template) -> set[str]:
-    """Return the macros and variables that a template defines for its blocks and its extensions."""
-    macros = {node.name for node in tree.find_all(nodes.Macro)}
-    return macros | {
-        node.target.name for node in tree.body if isinstance(node, nodes.Assign) and isinstance(node.target, nodes.Name)
-    }
-
-
 @cache
-def _sandbox() -> Sandbox:
-    return Sandbox("armwright.llm")
+def _environment() -> Environment:
+    """Return the environment of the templates; prompts are not HTML, so nothing is escaped."""
+    loader = PackageLoader("armwright.llm")
+    environment = Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["exact"] = exact
+    return environment

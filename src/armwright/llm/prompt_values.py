@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.kinematics.ik.ik import UPDATES
 from armwright.llm.answer_format import SINGLE, module_lists
-from armwright.llm.feedback import MAX_PROPOSED, MIN_PROPOSED, Feedback, Record, design_lines, points, vector
+from armwright.llm.feedback import Feedback, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.ignored_errors import stated_tolerance
 from armwright.problem.objective import Objective
@@ -41,101 +41,22 @@ MAX_DESCRIPTION_LENGTH = 2_000  # characters of a task's description
 
 @dataclass(frozen=True)
 class Limits:
-    """How much a prompt shows at most.
+    """How much a prompt shows at most."""
 
-    Attributes:
-        targets: of the task.
-        designs: in detail, of the front, of the others and of the proposer's latest ones.
-        lines: designs in one line each, of the front and of the proposer.
-        proposed: earlier proposals with expectations and reasons.
-    """
-
-    targets: int = MAX_TARGETS
-    designs: int = 5
-    lines: int = 60
-    proposed: int = MAX_PROPOSED
+    targets: int = MAX_TARGETS  # of the task
+    designs: int = 5  # in detail, of the front, of the others and of the proposer's latest ones
+    lines: int = 60  # designs in one line each, of the front and of the proposer
 
     def fewer(self) -> "Limits":
         """Return the next smaller limits, or these if they are the smallest.
 
         Targets are the last but one to go: a model that knows all of them needs fewer examples.
         """
-        proposed = max(MIN_PROPOSED, 3 * self.proposed // 4)
         if self.designs > 2:
-            return replace(self, designs=self.designs - 1, proposed=proposed)
+            return replace(self, designs=self.designs - 1)
         if self.targets > 4:
-            return replace(self, targets=max(4, 3 * self.targets // 4), proposed=proposed)
-        return replace(self, designs=1, lines=max(5, 3 * self.lines // 4), proposed=proposed)
-
-
-# Variables of a template, as `armwright prompt --variables` lists them.
-VARIABLES = {
-    "space": "the design space: min_joints, max_joints, joint_types, joint_range, origin_x, origin_y, origin_z, "
-    "link, mass_note, and all other keys of a space file",
-    "n_joints": "number of joints as text; D if it is searched",
-    "revolute_types": "joint types that rotate",
-    "prismatic_types": "joint types that slide",
-    "straight": "true if all links form one vertical line in the start posture",
-    "extra_groups": "parameters besides base, joints and links: name in capitals, and prefix of the parameters",
-    "single": "names of the parameters that are choices of a whole arm",
-    "custom_parameters": "parameters that only the evaluator reads: name, per_joint, some (some joints do not have "
-    "it), unit, choices, range, integer, log",
-    "bar_radius": "radius of the links, as text",
-    "n_copies": "number of copies of a design that a build tolerance adds",
-    "joint_descriptions": "description of each joint type, by its letter",
-    "mount_descriptions": "description of each mount",
-    "gravity": "[m/s²], along -z",
-    "task": "the task: name, and more",
-    "description": "description of the task, on one line",
-    "targets": "target points as text; n_targets_shown of n_targets",
-    "restricted": "parameters that are fixed or narrower than the space's ranges: name with low and high, or choices",
-    "tool": "mass of the tool, as text",
-    "payload": "payload of the tip at the targets, as text; empty if there is none",
-    "point_masses": "parts that count as point masses, as text",
-    "obstacles": "obstacles, each as text",
-    "collisions": "true if contact counts in an objective",
-    "target_requirements": "requirements of targets besides their points, such as an axis of the tool, a line each",
-    "oriented": "true if any target requires an axis or an orientation of the tool",
-    "restarts": "additional starts of the inverse kinematics at each target",
-    "cycle": "steps of the cycle, as text; empty if the task has none",
-    "cycle_times": "durations of the steps, as text; empty if they count in no objective",
-    "workspace": "boxes that the tip should cover, each as text; none if they count in no objective",
-    "of_the_way": "objectives whose share of a target is the worst of it and of the way to it",
-    "n_targets": "number of targets of the task",
-    "n_targets_shown": "number of targets that are listed",
-    "target_low": "smallest x, y and z of all targets",
-    "target_high": "largest x, y and z of all targets",
-    "updates": "updates of the inverse kinematics per start",
-    "objectives": "objectives, each with symbol, label, unit, description, over (sum, max, min, rms or arm)",
-    "constraints": "constraints, each with quantity (as an objective), relation, bound",
-    "n_feasible": "number of feasible designs",
-    "cases": "variants of the task whose worst case counts, as text; empty if there are none",
-    "tolerance": "build tolerance [m] of base and links whose worst case counts; 0 if there is none",
-    "reference_point": "of the hypervolume; none if there is none yet",
-    "n_finished": "number of evaluated designs",
-    "n_front": "number of Pareto-optimal designs",
-    "front": "members of the front, by rising first objective: number, origin, joints, links, fine_origin and "
-    "fine_links (with more digits), extras, e_each, p_ik, a_ik, unreached, q_ik, tau_ik, limits, load, e_all, violated "
-    "(constraints, or none; empty if the task has none); if no design is feasible (n_feasible), those with the "
-    "smallest violations",
-    "others": "some other designs, with the same fields",
-    "n_others": "number of designs that these were drawn from: those off the front, or all (option others)",
-    "latest": "the proposer's latest designs, with the same fields",
-    "whole_front": "every design of the front in short, by rising first objective: number, source, origin, joints, "
-    "links, fine_origin, fine_links, extras, e_all, gained (hypervolume, when it was evaluated), on_front",
-    "own": "every earlier design of the proposer, with the same fields; n_own of them",
-    "n_own": "number of the proposer's earlier designs",
-    "hypervolume": "of the front, as text; empty without a reference point",
-    "n_between": "designs that the black box tries between two prompts; none outside a study",
-    "n_turns": "prompts that are left, this one included; none outside a study",
-    "proposed": "earlier proposals (memory: own): number, origin, joints, links, extras, expected, e_all, violated, "
-    "reason",
-    "n_proposed": "number of earlier proposals",
-    "proposals": "number of designs to propose",
-    "expected": "true if expected objectives are requested",
-    "hints": "notes of an engineer who watches the search, for this prompt only, each on one line",
-    "form": 'of the answer: "schema", "then-schema" (free text, a second call extracts it) or "text" (free text alone)',
-}
+            return replace(self, targets=max(4, 3 * self.targets // 4))
+        return replace(self, designs=1, lines=max(5, 3 * self.lines // 4))
 
 
 def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
@@ -143,7 +64,7 @@ def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
     problem = history.problem
     hypervolume = history.hypervolumes[-1:]
     return {
-        **_schedule_values(history, options),
+        **_schedule_values(history),
         "hypervolume": f"{hypervolume[0]:.4g}" if len(hypervolume) else "",
         **_space_values(problem.space),
         **_task_values(problem),
@@ -153,20 +74,17 @@ def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
         "reference_point": history.reference_point,
         "n_finished": len(history),
         "n_front": len(history.front),
-        "proposals": options.proposals,
-        "expected": options.expects,
         "form": options.form,
     }
 
 
-def _schedule_values(history: History, options: PromptOptions) -> dict[str, int | None]:
+def _schedule_values(history: History) -> dict[str, int | None]:
     """Return how the study goes on around this prompt."""
     method = history.method
     if method is None:
         return {"n_between": None, "n_turns": None}
-    block = method.n_step * options.proposals
     left = method.n_trials - max(method.n_init, len(history))
-    return {"n_between": (method.n_step - 1) * options.proposals, "n_turns": max(1, -(-left // block))}
+    return {"n_between": method.n_step - 1, "n_turns": max(1, -(-left // method.n_step))}
 
 
 def _space_values(space: DesignSpace) -> dict[str, Any]:
@@ -283,20 +201,8 @@ def _sample(items: Sequence[str]) -> tuple[str, str]:
     return ", ".join(items[i] for i in shown), "" if len(shown) == len(items) else f" (some of {len(items)})"
 
 
-def shown_values(
-    history: History,
-    feedback: Feedback,
-    proposed: Sequence[Record],
-    most: "Limits",
-) -> dict[str, Any]:
-    """Return the values that show past designs.
-
-    Args:
-        history: the finished trials.
-        feedback: the designs drawn from them.
-        proposed: records of the proposer's earlier designs.
-        most: how much is shown.
-    """
+def shown_values(history: History, feedback: Feedback, most: Limits) -> dict[str, Any]:
+    """Return the values that show past designs: those drawn from a history, at most so many of them."""
     task, decimals = history.problem.task, feedback.digits.length
     shown = spread(len(task.target_positions), most.targets)
     front = [feedback.front[i] for i in spread(len(feedback.front), most.designs)]
@@ -318,7 +224,6 @@ def shown_values(
         ),
         "own": design_lines(history, own[-most.lines :], feedback.name),
         "n_own": len(own),
-        "proposed": proposed[-most.proposed :],
     }
 
 

@@ -5,23 +5,19 @@ calls in their order. `xzcat NAME.jsonl.xz` shows it. The recordings in recordin
 by name.
 """
 
-import json
 import lzma
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from armwright.exceptions import ReplayError
 from armwright.llm.transcript import Call
 from armwright.runs.config import RunConfig
-from armwright.spaces.design_space import DesignSpace
-from armwright.tasks.task import Task
 
 ENDING = ".jsonl.xz"
 MAX_RECORDING = 64 * 1024 * 1024  # [bytes] of text, far above the largest run
@@ -29,19 +25,12 @@ MAX_RECORDING = 64 * 1024 * 1024  # [bytes] of text, far above the largest run
 
 @dataclass(frozen=True)
 class Recording:
-    """A recorded run.
+    """A recorded run."""
 
-    Attributes:
-        name: Name of its file, without the ending.
-        provenance: What answered, how and when.
-        config: Settings of the run.
-        calls: Calls with their whole prompts and answers.
-    """
-
-    name: str
-    provenance: str
+    name: str  # of its file, without the ending
+    provenance: str  # what answered, how and when
     config: RunConfig
-    calls: tuple[Call, ...]
+    calls: tuple[Call, ...]  # with their whole prompts and answers
 
     @property
     def options(self) -> str:
@@ -74,24 +63,6 @@ def find_recording(name_or_path: str) -> Recording | None:
         return read_recording(Path(name_or_path))
     shipped = shipped_recordings().get(name_or_path)
     return None if shipped is None or os.path.exists(name_or_path) else read_recording(shipped)
-
-
-def pack_recording(recording: Recording) -> bytes:
-    """Return the content of a recording's file, without values of task and space that are the defaults."""
-    header = _Header(provenance=recording.provenance, calls=len(recording.calls), config=recording.config)
-    content = header.model_dump(mode="json")
-    for name, model in (("task", Task), ("space", DesignSpace)):
-        content["config"][name] = _without_defaults(content["config"][name], model)
-    lines = [json.dumps(content), *(json.dumps(asdict(call)) for call in recording.calls)]
-    return lzma.compress("".join(line + "\n" for line in lines).encode(), preset=9 | lzma.PRESET_EXTREME)
-
-
-def _without_defaults(values: dict[str, Any], model: type[BaseModel]) -> dict[str, Any]:
-    defaults = {
-        field.alias or name: field.get_default(call_default_factory=True) for name, field in model.model_fields.items()
-    }
-    plain = TypeAdapter(dict[str, Any]).dump_python(defaults, mode="json", warnings=False, fallback=lambda _: None)
-    return {name: value for name, value in values.items() if value != plain[name]}
 
 
 def read_recording(file: Path | Traversable) -> Recording:

@@ -5,6 +5,8 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 
+from armwright.text import one_line
+
 _NAMES = re.compile(r"(^|_)(KEY|TOKEN|SECRET|PASSWORD)$")
 _SENT = re.compile(r"(^|_)API_(KEY|TOKEN)$")  # read and sent by vendors' clients
 _MIXED = re.compile(r"[A-Za-z][0-9]|[0-9][A-Za-z]")
@@ -35,6 +37,11 @@ def redacted(text: str) -> str:
         text = _without(_parts(key, text), blot, text)
         text = _without(_masked(key, text), blot, text)
     return text
+
+
+def redacted_line(fault: object) -> str:
+    """Return an error on one line without keys and without a full stop."""
+    return one_line(redacted(str(fault)), 300).rstrip(".")
 
 
 def _parts(key: str, text: str) -> Iterator[tuple[int, int]]:

@@ -20,17 +20,11 @@ _LOCAL = {
 
 @dataclass(frozen=True)
 class Server:
-    """An OpenAI-compatible server.
+    """An OpenAI-compatible server."""
 
-    Attributes:
-        address: Its base URL.
-        model: Its name for the model.
-        key_variable: Environment variable of its key; empty if none is sent.
-    """
-
-    address: str
-    model: str
-    key_variable: str
+    address: str  # its base URL
+    model: str  # its name for the model
+    key_variable: str  # environment variable of its key; empty if none is sent
 
     @property
     def is_local(self) -> bool:

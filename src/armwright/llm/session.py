@@ -21,8 +21,10 @@ from armwright.llm.backend import (
 )
 from armwright.llm.budget import CallBudget
 from armwright.llm.conversation import Conversation, conversation, new_part
+from armwright.llm.model_options import PromptOptions
 from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, output_mode_of, total_cost
 from armwright.proof.summary_file import ProposerSummary
+from armwright.runs.control import Hint
 
 UNBILLED = ("missing", "cancelled")  # faults of calls that cost nothing unless a request was answered
 
@@ -44,6 +46,10 @@ class LlmSession:
         self._budget = budget or CallBudget()
         self._transcript = Transcript(None)
         self._over = threading.Event()  # set when no more answers are wanted in this session
+
+    def identity(self, number: int) -> str:
+        """Return the id of the question for trial `number` and of its proposal."""
+        return f"{self.name}-{number:04d}"
 
     def summary(self) -> ProposerSummary:
         """Return calls, tokens and cost of the whole run, earlier sessions included."""
@@ -129,6 +135,13 @@ class LlmSession:
     def _part_to_ask(self, prompt: str, trial: int) -> str:
         """Return what a question for a trial says of a prompt: in a chat, what the turns before it do not."""
         return new_part(prompt, self._conversation(trial).turns) if self.chat else prompt
+
+    def _first_question(
+        self, number: int, options: PromptOptions, prompt: str, known: int, hints: tuple[Hint, ...] = ()
+    ) -> Question:
+        """Return the question for trial `number`, to be followed by a second one if the answer is in two steps."""
+        step = "reasoning" if options.form == "then-schema" else "answer"
+        return Question(self.identity(number), step, prompt, known, hints)
 
     def _call(self, question: Question, ask: Callable[[int | None], Reply], over: threading.Event) -> str:
         """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call.

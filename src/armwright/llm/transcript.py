@@ -25,18 +25,12 @@ READ = (None, "answer", "limit", "refused", "rejected", "context")  # faults of 
 
 @dataclass(frozen=True)
 class Call(Reply, Question):
-    """One call: the question, the reply, and who answered.
+    """One call: the question, the reply, and who answered."""
 
-    Attributes:
-        origin: What answered: `model`, `manual` (a person) or `scripted` (a stand-in).
-        fault: Kind of fault, if there was one; then the answer may be empty.
-        error: Its message.
-    """
-
-    origin: str = field(kw_only=True)
+    origin: str = field(kw_only=True)  # what answered: `model`, `manual` (a person) or `scripted` (a stand-in)
     model: str = field(kw_only=True)
-    fault: str | None = None
-    error: str | None = None
+    fault: str | None = None  # kind of fault, if there was one; then the answer may be empty
+    error: str | None = None  # its message
 
 
 class Transcript:

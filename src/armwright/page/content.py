@@ -381,7 +381,6 @@ def _proposals(history: History, first: int) -> dict[int, dict[str, Any]]:
         trial.number: {
             "id": trial.answer,
             "reason": trial.reason,
-            "expected": trial.expected,
             "fault": trial.fault,
             "screened": None if trial.screened is None else trial.screened.describe(history.problem.objectives),
         }

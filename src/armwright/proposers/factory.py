@@ -7,7 +7,6 @@ from pathlib import Path
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.llm.configuration import ConfiguredModel, configured_model
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import load_prompt
 from armwright.proposers.proposer import Proposer
 from armwright.proposers.rules import RulesProposer
 
@@ -18,26 +17,19 @@ WITH_PLACE = ("replay", "manual")  # written replay:RUN and manual:DIR
 _USED: dict[str, Collection[str]] = {
     "none": (),
     "rules": (),
-    "manual": ("prompt", "memory", "proposals", "others", "wait"),  # answers are text and cost nothing
-    # The first five are for a transcript without its run; those that contradict the record are refused.
-    "replay": ("prompt", "memory", "answer", "proposals", "others", "in_flight", "replay_strict"),
+    "manual": ("prompt", "memory", "wait"),  # answers are text and cost nothing
+    "replay": ("in_flight", "replay_strict"),
     "llm": [name for name in ModelOptions.model_fields if name not in ("wait", "replay_strict")],
 }
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A proposer, the options that it was made from, and the reason for the choice.
+    """A proposer, the options that it was made from, and the reason for the choice."""
 
-    Attributes:
-        proposer: None for black-box trials only.
-        reason: What was chosen and why, in one line for the user.
-        options: The given options, completed by the configuration if a model is used.
-    """
-
-    proposer: Proposer | None
-    reason: str
-    options: ModelOptions
+    proposer: Proposer | None  # None for black-box trials only
+    reason: str  # what was chosen and why, in one line for the user
+    options: ModelOptions  # the given ones, completed by the configuration if a model is used
 
 
 def choose_proposer(name: str = "auto", options: ModelOptions | None = None) -> Choice:
@@ -62,7 +54,6 @@ def choose_proposer(name: str = "auto", options: ModelOptions | None = None) -> 
         )
     if kind in WITH_PLACE and not place:
         raise SettingsError(f"--proposer {kind} needs a {'run' if kind == 'replay' else 'folder'}: {kind}:PATH")
-    load_prompt(options.prompt)  # an unknown prompt is reported even if the proposer uses none
     configured = configured_model(options) if kind in ("auto", "llm") else None
     if configured is None and kind == "llm":
         raise SettingsError(
@@ -104,7 +95,7 @@ def _proposer(
     if kind == "replay":
         from armwright.proposers.replay import ReplayProposer
 
-        replayed = ReplayProposer(place, options.replay_strict, options)
+        replayed = ReplayProposer(place, options.replay_strict)
         calls, model = replayed.replayed.calls, replayed.replayed.model
         settings = f", recorded with {replayed.recording.options}" if replayed.recording else ""
         return replayed, (

@@ -1,24 +1,19 @@
 """The language model as a proposer."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from armwright.llm.budget import CallBudget
 from armwright.llm.conversation import RESULTS
-from armwright.llm.feedback import N_LATEST, N_PARETO, N_RANDOM
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MAX_TOKENS, estimated_tokens, parameters_prompt
-from armwright.llm.prompt_values import MAX_TARGETS
 from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
 from armwright.runs.history import History
 
-if TYPE_CHECKING:
-    from armwright.llm.prices import ExpectedTokens
-
-TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, measured on prompts
-LINES = 40  # of designs in one line each that a prompt has on average
-THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # of an answer, for estimates
+# Tokens of a number and of a design in the feedback, of an analysis and of the parameters after it, for estimates.
+NUMBER_TOKENS, DESIGN_TOKENS, ANALYSIS_TOKENS, PARAMETER_TOKENS = 5, 100, 1000, 200
+SHOWN_DESIGNS, LISTED_DESIGNS = 10, 40  # in detail, and in one line each, late in a run
 
 
 class LlmProposer(PromptedProposer):
@@ -32,9 +27,8 @@ class LlmProposer(PromptedProposer):
         from armwright.llm.client import ModelClient
 
         options = ModelOptions.of(options)
-        budget = CallBudget(options.max_calls, options.max_cost)
         self.client = ModelClient(options)
-        super().__init__(self.client, options, options.source, budget=budget)
+        super().__init__(self.client, options, options.source, CallBudget(options.max_calls, options.max_cost))
         self.options = options
 
     def settings(self) -> Mapping[str, Any]:
@@ -46,58 +40,45 @@ class LlmProposer(PromptedProposer):
         """Estimate the calls, tokens and cost of `n` proposals."""
         from armwright.llm.prices import describe_cost
 
-        tokens = self._expected_tokens(problem, -(-n // self.options.proposals))
-        estimate = (
-            f"{n} proposals: about {tokens.requests + 1} calls, {_thousands(tokens.input)} tokens in, "
-            f"{_thousands(tokens.output)} out"
-        )
-        return f"{estimate}; {describe_cost(self.options, tokens)}"
-
-    def _expected_tokens(self, problem: Problem, n: int) -> "ExpectedTokens":
-        """Return the tokens of `n` calls: from the mean so far, or the estimate for a full prompt."""
-        from armwright.llm.prices import ExpectedTokens
-
-        calls = [call for call in self._transcript.calls if call.proposal and call.fault is None]
-        proposals = {call.proposal for call in calls}
         requests = (2 if self.options.form == "then-schema" else 1) * n
-        written = self.options.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
+        given, written = self._expected_tokens(problem, n)
+        cost = describe_cost(self.options, requests, given, written)
+        return (
+            f"{n} proposals: about {requests + 1} calls, {_thousands(given)} tokens in, {_thousands(written)} out; "
+            f"{cost}"
+        )
+
+    def _expected_tokens(self, problem: Problem, n: int) -> tuple[int, int]:
+        """Return the tokens of the prompts and of the answers of `n` proposals, by the mean so far if there is one."""
+        calls = [call for call in self._transcript.calls if call.proposal and call.fault is None]
+        proposals = len({call.proposal for call in calls})
+        written = PARAMETER_TOKENS + ANALYSIS_TOKENS
         if proposals:
-            written = sum(call.output_tokens for call in calls) // len(proposals)
+            written = sum(call.output_tokens for call in calls) // proposals
         if proposals and not self.chat:
-            given = sum(call.input_tokens for call in calls) // len(proposals)
-            return ExpectedTokens(requests, n * given, n * written)
+            return n * sum(call.input_tokens for call in calls) // proposals, n * written
         prompt = self.prompt_for(History(problem, (), 0), 0, 0)
         whole = min(MAX_TOKENS, estimated_tokens(prompt) + self._feedback_tokens(problem))
-        second = estimated_tokens(parameters_prompt(problem, "")) + THOUGHT_TOKENS if requests > n else 0
+        in_steps = self.options.form == "then-schema"
+        second = estimated_tokens(parameters_prompt(problem, "")) + ANALYSIS_TOKENS if in_steps else 0
         if not self.chat:
-            return ExpectedTokens(requests, n * (whole + second), n * written)
-        problem_tokens = estimated_tokens(prompt.rpartition(RESULTS)[0])
-        asked = self._chat_tokens(whole, whole - problem_tokens, written, n)
-        return ExpectedTokens(requests, sum(asked) + n * second, n * written, sum(asked), sum(asked[:-1]))
-
-    def _chat_tokens(self, whole: int, part: int, written: int, n: int) -> list[int]:
-        """Return the tokens of the next `n` questions of a chat, each with all turns before it.
-
-        Args:
-            whole: Tokens of the first question of a chat.
-            part: Tokens of a later question.
-            written: Tokens of an answer.
-            n: Number of questions.
-        """
+            return n * (whole + second), n * written
         turns = self._conversation().turns
         past = sum(estimated_tokens(turn.question) + estimated_tokens(turn.answer) for turn in turns)
+        part = whole - estimated_tokens(prompt.rpartition(RESULTS)[0])  # of a question after the first
         first = past + part if turns else whole
-        return [min(first + k * (part + written), self.client.context_window) for k in range(n)]
+        asked = [min(first + k * (part + written), self.client.context_window) for k in range(n)]
+        return sum(asked) + n * second, n * written
 
     def _feedback_tokens(self, problem: Problem) -> int:
         """Estimate the tokens of the feedback late in a run without evaluating designs, which may be slow."""
-        lists_all = self.prompt.name == "full"
-        joints, targets = problem.space.max_joints, min(len(problem.task.targets), MAX_TARGETS)
+        lists_all = self.options.prompt == "full"
+        joints = problem.space.max_joints
         each = len(problem.objectives) + 3 + joints * (2 if lists_all else 1)  # numbers of a target
         alone = 2 * joints + len(problem.objectives) + 3
-        n_designs = N_LATEST + (N_PARETO + N_RANDOM) // 2 if lists_all else N_PARETO + N_RANDOM
-        designs = n_designs * (TOKENS_A_NUMBER * (targets * each + alone) + TOKENS_A_DESIGN)
-        return designs + (LINES * TOKENS_A_NUMBER * alone if lists_all else 0)
+        numbers = len(problem.task.targets) * each + alone
+        designs = SHOWN_DESIGNS * (NUMBER_TOKENS * numbers + DESIGN_TOKENS)
+        return designs + (LISTED_DESIGNS * NUMBER_TOKENS * alone if lists_all else 0)
 
 
 def _thousands(n: int) -> str:

@@ -13,7 +13,7 @@ class ManualProposer(PromptedProposer):
 
     Args:
         folder: Folder of questions and answers.
-        options: Prompt, memory and number of designs; answers are always text.
+        options: Prompt and memory; answers are always text.
         wait: Wait for an answer; if false, raise AnswerPendingError. The same call continues once it is there.
     """
 

@@ -2,17 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import DesignError, ProposalError
-from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
+from armwright.llm.answer import answer_schema, read_answer, read_text, written_answer
 from armwright.llm.backend import LlmBackend, OutputFormat, Question
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import PROMPTS, Prompt, load_prompt, parameters_prompt
+from armwright.llm.prompt import design_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
 from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Transcript, hints_of
 from armwright.problem.problem import Problem
@@ -29,35 +28,21 @@ class PromptedProposer(LlmSession, Proposer):
         backend: Who answers.
         options: How designs are asked for.
         name: The `source` of its trials.
-        prompt: A prompt that is loaded already, in place of the one that `options` names.
         budget: Limits of the whole run.
     """
 
     def __init__(
-        self,
-        backend: LlmBackend,
-        options: PromptOptions,
-        name: str,
-        *,
-        prompt: Prompt | None = None,
-        budget: CallBudget | None = None,
+        self, backend: LlmBackend, options: PromptOptions, name: str, budget: CallBudget | None = None
     ) -> None:
         super().__init__(backend, name, budget, chat=options.memory == "chat")
         self.overlaps = self.overlaps and not self.chat  # a turn follows the one before it
         self.options = options
-        self.per_call = options.proposals
-        self.prompt = prompt or load_prompt(options.prompt)
         self._hints = Hints(None)
         self._told_dropped = False  # in this session
 
     def settings(self) -> Mapping[str, Any]:
-        """Return prompt, memory and form of the answer; for a custom prompt also its template."""
-        own = {} if self.prompt.name in PROMPTS else {"template": self.prompt.template}
-        return {
-            "prompt": self.prompt.name,
-            **own,
-            **self.options.model_dump(include={"memory", "answer", "proposals", "others"}),
-        }
+        """Return prompt, memory and form of the answer."""
+        return self.options.model_dump(include=set(PromptOptions.model_fields))
 
     def open(self, folder: Path | None) -> None:
         """Open the run's transcript and hints."""
@@ -81,38 +66,30 @@ class PromptedProposer(LlmSession, Proposer):
         for call in self._transcript.calls:
             if call.step in LAST_STEPS and call.fault is None:
                 with suppress(DesignError):  # a transcript edited by hand: asked again
-                    answers = read_text(call.answer, history.problem, self.options.proposals)
-                    recorded.update({p.id: p for p in self._proposals(call, answers)})
+                    recorded[call.proposal] = _proposal(call, call.answer, history.problem)
         return [proposal for proposal in recorded.values() if proposal.id not in used]
 
-    def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
-        """Propose the next designs; recorded thoughts of a killed run are used rather than asked for again."""
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
+        """Propose the next design; recorded thoughts of a killed run are used rather than asked for again."""
         question, problem = self.question(history, seed, number), history.problem
         try:
-            text = self._ask(question, self.output_format(problem), partial(self._extraction_prompt, problem))
+            text = self._ask(question, self.output_format(problem), partial(parameters_prompt, problem))
         except ProposalError as fault:
             fault.known = question.known
             raise
         finally:
             self._hints.give_back(question.hints)
-        first, *others = self._proposals(question, read_text(text, problem, self.options.proposals))
-        return [replace(first, note=self._note_dropped(number)), *others]
+        return _proposal(question, text, problem, self._note_dropped(number))
 
     def question(self, history: History, seed: int, number: int) -> Question:
         """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
-        identity = self.identity(number)
-        in_steps = self.options.form == "then-schema"
-        thoughts = self._transcript.answered(identity, "reasoning") if in_steps else None
+        thoughts = self._transcript.answered(self.identity(number), "reasoning")
         if thoughts is not None:
-            prompt = self._extraction_prompt(history.problem, thoughts.answer)
-            return Question(identity, "parameters", prompt, thoughts.known)
+            prompt = parameters_prompt(history.problem, thoughts.answer)
+            return Question(self.identity(number), "parameters", prompt, thoughts.known)
         hints = self.next_hints(number)
         prompt = self.prompt_for(history, seed, number, hints)
-        return Question(identity, "reasoning" if in_steps else "answer", prompt, len(history), hints=hints)
-
-    def identity(self, number: int) -> str:
-        """Return the id of the question for trial `number` and of its proposal."""
-        return f"{self.name}-{number:04d}"
+        return self._first_question(number, self.options, prompt, len(history), hints)
 
     def next_hints(self, number: int) -> tuple[Hint, ...]:
         """Return the hints for a question about trial `number` that is asked now.
@@ -125,13 +102,9 @@ class PromptedProposer(LlmSession, Proposer):
         """Return the hints that the question for trial `number` contained."""
         return hints_of(self._transcript.calls, self.identity(number))
 
-    def _extraction_prompt(self, problem: Problem, thoughts: str) -> str:
-        return parameters_prompt(problem, thoughts, self.options)
-
     def prompt_for(self, history: History, seed: int, number: int, hints: Sequence[Hint] = ()) -> str:
         """Return the prompt for trial `number`; in a chat, the part of it that is new."""
-        texts = [hint.text for hint in hints]
-        prompt = self.prompt.render(history, seed, self.options, name=self.name, hints=texts)
+        prompt = design_prompt(history, seed, self.options, name=self.name, hints=[hint.text for hint in hints])
         return self._part_to_ask(prompt, number)
 
     def _note_dropped(self, number: int) -> str:
@@ -146,21 +119,16 @@ class PromptedProposer(LlmSession, Proposer):
         )
 
     def output_format(self, problem: Problem) -> OutputFormat:
-        """Return the form of the answer that holds the designs; it is recorded as JSON that `read_text` reads."""
-        n = self.options.proposals
+        """Return the form of the answer that holds the design; it is recorded as JSON that `read_text` reads."""
 
         def read(content: Mapping[str, Any] | str) -> str:
             if isinstance(content, str):
-                return written_answers(read_text(content, problem, n), problem)
-            answers = read_answers(content, problem, n)
-            return written_answers(answers, problem, str(content.get("reasoning", "")))
+                return written_answer(read_text(content, problem))
+            return written_answer(read_answer(content, problem), str(content.get("reasoning", "")))
 
         return OutputFormat(answer_schema(problem, self.options), read)
 
-    def _proposals(self, question: Question, answers: Sequence[Answer]) -> list[Proposal]:
-        identity, n = question.proposal, len(answers)
-        ids = [identity] if n == 1 else [f"{identity}.{i}" for i in range(1, n + 1)]
-        return [
-            Proposal(answer.design, id_, answer.reason, answer.expected, question.trial, question.known)
-            for id_, answer in zip(ids, answers, strict=True)
-        ]
+
+def _proposal(question: Question, text: str, problem: Problem, note: str = "") -> Proposal:
+    answer = read_text(text, problem)
+    return Proposal(answer.design, question.proposal, answer.reason, question.trial, question.known, note)

@@ -14,39 +14,22 @@ from armwright.spaces.parameters import Design
 
 @dataclass(frozen=True)
 class Proposal:
-    """A design to evaluate next.
-
-    Attributes:
-        design: the design.
-        id: unique within the run.
-        reason: one line.
-        expected: objectives that the proposer expects, if any.
-        asked: trial that it was requested for; required for proposals of an earlier session.
-        known: number of finished trials it was made from, if fewer than the proposer was given.
-        note: message for the user about its origin.
-    """
+    """A design to evaluate next."""
 
     design: Design
-    id: str
-    reason: str = ""
-    expected: tuple[float, ...] | None = None
-    asked: int = 0
-    known: int | None = None
-    note: str = ""
+    id: str  # unique within the run
+    reason: str = ""  # one line
+    asked: int = 0  # trial that it was requested for; required for proposals of an earlier session
+    known: int | None = None  # number of finished trials it was made from, if fewer than the proposer was given
+    note: str = ""  # message for the user about its origin
 
 
 class Proposer(Protocol):
-    """Proposes one design for every n_step trials; subclass it and implement `propose`.
+    """Proposes one design for every n_step trials; subclass it and implement `propose`."""
 
-    Attributes:
-        name: the `source` of its trials.
-        per_call: number of designs per call of `propose`, at most.
-        overlaps: True if other threads may call it while black-box trials run (`in_flight`).
-    """
-
-    name: str
-    per_call: int = 1
-    overlaps: bool = True
+    name: str  # the `source` of its trials
+    per_call: int = 1  # number of designs per call of `propose`, at most
+    overlaps: bool = True  # true if other threads may call it while black-box trials run (`in_flight`)
 
     def settings(self) -> Mapping[str, Any]:
         """Return what is needed to repeat the proposals, for config.yaml; no secrets."""

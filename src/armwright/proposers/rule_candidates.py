@@ -24,17 +24,11 @@ SMALL = 1e-6
 
 @dataclass(frozen=True)
 class Candidates:
-    """N designs to choose from.
+    """N designs to choose from."""
 
-    Attributes:
-        designs: the designs, all different.
-        structures: the structure of each.
-        forecast: position error and torque of each.
-    """
-
-    designs: Sequence[Design]
-    structures: Sequence[Structure]
-    forecast: Forecast
+    designs: Sequence[Design]  # the designs, all different
+    structures: Sequence[Structure]  # the structure of each
+    forecast: Forecast  # position error and torque of each
 
     @cached_property
     def _rows(self) -> dict[Design, int]:

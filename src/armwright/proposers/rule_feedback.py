@@ -20,21 +20,13 @@ LEAST_SCALE, MAX_SCALE = 0.4, 1.6
 
 @dataclass(frozen=True)
 class Gap:
-    """A step of the front between two neighbours.
+    """A step of the front between two neighbours."""
 
-    Attributes:
-        area: hypervolume that an ideal design in the gap would add.
-        low: neighbour with the smaller position error; None at the edge of the reference box.
-        high: neighbour with the smaller torque; None at the edge of the reference box.
-        more: α-scaled torque of `low`.
-        less: α-scaled torque of `high`.
-    """
-
-    area: float
-    low: FrontMember | None
-    high: FrontMember | None
-    more: float
-    less: float
+    area: float  # hypervolume that an ideal design in the gap would add
+    low: FrontMember | None  # neighbour with the smaller position error; None at the edge of the reference box
+    high: FrontMember | None  # neighbour with the smaller torque; None at the edge of the reference box
+    more: float  # α-scaled torque of `low`
+    less: float  # α-scaled torque of `high`
 
     @property
     def description(self) -> str:

@@ -25,17 +25,11 @@ AXES = np.vstack([np.eye(3), np.zeros((4, 3))])  # by motion; zero for joints th
 
 @dataclass(frozen=True)
 class Forecast:
-    """Forecast of N designs.
+    """Forecast of N designs."""
 
-    Attributes:
-        error: (N,) position error beyond stated tolerances, summed over the targets [m].
-        torque: (N,) torque, summed over the targets [α-scaled].
-        length: (N,) from pivot to tip [m].
-    """
-
-    error: Array
-    torque: Array
-    length: Array
+    error: Array  # (N,) position error beyond stated tolerances, summed over the targets [m]
+    torque: Array  # (N,) torque, summed over the targets [α-scaled]
+    length: Array  # (N,) from pivot to tip [m]
 
 
 def forecast(problem: Problem, designs: Sequence[Design]) -> Forecast:

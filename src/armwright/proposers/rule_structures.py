@@ -36,27 +36,19 @@ def before_a_wall(points: Array) -> bool:
 
 @dataclass(frozen=True)
 class Structure:
-    """A type of arm without its size and position.
+    """A type of arm without its size and position."""
 
-    Attributes:
-        name: for the reason of a proposal.
-        joints: joint types, from the base.
-        links: link lengths, relative to the reach; 0 for the shortest that the space allows.
-        why: for the reason of a proposal.
-        offset: base relative to the shoulder, in reaches. A base below lets the arm, which starts upright, bring its
-            middle to the targets.
-        shift: base relative to that [m]. A few centimetres or millimetres to the side decide towards which side the
-            first joint turns, and keep targets off the line of the straight arm, along which they cannot be approached.
-        suits: whether it is worth trying for targets (T, 3).
-    """
-
-    name: str
-    joints: str
-    links: tuple[float, ...]
-    why: str
+    name: str  # for the reason of a proposal
+    joints: str  # joint types, from the base
+    links: tuple[float, ...]  # link lengths, relative to the reach; 0 for the shortest that the space allows
+    why: str  # for the reason of a proposal
+    # base relative to the shoulder, in reaches. A base below lets the arm, which starts upright, bring its middle to
+    # the targets
     offset: Vector = (0.0, 0.0, 0.0)
+    # base relative to that [m]. A few centimetres or millimetres to the side decide towards which side the first joint
+    # turns, and keep targets off the line of the straight arm, along which they cannot be approached
     shift: Vector = (0.0, 0.0, 0.0)
-    suits: Callable[[Array], bool] = any_targets
+    suits: Callable[[Array], bool] = any_targets  # whether it is worth trying for targets (T, 3)
 
     @property
     def mirrored(self) -> "Structure":

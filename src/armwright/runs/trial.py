@@ -79,7 +79,6 @@ class FinishedTrial:
     values: _Objectives  # the objectives; infinite if its evaluation failed, and left out of its line
     proposal: str | None = None  # the proposal's id, if a proposer made the design
     reason: _Text = ""  # why the proposer suggested it
-    expected: _Objectives | None = None  # objectives that the proposer expected
     fault: str | None = None  # why a trial that was a proposer's became a black-box one
     asked: int | None = None  # the trial that the proposal was asked for, if another one
     feedback: int | None = None  # how many finished trials the proposer knew, if not all before this one

@@ -23,7 +23,7 @@ from armwright.runs.trials_file import TRIALS
 from armwright.spaces.optuna_distributions import distributions, quietly
 
 STUDY_DB = "study.db"
-TRIAL_ATTRIBUTES = ("source", "proposal", "reason", "expected", "fault", "duplicate_of")
+TRIAL_ATTRIBUTES = ("source", "proposal", "reason", "fault", "duplicate_of")
 
 
 def export_study(run: Path, target: Path | None = None) -> Path:

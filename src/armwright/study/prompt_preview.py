@@ -7,7 +7,7 @@ from typing import Any
 
 from armwright.exceptions import SettingsError
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import estimated_tokens, load_prompt
+from armwright.llm.prompt import estimated_tokens
 from armwright.llm.replay_backend import ReplayBackend
 from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
@@ -51,15 +51,11 @@ def preview_after(run: Path, options: PromptOptions | None = None, *, number: in
         number: trial whose past prompt is returned; None for the next one.
     """
     config, history = read_run(run)
-    own, recorded = recorded_options(config)
     stated = {} if options is None else options.given
     given = {name: value for name, value in stated.items() if name in PromptOptions.model_fields}
-    asked = recorded.model_copy(update=given)
-    prompt = load_prompt(asked.prompt) if own is None or "prompt" in given else own
+    asked = recorded_options(config).model_copy(update=given)
     settings = config.study.proposer or {}
-    proposer = PromptedProposer(
-        ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm", prompt=prompt
-    )
+    proposer = PromptedProposer(ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm")
     proposer.open_read_only(run)
     if number is not None:
         past = _history_at(run, config, history, proposer.requested_trials(), number)

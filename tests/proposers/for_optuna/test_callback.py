@@ -123,13 +123,6 @@ def test_first_proposal_follows_the_initial_trials(every: int, first: int, numbe
     assert [trial.number for trial in proposals(study)][: len(numbers)] == numbers
 
 
-def test_continued_study_keeps_the_ratio() -> None:
-    study = tpe()
-    for n in (7, 1, 5, 12):
-        study.optimize(objective, n_trials=n, callbacks=[ProposalCallback(Told(), 5)])
-    assert [trial.number for trial in proposals(study)] == [4, 9, 14, 19, 24]
-
-
 def test_failed_and_pruned_trials_count_towards_the_ratio() -> None:
     def failing(trial: optuna.Trial) -> float:
         objective(trial)
@@ -229,14 +222,6 @@ def test_genetic_samplers_use_proposals_as_parents(genetic: type[NSGAIISampler])
     assert not {trial.params["x"] for trial in enqueued.trials[4:]} & {0.001, 0.003}
 
 
-def test_genetic_study_with_out_of_range_trials_gets_proposals() -> None:
-    study = optuna.create_study(sampler=NSGAIISampler(population_size=4, seed=0))
-    study.enqueue_trial({"x": -5.0, "y": 3})
-    with pytest.warns(UserWarning, match="out of range"):
-        study.optimize(objective, n_trials=5, callbacks=[ProposalCallback(Told(), 5)])
-    assert len(proposals(study)) == 1
-
-
 @pytest.mark.parametrize(
     ("others", "words"),
     [
@@ -306,15 +291,6 @@ def test_on_failure_stop_raises_before_the_first_trial(n_jobs: int) -> None:
     study.optimize(objective, n_trials=10, n_jobs=n_jobs, callbacks=[callback(ProposalError("timeout", "too slow"))])
     assert n >= 3
     assert len(proposals(study)) > n  # once there was a proposal, nothing stops
-
-
-def test_two_proposers_share_a_study() -> None:
-    class Other(Told):
-        name = "other"
-
-    study = tpe()
-    study.optimize(objective, n_trials=22, callbacks=[ProposalCallback(Told(), 10), ProposalCallback(Other(), 5)])
-    assert Counter(trial.user_attrs.get("source") for trial in study.trials) == {None: 16, "told": 2, "other": 4}
 
 
 PROBLEM = Problem(load_task("target-1"))
@@ -397,46 +373,17 @@ def origins(study: optuna.Study) -> list[float]:
     return [trial.params["origin_x"] for trial in study.trials if trial.user_attrs.get("source") == "llm"]
 
 
-@pytest.mark.parametrize("callbacks", [1, 2])
-def test_proposer_is_called_separately_for_each_study(thinker: ChatServer, callbacks: int) -> None:
-    """Both studies request trials 3 and 7, as a resumed study would."""
-    llm = llm_proposer(thinker.url, max_calls=4)
-    made = [ProposalCallback(llm, 4, problem=PROBLEM) for _ in range(callbacks)]
+def test_proposer_of_arms_is_for_one_study(thinker: ChatServer) -> None:
+    callback = ProposalCallback(llm_proposer(thinker.url), 4, problem=PROBLEM)
     studies = [tpe(seed, directions=["minimize"] * 2) for seed in range(2)]
-    for n, study in enumerate(studies):
-        arms(PROBLEM, study, 8, made[n % callbacks])
-    assert [origins(study) for study in studies] == [[0.01, 0.02], [0.03, 0.04]]
-    arms(PROBLEM, studies[0], 4, made[0])
-    assert origins(studies[0]) == [0.01, 0.02, 0.05]
-    assert [callback.faults for callback in made] == [{}] * callbacks  # each study has the whole budget
+    arms(PROBLEM, studies[0], 4, callback)
+    arms(PROBLEM, studies[0], 4, callback)
+    assert origins(studies[0]) == [0.01, 0.02]
+    with pytest.raises(SettingsError, match="llm proposes for another study; make one for each"):
+        arms(PROBLEM, studies[1], 4, callback)
 
 
-def test_pending_designs_stay_with_their_study() -> None:
-    class Pair(RulesProposer):
-        def propose(self, history: Any, seed: int, number: int) -> Any:
-            return [Proposal(d, f"pair-{number}.{i}") for i, d in enumerate(PROBLEM.space.sample(2, len(history)))]
-
-    callback = ProposalCallback(Pair(), 3, problem=PROBLEM)
-    for _ in range(2):
-        study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 3, callback)
-        assert [trial.user_attrs["proposal"] for trial in study.trials if trial.user_attrs] == ["pair-2.0"]
-
-
-def test_proposer_refuses_two_studies_at_once(thinker: ChatServer) -> None:
-    llm = llm_proposer(thinker.url)
-
-    def meanwhile(request: Request) -> Answer:
-        other = tpe(1, directions=["minimize"] * 2)
-        with pytest.raises(SettingsError, match="llm is asking for another study; make one for each"):
-            arms(PROBLEM, other, 3, ProposalCallback(llm, 4, problem=PROBLEM))
-        return thinking(request)
-
-    thinker.answer = meanwhile
-    study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 4, ProposalCallback(llm, 4, problem=PROBLEM))
-    assert origins(study) == [0.01]
-
-
-def test_recorded_calls_of_a_study_are_reused(thinker: ChatServer, tmp_path: Path) -> None:
+def test_calls_of_a_study_are_recorded_in_its_own_folder(thinker: ChatServer, tmp_path: Path) -> None:
     storage = InMemoryStorage()
 
     def go_on(n_trials: int) -> optuna.Study:
@@ -444,26 +391,21 @@ def test_recorded_calls_of_a_study_are_reused(thinker: ChatServer, tmp_path: Pat
         study = optuna.create_study(
             storage=storage, study_name="my/arms", directions=["minimize"] * 2, load_if_exists=True
         )
-        llm = llm_proposer(thinker.url, proposals=2)
+        llm = llm_proposer(thinker.url)
         return arms(PROBLEM, study, n_trials, ProposalCallback(llm, 4, problem=PROBLEM, folder=tmp_path / "calls"))
 
-    def pair(request: Request) -> Answer:
-        if not wants_design(request):
-            return "two of them"
-        return json.dumps({"designs": [{**GOOD_DESIGN, "origin_x": x} for x in (0.1, 0.2)]})
-
-    thinker.answer = pair
     go_on(4)
-    assert len(thinker.requests) == 2
-    study = go_on(4)
-    assert (origins(study), len(thinker.requests)) == ([0.1, 0.2], 2)
+    go_on(4)
     (folder,) = (tmp_path / "calls").iterdir()
     assert folder.name.startswith("my_arms-2")
     calls = Transcript(folder / "transcripts.jsonl").calls
-    assert [(call.proposal, call.step) for call in calls] == [("llm-0003", "reasoning"), ("llm-0003", "parameters")]
+    assert [(call.proposal, call.step) for call in calls] == [
+        (f"llm-{number:04d}", step) for number in (3, 7) for step in ("reasoning", "parameters")
+    ]
     optuna.delete_study(study_name="my/arms", storage=storage)
-    assert origins(go_on(4)) == [0.1]  # another study of the same name: asked anew
-    assert len(thinker.requests) == 4
+    go_on(4)
+    assert len(list((tmp_path / "calls").iterdir())) == 2  # another study of the same name
+    assert len(thinker.requests) == 6
     with pytest.raises(SettingsError, match="folder calls goes with problem"):
         ProposalCallback(Told(), folder="calls")
 

@@ -1,6 +1,5 @@
 """Optuna's conformance suite for samplers, applied to studies with proposals."""
 
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -188,16 +187,6 @@ def test_proposals_survive_in_every_storage(storage: BaseStorage) -> None:
     assert [set(trial.user_attrs) for trial in of_rules(again)] == [{"source", "proposal", "reason"}] * 6
 
 
-@pytest.mark.parametrize("sampler", [TPESampler(seed=0), NSGAIISampler(population_size=6, seed=0)])
-def test_threads_get_distinct_proposals(sampler: BaseSampler) -> None:
-    study = optuna.create_study(directions=["minimize"] * 2, sampler=sampler)
-    callback = rules()
-    study.optimize(two, n_trials=45, n_jobs=4, callbacks=[callback])
-    study.optimize(two, n_trials=4)  # what was left waiting
-    assert len({trial.user_attrs["proposal"] for trial in of_rules(study)}) == callback.proposed == 15
-    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
-
-
 def test_failed_pruned_and_nan_trials_are_ignored() -> None:
     def broken(trial: optuna.Trial) -> float:
         value = mixed(trial)
@@ -268,16 +257,6 @@ def test_stopped_study_resumes_with_pending_proposals() -> None:
     assert len(study.trials) == 6
 
 
-def test_earlier_trials_inform_the_first_proposal() -> None:
-    before = optuna.create_study(sampler=RandomSampler(seed=0))
-    before.optimize(mixed, n_trials=20)
-    study = optuna.create_study(sampler=RandomSampler(seed=1))
-    study.add_trials(before.trials)
-    study.optimize(mixed, n_trials=4, callbacks=[rules()])
-    first, *_ = of_rules(study)
-    assert first.user_attrs["proposal"].rpartition("-")[2] != "far"
-
-
 def test_trials_enqueued_by_the_user_run_first() -> None:
     study = optuna.create_study(sampler=RandomSampler(seed=0))
     for k in range(5):
@@ -324,14 +303,3 @@ def test_stated_space_keeps_a_fixed_parameter() -> None:
     study.optimize(mixed, n_trials=15, callbacks=[callback])
     assert len(of_rules(study)) >= 7
     assert {trial.params["whole"] for trial in study.trials[5:]} == {4}
-
-
-def test_optuna_warns_of_pending_proposals_outside_a_changed_range() -> None:
-    study = optuna.create_study(sampler=RandomSampler(seed=0))
-    study.optimize(lambda t: t.suggest_float("x", 0.0, 1.0), n_trials=3, callbacks=[rules(first=3)])
-    with warnings.catch_warnings(record=True) as seen:
-        warnings.simplefilter("always")
-        study.optimize(lambda t: t.suggest_float("x", 5.0, 6.0), n_trials=9, callbacks=[rules()])
-    assert [str(w.message) for w in seen if "out of range" in str(w.message)]
-    assert all(5.0 <= trial.params["x"] <= 6.0 for trial in of_rules(study)[1:])
-    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}

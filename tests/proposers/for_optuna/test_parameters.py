@@ -20,10 +20,7 @@ from armwright.proposers.for_optuna.parameter_values import (
     read_value,
 )
 from armwright.proposers.for_optuna.parameters import Parameter, checked_params, study_parameters, unique_keys
-from armwright.proposers.for_optuna.prompt import StudyObjective
-from armwright.proposers.for_optuna.proposer import StudyProposal
 
-OBJECTIVES = [StudyObjective("value", "value", "minimised")]
 CHOICES = st.one_of(st.none(), st.booleans(), st.integers(-9, 9), st.floats(-9, 9), st.text(max_size=6))
 
 
@@ -64,13 +61,11 @@ def test_written_answers_round_trip_and_fit_optuna(
     space = {name: distribution for name, (distribution, _) in drawn.items()}
     params = {name: value for name, (_, value) in drawn.items()}
     parameters = study_parameters(space, [])
-    text = written_answer(StudyProposal(params, "", "so", (1.5,)), parameters, OBJECTIVES)
-    back = read_answer(json.loads(text), parameters, OBJECTIVES)
-    assert dict(back.params) == params
-    assert [type(back.params[name]) for name in params] == [type(value) for value in params.values()]
-    assert (back.reason, back.expected) == ("so", (1.5,))
-    assert checked_params(back.params, space, space) == params
-    for name, value in back.params.items():
+    back, reason = read_answer(json.loads(written_answer(params, "so", parameters)), parameters)
+    assert (back, reason) == (params, "so")
+    assert [type(back[name]) for name in params] == [type(value) for value in params.values()]
+    assert checked_params(back, space, space) == params
+    for name, value in back.items():
         assert space[name]._contains(space[name].to_internal_repr(value))
 
 
@@ -78,8 +73,8 @@ def test_written_answers_round_trip_and_fit_optuna(
 def test_schema_allows_written_answers(drawn: tuple[BaseDistribution, Any]) -> None:
     distribution, value = drawn
     (parameter,) = study_parameters({"x": distribution}, [])
-    schema = answer_schema([parameter], OBJECTIVES, PromptOptions(answer="one-step", memory="own"))
-    assert list(schema["properties"]) == ["reasoning", "parameters", "expected", "reason"]
+    schema = answer_schema([parameter], PromptOptions(answer="one-step"))
+    assert list(schema["properties"]) == ["reasoning", "parameters", "reason"]
     field = schema["properties"]["parameters"]["properties"]["x"]
     written = json_value(value, distribution)
     if isinstance(distribution, CategoricalDistribution):
@@ -186,41 +181,35 @@ PARAMETERS = [
 
 def test_conditional_parameters_may_be_left_out() -> None:
     for left_out in ({}, {"gamma": None}, {"gamma": "n/a"}):
-        answer = read_answer({"parameters": {"kernel": "linear", "C": 1, **left_out}}, PARAMETERS, OBJECTIVES)
-        assert dict(answer.params) == {"kernel": "linear", "C": 1.0}
-    schema = answer_schema(PARAMETERS, OBJECTIVES, PromptOptions())
+        params, _ = read_answer({"parameters": {"kernel": "linear", "C": 1, **left_out}}, PARAMETERS)
+        assert params == {"kernel": "linear", "C": 1.0}
+    schema = answer_schema(PARAMETERS, PromptOptions())
     assert schema["properties"]["parameters"]["required"] == ["kernel", "C"]
 
 
 def test_answer_without_the_parameters_object_is_read() -> None:
-    answer = read_answer({"KERNEL": "rbf", "c": "2.5", "reason": "a  try\n"}, PARAMETERS, OBJECTIVES)
-    assert (dict(answer.params), answer.reason, answer.expected) == ({"kernel": "rbf", "C": 2.5}, "a try", None)
+    answer = read_answer({"KERNEL": "rbf", "c": "2.5", "reason": "a  try\n"}, PARAMETERS)
+    assert answer == ({"kernel": "rbf", "C": 2.5}, "a try")
 
 
 def test_missing_reason_is_empty() -> None:
     """A missing reason is not the word None, and invisible characters are dropped."""
     parameters = [Parameter("C", "C", FloatDistribution(0.0, 9.0))]
-    assert read_answer({"C": 1, "reason": None}, parameters, OBJECTIVES).reason == ""
-    assert read_answer({"C": 1, "reason": "so\x1b[2J\u200b it is"}, parameters, OBJECTIVES).reason == "so it is"
+    assert read_answer({"C": 1, "reason": None}, parameters)[1] == ""
+    assert read_answer({"C": 1, "reason": "so\x1b[2J\u200b it is"}, parameters)[1] == "so it is"
 
 
 def test_parameter_may_be_named_reason() -> None:
     parameters = [Parameter("reason", "reason", IntDistribution(0, 9))]
-    answer = StudyProposal({"reason": 4}, "", "four")
-    assert read_answer(json.loads(written_answer(answer, parameters, OBJECTIVES)), parameters, OBJECTIVES) == answer
+    written = written_answer({"reason": 4}, "four", parameters)
+    assert read_answer(json.loads(written), parameters) == ({"reason": 4}, "four")
 
 
 def test_all_errors_are_reported_at_once() -> None:
     with pytest.raises(DesignError) as refusal:
-        read_answer({"parameters": {"C": 1e3, "kernl": "rbf", "gamma": "big"}}, PARAMETERS, OBJECTIVES)
+        read_answer({"parameters": {"C": 1e3, "kernl": "rbf", "gamma": "big"}}, PARAMETERS)
     words = str(refusal.value)
     assert 'unknown parameter "kernl". Did you mean "kernel"?' in words
     assert "kernel is missing: one of rbf, linear" in words
     assert "C = 1000 is outside 0.01 <= C <= 100" in words
     assert "gamma = 'big' is not a finite number" in words
-
-
-@pytest.mark.parametrize("expected", [None, [1.0], {}, {"value": "much"}, {"value": float("inf")}, {"other": 1.0}])
-def test_missing_expected_values_are_omitted(expected: Any) -> None:
-    content = {"parameters": {"kernel": "rbf", "C": 1.0}, "expected": expected}
-    assert read_answer(content, PARAMETERS, OBJECTIVES).expected is None

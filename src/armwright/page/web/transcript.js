@@ -34,8 +34,7 @@ function describeProposal() {
   if (proposal?.fault) return `The proposal for #${i} failed (${proposal.fault}); the black box replaced it.`;
   if (proposal?.screened) return `${proposal.screened}. #${i} is the black box's design instead.`;
   if (!proposal) return `#${i}, source: ${content.look(i).label}; no reason is given.`;
-  const expected = proposal.expected ? ` Expected: ${proposal.expected.map((value) => number(value)).join(", ")}.` : "";
-  return `#${i}, by ${content.look(i).label}: ${proposal.reason || "no reason is given"}.${expected}`.replace("..", ".");
+  return `#${i}, by ${content.look(i).label}: ${proposal.reason || "no reason is given"}.`.replace("..", ".");
 }
 
 function callElement(call, inList) {

@@ -1,49 +1,30 @@
 """A model's answer for an Optuna study: its JSON schema, and its values read and checked."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from optuna.distributions import CategoricalDistribution, IntDistribution
 
 from armwright.exceptions import DesignError
-from armwright.llm.answer import MAX_REASON_LENGTH, answer_json, object_schema, response_schema
+from armwright.llm.answer import answer_json, object_schema, response_schema, short_reason
 from armwright.llm.model_options import PromptOptions
 from armwright.proposers.for_optuna.parameter_values import choice_texts, json_value, read_value
 from armwright.proposers.for_optuna.parameters import Parameter, unknown_parameter
-from armwright.proposers.for_optuna.prompt import StudyObjective
-from armwright.proposers.for_optuna.proposer import StudyProposal
-from armwright.text import one_line
 
-OTHER_KEYS = ("parameters", "reasoning", "reason", "expected")  # keys of an answer that are no parameters
+OTHER_KEYS = ("parameters", "reasoning", "reason")  # keys of an answer that are no parameters
 MAX_ERRORS = 10  # reported at once
 LEFT_OUT = ("", "null", "none", "n/a", "-")  # values that models write for conditional parameters they leave out
 
 
-def answer_schema(
-    parameters: Sequence[Parameter], objectives: Sequence[StudyObjective], options: PromptOptions
-) -> dict[str, Any]:
-    """Return the JSON schema of an answer: the parameters and the reason for them.
-
-    Args:
-        parameters: what the model chooses; conditional parameters are optional.
-        objectives: the study's objectives.
-        options: form of the answer, and whether values are expected.
-    """
+def answer_schema(parameters: Sequence[Parameter], options: PromptOptions) -> dict[str, Any]:
+    """Return the JSON schema of an answer: the parameters, of which conditional ones are optional, and the reason."""
     fields = {parameter.key: _property(parameter) for parameter in parameters}
     required = [parameter.key for parameter in parameters if not parameter.conditional]
-    content: dict[str, Any] = {"parameters": object_schema(fields, required)}
-    if options.expects:
-        values = {o.key: {"type": "number", "description": f"that you expect; {o.direction}"} for o in objectives}
-        content["expected"] = object_schema(values)
-    content["reason"] = {"type": "string", "description": "the main reason for these parameters, in one sentence"}
-    return response_schema("NewTrial", content, options)
+    return response_schema("NewTrial", {"parameters": object_schema(fields, required)}, "these parameters", options)
 
 
-def read_answer(
-    content: Mapping[str, Any], parameters: Sequence[Parameter], objectives: Sequence[StudyObjective]
-) -> StudyProposal:
-    """Read the parameters of an answer as a proposal without an id.
+def read_answer(content: Mapping[str, Any], parameters: Sequence[Parameter]) -> tuple[dict[str, Any], str]:
+    """Return the parameters of an answer, by name, and the reason for them.
 
     Raises:
         DesignError: Values are missing or invalid; the message lists all of them.
@@ -67,19 +48,13 @@ def read_answer(
         errors = ["no parameter is given"]
     if errors:
         raise DesignError("; ".join(errors[:MAX_ERRORS]))
-    reason = one_line(str(content.get("reason") or ""), MAX_REASON_LENGTH)
-    return StudyProposal(params, "", reason, _expected(content.get("expected"), objectives))
+    return params, short_reason(content.get("reason"))
 
 
-def written_answer(
-    answer: StudyProposal, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective], reasoning: str = ""
-) -> str:
+def written_answer(params: Mapping[str, Any], reason: str, parameters: Sequence[Parameter], reasoning: str = "") -> str:
     """Return an answer as JSON, which `read_answer` reads without loss."""
-    values = {p.key: json_value(answer.params[p.name], p.distribution) for p in parameters if p.name in answer.params}
-    content: dict[str, Any] = {"parameters": values}
-    if answer.expected is not None:
-        content["expected"] = {o.key: value for o, value in zip(objectives, answer.expected, strict=True)}
-    return answer_json({**content, "reason": answer.reason}, reasoning)
+    values = {p.key: json_value(params[p.name], p.distribution) for p in parameters if p.name in params}
+    return answer_json({"parameters": values, "reason": reason}, reasoning)
 
 
 def _property(parameter: Parameter) -> dict[str, Any]:
@@ -110,13 +85,3 @@ def _by_name(content: Mapping[str, Any], parameters: Sequence[Parameter]) -> tup
         elif given is not content or key not in OTHER_KEYS:
             unknown.append(key)
     return values, unknown
-
-
-def _expected(given: Any, objectives: Sequence[StudyObjective]) -> tuple[float, ...] | None:
-    """Return the expected values; None unless all are finite numbers."""
-    values = cast("dict[str, Any]", given) if isinstance(given, dict) else {}
-    try:
-        numbers = tuple(float(values.get(o.key, values.get(o.name))) for o in objectives)  # pyright: ignore[reportArgumentType]
-    except (TypeError, ValueError, OverflowError):
-        return None
-    return numbers if all(map(math.isfinite, numbers)) else None

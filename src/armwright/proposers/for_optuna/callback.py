@@ -15,7 +15,7 @@ from optuna.trial import FrozenTrial, TrialState, create_trial
 from armwright.exceptions import DesignError, ModelError, ProposalError, SettingsError
 from armwright.problem.problem import Problem
 from armwright.proposers.for_optuna.parameters import checked_params, observed_space
-from armwright.proposers.for_optuna.proposer import ArmProposer, StudyProposal, StudyProposer
+from armwright.proposers.for_optuna.proposer import ArmProposer, StudyProposer
 from armwright.proposers.proposer import Proposer
 from armwright.search.samplers import quiet_study
 from armwright.seeding import PROPOSING, derived_seed
@@ -91,7 +91,7 @@ class ProposalCallback:
         except DesignError as error:
             self._fail(study, ProposalError("design", f"{self.proposer.name}: {error}"))
         else:
-            enqueue(study, params, _attributes(self.proposer.name, proposal))
+            enqueue(study, params, {"source": self.proposer.name, "proposal": proposal.id, "reason": proposal.reason})
             with self._lock:
                 self.proposed += 1
 
@@ -143,14 +143,6 @@ def enqueue(study: optuna.Study, params: Mapping[str, Any], attributes: Mapping[
 def _has_proposals(study: optuna.Study) -> bool:
     """Return whether this or another process has enqueued a proposal."""
     return any("proposal" in trial.user_attrs for trial in study.get_trials(deepcopy=False))
-
-
-def _attributes(source: str, proposal: StudyProposal) -> dict[str, Any]:
-    """Return the user attributes of the trial, which storages keep as JSON."""
-    attributes: dict[str, Any] = {"source": source, "proposal": proposal.id, "reason": proposal.reason}
-    if proposal.expected is not None:
-        attributes["expected"] = list(proposal.expected)
-    return attributes
 
 
 def _study_proposer(

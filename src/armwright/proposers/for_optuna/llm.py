@@ -2,20 +2,20 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import optuna
 
 from armwright.exceptions import ProposalError, SettingsError
-from armwright.llm.backend import OutputFormat, Question
+from armwright.llm.backend import OutputFormat
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.session import LlmSession
 from armwright.proposers.for_optuna.answer import answer_schema, read_answer, written_answer
 from armwright.proposers.for_optuna.parameters import Parameter, Space, study_parameters
-from armwright.proposers.for_optuna.prompt import StudyObjective, parameters_prompt, study_objectives, study_prompt
+from armwright.proposers.for_optuna.prompt import parameters_prompt, study_prompt
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
 
 
@@ -57,22 +57,20 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         parameters = study_parameters(self.space(study), trials)
         if not parameters:
             raise ProposalError("space", "no trial has shown a parameter yet; give StudyLlmProposer(space=…)")
-        objectives = study_objectives(study)
-        identity = f"{self.name}-{number:04d}"
-        prompt = study_prompt(study, trials, parameters, self.description, seed, self.options, self.name)
+        prompt = study_prompt(study, trials, parameters, self.description, seed, self.options)
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
-        step = "reasoning" if self.options.form == "then-schema" else "answer"
         text = self._ask(
-            Question(identity, step, self._part_to_ask(prompt, number), known),
-            self._output_format(parameters, objectives),
-            lambda thoughts: parameters_prompt(parameters, objectives, thoughts, self.options.expects),
+            self._first_question(number, self.options, self._part_to_ask(prompt, number), known),
+            self._output_format(parameters),
+            partial(parameters_prompt, parameters),
         )
-        return replace(read_answer(json.loads(text), parameters, objectives), id=identity)
+        params, reason = read_answer(json.loads(text), parameters)
+        return StudyProposal(params, self.identity(number), reason)
 
-    def _output_format(self, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective]) -> OutputFormat:
+    def _output_format(self, parameters: Sequence[Parameter]) -> OutputFormat:
         def read(content: Mapping[str, Any] | str) -> str:
             assert not isinstance(content, str)  # models answer in JSON
-            answer = read_answer(content, parameters, objectives)
-            return written_answer(answer, parameters, objectives, str(content.get("reasoning") or ""))
+            params, reason = read_answer(content, parameters)
+            return written_answer(params, reason, parameters, str(content.get("reasoning") or ""))
 
-        return OutputFormat(answer_schema(parameters, objectives, self.options), read)
+        return OutputFormat(answer_schema(parameters, self.options), read)

@@ -20,21 +20,13 @@ _KEY = re.compile(r"[A-Za-z0-9_.-]{1,64}")  # property names that every vendor a
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter as prompts and schemas show it.
+    """A parameter as prompts and schemas show it."""
 
-    Attributes:
-        name: its name in the study.
-        key: the name, or a valid property name in its place.
-        distribution: its values.
-        conditional: True if some complete trials lack it.
-        seen: how many complete trials have it, as text.
-    """
-
-    name: str
-    key: str
-    distribution: BaseDistribution
-    conditional: bool = False
-    seen: str = ""
+    name: str  # its name in the study
+    key: str  # the name, or a valid property name in its place
+    distribution: BaseDistribution  # its values
+    conditional: bool = False  # true if some complete trials lack it
+    seen: str = ""  # how many complete trials have it, as text
 
     @property
     def description(self) -> str:

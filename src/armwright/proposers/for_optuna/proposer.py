@@ -3,13 +3,11 @@
 import re
 import threading
 from collections import deque
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
-from weakref import WeakValueDictionary
 
 import optuna
 from optuna.study import StudyDirection
@@ -29,31 +27,18 @@ N_REFERENCE = 10  # first complete trials, which give the reference point if the
 
 @dataclass(frozen=True)
 class StudyProposal:
-    """Parameters to evaluate next; the study's sampler draws those that are missing.
+    """Parameters to evaluate next; the study's sampler draws those that are missing."""
 
-    Attributes:
-        params: values by parameter name.
-        id: unique within the study.
-        reason: one line.
-        expected: the values that the proposer expects, if any.
-    """
-
-    params: Mapping[str, Any]
-    id: str
-    reason: str = ""
-    expected: tuple[float, ...] | None = None
+    params: Mapping[str, Any]  # values by parameter name
+    id: str  # unique within the study
+    reason: str = ""  # one line
 
 
 class StudyProposer(Protocol):
-    """Proposes trials for an Optuna study; subclass it and implement `propose`.
+    """Proposes trials for an Optuna study; subclass it and implement `propose`."""
 
-    Attributes:
-        name: the `source` of its trials.
-        given_space: distributions that take precedence over those of the trials so far.
-    """
-
-    name: str
-    given_space: Space = MappingProxyType({})
+    name: str  # the `source` of its trials
+    given_space: Space = MappingProxyType({})  # distributions that take precedence over those of the trials so far
 
     def space(self, study: optuna.Study) -> Space:
         """Return the distributions of the parameters: the given ones, completed by those of the trials so far."""
@@ -74,14 +59,12 @@ class StudyProposer(Protocol):
 
 
 class ArmProposer(StudyProposer):
-    """Lets a proposer of arms propose for an Optuna study over an armwright design space.
-
-    A proposer may serve several studies, one after the other; each has its own record and budget.
+    """Lets a proposer of arms propose for one Optuna study over an armwright design space.
 
     Args:
         proposer: proposes the arms.
         problem: gives the design space and the objectives.
-        folder: parent of the record folders, one per study; None to keep no records.
+        folder: parent of the study's record folder; None to keep no records.
     """
 
     def __init__(self, proposer: Proposer, problem: Problem, folder: str | Path | None = None) -> None:
@@ -89,9 +72,8 @@ class ArmProposer(StudyProposer):
         self.proposer = proposer
         self.problem = problem
         self.folder = None if folder is None else Path(folder)
-        self._study: optuna.Study | None = None  # for which the proposer was opened
+        self._opened_for = ""  # name of the study's record folder
         self._ready: deque[Proposal] = deque()  # designs left from a call that returned several
-        self._asking = 0
         self._lock = threading.Lock()
 
     def space(self, study: optuna.Study) -> Space:
@@ -101,50 +83,31 @@ class ArmProposer(StudyProposer):
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """Ask the proposer for a design, from the study's complete trials."""
         history = study_history(study, self.problem)
-        with self._opened(study, history):
-            try:
-                proposal = self._ready.popleft()
-            except IndexError:
-                made = self.proposer.propose(history, seed, number)
-                proposal, *rest = [made] if isinstance(made, Proposal) else list(made)
-                self._ready.extend(rest)
-        design = self.problem.space.design(proposal.design.params)
-        return StudyProposal(dict(design.params), proposal.id, proposal.reason, proposal.expected)
-
-    @contextmanager
-    def _opened(self, study: optuna.Study, history: History) -> Generator[None]:
-        """Reserve the proposer for this study; opens it if it served another one.
-
-        Records of another study, or of an earlier one with the same name, are not reused.
-        """
-        with _opening:
-            holder = _holders.get(id(self.proposer))
-            if holder is not self or self._study is not study:
-                if holder is not None and holder._asking:
-                    raise SettingsError(f"proposer {self.name} is asking for another study; make one for each")
+        with self._lock:
+            if not self._opened_for:
                 self._open(study, history)
-                _holders[id(self.proposer)] = self
-            self._asking += 1
+            elif self._opened_for != _folder_name(study):
+                raise SettingsError(f"proposer {self.name} proposes for another study; make one for each")
         try:
-            yield
-        finally:
-            with _opening:
-                self._asking -= 1
+            proposal = self._ready.popleft()
+        except IndexError:
+            made = self.proposer.propose(history, seed, number)
+            proposal, *rest = [made] if isinstance(made, Proposal) else list(made)
+            self._ready.extend(rest)
+        design = self.problem.space.design(proposal.design.params)
+        return StudyProposal(dict(design.params), proposal.id, proposal.reason)
 
     def _open(self, study: optuna.Study, history: History) -> None:
-        folder = None if self.folder is None else self.folder / _folder_name(study)
+        """Open the proposer with the records of this study; those of an earlier one of the same name are not reused."""
+        name = _folder_name(study)
+        folder = None if self.folder is None else self.folder / name
         if folder is not None:
             with naming_write_errors(folder):
                 folder.mkdir(parents=True, exist_ok=True)
         self.proposer.open(folder)
-        self._study = study
+        self._opened_for = name
         used = {trial.user_attrs.get("proposal") for trial in study.get_trials(deepcopy=False)}
-        self._ready = deque(proposal for proposal in self.proposer.unused(history) if proposal.id not in used)
-
-
-_opening = threading.Lock()
-# The adapter that opened a proposer last, by the proposer's id: two callbacks may share a proposer.
-_holders: WeakValueDictionary[int, ArmProposer] = WeakValueDictionary()
+        self._ready.extend(proposal for proposal in self.proposer.unused(history) if proposal.id not in used)
 
 
 def _folder_name(study: optuna.Study) -> str:
@@ -183,7 +146,6 @@ def study_history(study: optuna.Study, problem: Problem) -> History:
 
 def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTrial:
     attributes = trial.user_attrs
-    expected = attributes.get("expected")
     missing = [
         constraint.description for constraint in problem.constraints if constraint.description not in trial.constraints
     ]
@@ -199,6 +161,5 @@ def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTria
         tuple(trial.values),
         proposal=attributes.get("proposal"),
         reason=str(attributes.get("reason", "")),
-        expected=None if expected is None else tuple(expected),
         violations=tuple(trial.constraints[constraint.description] for constraint in problem.constraints),
     )

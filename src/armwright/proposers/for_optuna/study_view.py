@@ -23,25 +23,15 @@ Params = dict[str, Any]
 
 @dataclass(frozen=True)
 class StudyView:
-    """The trials of a study that rules can learn from.
+    """The trials of a study that rules can learn from."""
 
-    Attributes:
-        space: distributions of the parameters.
-        complete: complete trials with finite values and at least one parameter in the space.
-        params: the parameters of each that lie in the space; ranges may have changed since.
-        values: (N, M) values to minimise; infeasible trials rank behind all feasible ones.
-        best: indices of `best_trials`, sorted by the first value; at least two, or none.
-        tried: parameters of all trials, running ones included.
-        source: name of the proposer.
-    """
-
-    space: Space
-    complete: tuple[FrozenTrial, ...]
-    params: tuple[Params, ...]
-    values: Array
-    best: tuple[int, ...]
-    tried: tuple[Params, ...]
-    source: str
+    space: Space  # distributions of the parameters
+    complete: tuple[FrozenTrial, ...]  # complete trials with finite values and at least one parameter in the space
+    params: tuple[Params, ...]  # the parameters of each that lie in the space; ranges may have changed since
+    values: Array  # (N, M) values to minimise; infeasible trials rank behind all feasible ones
+    best: tuple[int, ...]  # indices of `best_trials`, sorted by the first value; at least two, or none
+    tried: tuple[Params, ...]  # parameters of all trials, running ones included
+    source: str  # name of the proposer
 
     @classmethod
     def of(cls, study: optuna.Study, space: Space, source: str) -> "StudyView":
