@@ -30,7 +30,7 @@ from armwright.kinematics.ik.ik import UPDATES, solve_postures
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import paper_space
 from armwright.spaces.link_mass import MassPerMetre
 from armwright.tasks.catalogue import load_task

@@ -41,7 +41,7 @@ from armwright.problem.evaluation import Scene, evaluate_arrays
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Outcomes, Problem, worst_case
 from armwright.rotations import rotation_from_rpy
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.tolerance import TOLERANCE, perturbed
 from armwright.tasks.catalogue import load_task

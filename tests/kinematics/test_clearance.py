@@ -16,7 +16,7 @@ from armwright.kinematics.contact.clearance import clearances
 from armwright.problem.evaluation import evaluate
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.obstacles import Box, Cylinder, Ground, Obstacle, Sphere
 from armwright.tasks.tool import Tool

@@ -19,7 +19,7 @@ from armwright.robot.collision_pairs import joined_by_column
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground
 from armwright.tasks.payload import POINT_LOAD

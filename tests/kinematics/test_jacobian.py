@@ -14,7 +14,7 @@ from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.catalogue import load_task
 from tests.support.arms import general_arms, moving_arms

@@ -25,7 +25,7 @@ from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
 from armwright.robot.urdf_writer import to_urdf
 from armwright.sheet.joint_lines import joint_lines
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground, Obstacle
 from armwright.tasks.payload import POINT_LOAD

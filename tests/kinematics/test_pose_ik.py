@@ -17,7 +17,7 @@ from armwright.problem.evaluation import Evaluation, Scene, evaluate, evaluate_a
 from armwright.robot.arm import Arm, Joint, MountedTool, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import MOUNTS
 from armwright.tasks.targets import TargetArrays, position_targets

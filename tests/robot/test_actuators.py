@@ -23,7 +23,7 @@ from armwright.robot.arm import Actuator, Arm, Joint, Link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, load_space
 from armwright.study.study import optimize
 from armwright.tasks.task import Task

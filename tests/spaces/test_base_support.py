@@ -12,8 +12,8 @@ from armwright.kinematics.contact.clearance import clearances
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.objectives import MASS, PRICE
 from armwright.problem.problem import Problem
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.base_support import supported_space
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 

@@ -22,7 +22,7 @@ from armwright.proof.selection import pick
 from armwright.runs.folder import read_run
 from armwright.search.encoding import DesignEncoding
 from armwright.search.front.variation import offspring
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import FloatParameter
 from armwright.spaces.tolerance import length_columns

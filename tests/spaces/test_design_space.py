@@ -15,7 +15,7 @@ from armwright.llm.prompt import load_prompt
 from armwright.problem.problem import Problem
 from armwright.robot.tubes import MATERIALS
 from armwright.runs.folder import read_run
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, load_space, paper_space
 from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.link_section import LinkSection
@@ -186,6 +186,8 @@ def test_order_of_parameter_values_is_irrelevant() -> None:
 def test_design_of_another_space_is_refused() -> None:
     with pytest.raises(DesignError, match="joint_5"):
         paper_space().arm(paper_space(5).sample(1, 0)[0])
+    with pytest.raises(DesignError, match="joint_1 = 'S' is not one of R, P, Y"):
+        paper_space().arm(Design(GOOD | {"joint_1": "S"}))
     with pytest.raises(SpaceError, match="from 1 to 8"):
         paper_space(9)
 

@@ -21,7 +21,7 @@ from armwright.robot.arm import Arm
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.search.samplers import BlackBox
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, builtin_spaces, load_space, paper_space
 from armwright.spaces.joint_modules import MODULES, MOUNTS
 from armwright.tasks.catalogue import load_task

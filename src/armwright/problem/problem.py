@@ -26,8 +26,8 @@ from armwright.problem.objectives import (
     named_objectives,
 )
 from armwright.robot.arm import Arm
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.base_support import supported_space
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
 from armwright.spaces.tolerance import perturbed
