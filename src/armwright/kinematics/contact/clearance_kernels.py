@@ -35,7 +35,7 @@ def clearance_kernels(precision: Precision) -> ClearanceKernels:
     """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
     base = frame_math(precision)
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
-    translate, rotate = base.translate, base.rotate
+    advance = base.advance
     solids = solid_math(precision)
     signed_distance, along_segment = solids.signed_distance, solids.along_segment
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
@@ -59,12 +59,8 @@ def clearance_kernels(precision: Precision) -> ClearanceKernels:
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
         p = base[arm]
         for j in range(motion.shape[1]):
-            value = q[arm, target, j]
-            p = translate(motion[arm, j], p, value, x, y, z)
-            x, y, z = rotate(motion[arm, j], x, y, z, wp.sin(value), wp.cos(value))
-            starts[arm, target, j] = p
-            along = offset[arm, j]
-            p = p + along[0] * x + along[1] * y + along[2] * z
+            place, p, x, y, z = advance(motion[arm, j], offset[arm, j], q[arm, target, j], p, x, y, z)
+            starts[arm, target, j] = place
             ends[arm, target, j] = p
 
     @wp.func

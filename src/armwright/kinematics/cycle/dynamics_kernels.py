@@ -37,7 +37,7 @@ def dynamics_kernels() -> DynamicsKernels:
     """Return the kernel."""
     base = frame_math("float64")
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
-    translate, rotate, axis_of = base.translate, base.rotate, base.axis_of
+    advance, axis_of = base.advance, base.axis_of
     Vectors = wp.types.matrix(shape=(MAX_JOINTS, 3), dtype=real)
     zero, one, two = real(0.0), real(1.0), real(2.0)
 
@@ -81,17 +81,13 @@ def dynamics_kernels() -> DynamicsKernels:
         p = bodies.base[arm]
         for j in range(bodies.dof):
             motion = bodies.motion[arm, j]
-            value = q[arm, sample, j]
-            p = translate(motion, p, value, x, y, z)
             a = axis_of(motion, x, y, z)
-            x, y, z = rotate(motion, x, y, z, wp.sin(value), wp.cos(value))
-            offset = bodies.offset[arm, j]
+            here, p, x, y, z = advance(motion, bodies.offset[arm, j], q[arm, sample, j], p, x, y, z)
             for i in range(3):
-                place[j, i] = p[i]
+                place[j, i] = here[i]
                 axis[j, i] = a[i]
                 along_x[j, i] = x[i]
                 along_y[j, i] = y[i]
-            p = p + offset[0] * x + offset[1] * y + offset[2] * z
         tip = p
         for term in range(3):
             force, moment = Vectors(), Vectors()  # on each link, about the joint
