@@ -32,6 +32,16 @@ def rotation_from_quaternion(x: float, y: float, z: float, w: float) -> Array:
     )
 
 
+def rotation_about(axis: Array, angle: Array | float) -> Array:
+    """Return the (..., 3, 3) rotations about unit vectors (..., 3) by angles (...) [rad], by Rodrigues' formula.
+
+    A vector of zeros stands for no rotation.
+    """
+    cross = np.cross(axis[..., None, :], np.eye(3)).swapaxes(-1, -2)  # v ↦ axis x v
+    sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
+    return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+
+
 def rpy_from_rotation(rotation: Array) -> tuple[float, float, float]:
     """Return roll, pitch and yaw [rad] of a (3, 3) rotation, the inverse of `rotation_from_rpy`.
 

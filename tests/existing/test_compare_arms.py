@@ -95,7 +95,7 @@ def test_exported_design_compared_as_existing_arm_keeps_its_values(run: Path, hi
 def test_measures_match_formulas_at_the_found_base(compared: ArmComparison) -> None:
     """Recompute the objectives from postures, the masses of the URDF and the payloads of the task."""
     for arm, there in zip(compared.arms, compared.placed, strict=True):
-        evaluation = compared.problem.physics_of_arms(stack_arms([there]))
+        evaluation = compared.problem.physics(stack_arms([there]))
         torque, error = evaluation.joint_torques[0], evaluation.position_error[0]
         efforts = [joint.effort for joint in there.joints]
         assert arm.values == (arm.measures["position_error"], arm.measures["torque"])
@@ -106,7 +106,7 @@ def test_measures_match_formulas_at_the_found_base(compared: ArmComparison) -> N
         assert arm.measures["peak_torque"] == pytest.approx(np.abs(torque).max())
         assert arm.measures["torque_utilisation"] == pytest.approx((1.5 * np.abs(torque) / efforts).max())
         without = replace(compared.problem, task=TASK.model_copy(update={"payload": 0.0}))
-        lighter = without.physics_of_arms(stack_arms([there])).joint_torques[0]
+        lighter = without.physics(stack_arms([there])).joint_torques[0]
         assert not np.allclose(lighter[:2], torque[:2])
         assert np.array_equal(lighter[2], torque[2])
     assert [arm.name for arm in compared.arms] == ["ur5_robot", "panda"]
@@ -126,7 +126,7 @@ def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compa
         assert np.subtract(first, arm.base) == pytest.approx(arm_at_origin.base)  # on the first axis of both arms
         others = rng.uniform((-0.5, -1.0, 0.0), (0.5, 1.0, 0.0), (1000, 3))
         moved = [replace(arm_at_origin, base=tuple(np.add(arm_at_origin.base, place).tolist())) for place in others]
-        evaluation = compared.problem.physics_of_arms(stack_arms(moved))
+        evaluation = compared.problem.physics(stack_arms(moved))
         missed = np.maximum(evaluation.position_error - 1e-3, 0.0).sum(axis=1)
         torque = 40 * np.linalg.norm(evaluation.joint_torques, axis=2).sum(axis=1)
         assert arm.measures["unreached_targets"] == 0

@@ -192,11 +192,6 @@ def test_design_of_another_space_is_refused() -> None:
         paper_space(9)
 
 
-def test_equal_designs_have_equal_hashes() -> None:
-    assert Design(GOOD) == Design(dict(GOOD))
-    assert len({Design(GOOD), Design(dict(GOOD))}) == 1
-
-
 RESTRICTED = {"joint_1": "Y", "joint_2": ["P", "R"], "origin_z": 0.0, "link_1": [0.1, 0.2]}
 
 

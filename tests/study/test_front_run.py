@@ -236,7 +236,7 @@ def test_good_initial_designs_are_not_a_stall() -> None:
     assert known is not None
     search = FrontSearch(
         PROBLEM.space.parameters,
-        lambda rows: PROBLEM.evaluate_matrix(rows).values,
+        lambda rows: PROBLEM.evaluate(rows).values,
         (5.0, 5.0),
         0,
         PROBLEM.space.matrix(known.designs[::4]),

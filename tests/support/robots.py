@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.robot.urdf_xml import rotation_about
+from armwright.rotations import rotation_about
 from tests.support.arms import _general_joint, _general_link, _vector
 
 

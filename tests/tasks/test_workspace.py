@@ -152,7 +152,7 @@ def test_large_batches_equal_small_ones(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr("armwright.problem.problem.POSTURES_AT_ONCE", {"cpu": 1000})
     monkeypatch.setattr(Problem, "outcomes", counted)
-    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)).values, values)
+    assert np.array_equal(problem.evaluate(problem.space.matrix(designs)).values, values)
     assert max(sizes) * (200 + 8) <= 1000
 
 

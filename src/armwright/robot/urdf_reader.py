@@ -17,7 +17,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
 from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Vector
-from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document, rotation_about
+from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document
+from armwright.rotations import rotation_about
 
 SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
 MAX_ANGLE = 2 * math.pi  # [rad]

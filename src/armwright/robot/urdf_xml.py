@@ -15,6 +15,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError
 from armwright.files import read_bytes
+from armwright.rotations import rotation_about
 
 MAX_FILE = 4 * 1024 * 1024  # [bytes]; the largest of 60 common robots has 0.2 MB
 DEEPEST = 50  # nested elements; a URDF needs 6
@@ -213,13 +214,6 @@ def _pose(element: ElementTree.Element | None, of: str) -> Pose:
     angles = _numbers(element, "rpy", 3, of) if element.get("rpy") is not None else [0.0, 0.0, 0.0]
     about_x, about_y, about_z = (rotation_about(axis, angle) for axis, angle in zip(np.eye(3), angles, strict=True))
     return Pose(about_z @ about_y @ about_x, position)
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """Return the (3, 3) rotation about a unit vector (3,) by an angle [rad] (Rodrigues' formula)."""
-    x, y, z = axis.tolist()
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
 
 
 def _numbers(element: ElementTree.Element | None, key: str, n: int, of: str) -> list[float]:

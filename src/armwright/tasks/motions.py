@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
+from armwright.rotations import rotation_about
 from armwright.tasks.cycle import Action, By, Cycle
 from armwright.tasks.targets import ORIENTATION, TargetArrays
 
@@ -294,13 +295,6 @@ def along_line(poses: Poses, start: int, end: int, share: Array) -> Poses:
         tolerance=np.full(n, poses.tolerance[end]),
         angle_tolerance=np.full(n, poses.angle_tolerance[end]),
     )
-
-
-def rotation_about(axis: Array, angle: Array) -> Array:
-    """Return the (S, 3, 3) rotations by angles (S,) [rad] about a unit vector (3,), by Rodrigues' formula."""
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
 
 
 def _turn(poses: Poses, start: int, end: int) -> tuple[Array, float]:

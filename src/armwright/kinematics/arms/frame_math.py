@@ -2,28 +2,16 @@
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
 from armwright.kinematics.arms.arm_arrays import PRISMATIC, Precision
 
 
-@dataclass(frozen=True)
-class FrameMath:
-    """Types and functions in one precision."""
-
-    real: Any
-    Vector3: Any
-    Matrix3: Any
-    advance: Any
-    axis_of: Any
-
-
 @cache
-def frame_math(precision: Precision) -> FrameMath:
+def frame_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
     real, Vector3, Matrix3 = {
         "float32": (wp.float32, wp.vec3f, wp.mat33f),
@@ -73,4 +61,4 @@ def frame_math(precision: Precision) -> FrameMath:
             return z
         return Vector3()
 
-    return FrameMath(real, Vector3, Matrix3, advance, axis_of)
+    return SimpleNamespace(real=real, Vector3=Vector3, Matrix3=Matrix3, advance=advance, axis_of=axis_of)

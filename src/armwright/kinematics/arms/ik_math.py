@@ -7,9 +7,8 @@ cost an eighth of the time, so arms of revolute joints alone have a variant.
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
 import math
-from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -23,25 +22,13 @@ OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
 kernel = partial(wp.kernel, enable_backward=False, module="unique", module_options=OPTIONS)
 
 
-@dataclass(frozen=True)
-class IkMath:
-    """Types and functions of one variant."""
-
-    Joints: Any  # a matrix whose row j is joint j in all lanes
-    Arms: Any  # `ArmArrays` on the device, a Warp struct
-    at_base: Any
-    advance: Any
-    columns: Any
-    limit: Any
-
-
 @cache
-def ik_math(precision: Precision, lanes: int, motions: Motions) -> IkMath:
+def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespace:
     """Return the variant for a precision, a number of lanes and what the joints of the arms do."""
     base = lane_math(precision, lanes)
     real, Vector3, Lane = base.real, base.Vector3, base.Lane
     at_least, sine_cosine = base.at_least, base.sine_cosine
-    Joints = wp.types.matrix(shape=(MAX_JOINTS, lanes), dtype=real)
+    Joints = wp.types.matrix(shape=(MAX_JOINTS, lanes), dtype=real)  # row j is joint j in all lanes
 
     zero, one, two = real(0.0), real(1.0), real(2.0)
     angle_margin = real(math.radians(1.0))  # from the limits, keeps the limit gradient finite
@@ -49,7 +36,7 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> IkMath:
     centring_gain = real(0.01)
 
     @wp.struct
-    class Arms:
+    class Arms:  # `ArmArrays` on the device
         dof: int
         base: wp.array(dtype=Vector3)  # (N,)
         motion: wp.array2d(dtype=int)  # (N, D)
@@ -179,4 +166,4 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> IkMath:
         y = -centring_gain * wp.cw_mul(w, wp.cw_mul(share, wp.abs(share)))
         return n, d, w, y
 
-    return IkMath(Joints, Arms, at_base, advance, columns, limit)
+    return SimpleNamespace(Joints=Joints, Arms=Arms, at_base=at_base, advance=advance, columns=columns, limit=limit)

@@ -6,35 +6,19 @@ and ones.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
 from armwright.kinematics.arms.arm_arrays import Precision
 
 
-@dataclass(frozen=True)
-class LaneMath:
-    """Types and functions of one variant."""
-
-    real: Any  # the number type
-    Vector3: Any
-    Lane: Any  # a vector of one number for each lane
-    Wide: Any  # likewise in float64
-    roots: Any
-    at_least: Any
-    select: Any
-    sine_cosine: Any
-    norm_squared: Any
-
-
 @cache
-def lane_math(precision: Precision, lanes: int) -> LaneMath:
+def lane_math(precision: Precision, lanes: int) -> SimpleNamespace:
     """Return the variant for a precision and a number of lanes."""
     real, Vector3 = {"float32": (wp.float32, wp.vec3f), "float64": (wp.float64, wp.vec3d)}[precision]
-    Lane = wp.types.vector(length=lanes, dtype=real)
+    Lane = wp.types.vector(length=lanes, dtype=real)  # one number for each lane
     Wide = wp.types.vector(length=lanes, dtype=wp.float64)
     one = real(1.0)
 
@@ -95,4 +79,7 @@ def lane_math(precision: Precision, lanes: int) -> LaneMath:
         """Return the square of a vector's length."""
         return wp.cw_mul(x, x) + wp.cw_mul(y, y) + wp.cw_mul(z, z)
 
-    return LaneMath(real, Vector3, Lane, Wide, roots, at_least, select, sine_cosine, norm_squared)
+    return SimpleNamespace(
+        real=real, Vector3=Vector3, Lane=Lane, Wide=Wide,
+        roots=roots, at_least=at_least, select=select, sine_cosine=sine_cosine, norm_squared=norm_squared,
+    )  # fmt: skip

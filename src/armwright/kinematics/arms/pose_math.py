@@ -3,9 +3,8 @@
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
 import math
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -13,16 +12,8 @@ from armwright.kinematics.arms.arm_arrays import PRISMATIC, Motions, Precision
 from armwright.kinematics.arms.lane_math import lane_math
 
 
-@dataclass(frozen=True)
-class PoseMath:
-    """Functions of one variant."""
-
-    angular_columns: Any
-    error_rotation: Any
-
-
 @cache
-def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
+def pose_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespace:
     """Return the functions for a precision, a number of lanes and joint motions, as in `ik_math`."""
     base = lane_math(precision, lanes)
     real, Vector3, Lane = base.real, base.Vector3, base.Lane
@@ -170,4 +161,4 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         )
         return sx, sy, sz, tx, ty, tz, fx, fy, fz, angle, rx, ry, rz
 
-    return PoseMath(angular_columns, error_rotation)
+    return SimpleNamespace(angular_columns=angular_columns, error_rotation=error_rotation)

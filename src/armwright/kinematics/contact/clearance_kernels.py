@@ -6,9 +6,8 @@ branches: a bound excludes distant obstacles. docs/method.md §13 defines the di
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -18,20 +17,8 @@ from armwright.kinematics.arms.ik_math import kernel
 from armwright.kinematics.contact.solid_math import solid_math
 
 
-@dataclass(frozen=True)
-class ClearanceKernels:
-    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
-
-    real: Any
-    Vector3: Any
-    Matrix3: Any
-    link_axes: Any
-    self_clearance: Any
-    obstacle_clearance: Any
-
-
 @cache
-def clearance_kernels(precision: Precision) -> ClearanceKernels:
+def clearance_kernels(precision: Precision) -> SimpleNamespace:
     """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
     base = frame_math(precision)
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
@@ -175,4 +162,7 @@ def clearance_kernels(precision: Precision) -> ClearanceKernels:
                                 nearest = wp.min(nearest, distance)
         clearance[arm, target] = nearest
 
-    return ClearanceKernels(real, Vector3, Matrix3, link_axes, self_clearance, obstacle_clearance)
+    return SimpleNamespace(
+        real=real, Vector3=Vector3, Matrix3=Matrix3,
+        link_axes=link_axes, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance,
+    )  # fmt: skip

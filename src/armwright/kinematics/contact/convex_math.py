@@ -12,9 +12,8 @@ and Automation 4, 1988) finds the maximum.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -27,16 +26,8 @@ ITERATIONS = 40  # of the search for the nearest points; boxes take about 5, cyl
 ACCURACY = 1e-5  # [m] below the distance at most
 
 
-@dataclass(frozen=True)
-class ConvexMath:
-    """Functions in one precision."""
-
-    separation: Any
-    from_obstacle: Any
-
-
 @cache
-def convex_math(precision: Precision) -> ConvexMath:
+def convex_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
     base, simplex = frame_math(precision), simplex_math(precision)
     signed_distance = solid_math(precision).signed_distance
@@ -154,4 +145,4 @@ def convex_math(precision: Precision) -> ConvexMath:
             return signed_distance(kind, into * d, half) - size[0]
         return separation(into * d, kind, half, frame * wp.transpose(into), shape, size, enough)
 
-    return ConvexMath(separation, from_obstacle)
+    return SimpleNamespace(separation=separation, from_obstacle=from_obstacle)

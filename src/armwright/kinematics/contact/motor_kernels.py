@@ -6,9 +6,8 @@ distances and which pairs count.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -19,17 +18,8 @@ from armwright.kinematics.contact.convex_math import convex_math
 from armwright.kinematics.contact.solid_math import solid_math
 
 
-@dataclass(frozen=True)
-class MotorKernels:
-    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
-
-    motor_frames: Any
-    self_clearance: Any
-    obstacle_clearance: Any
-
-
 @cache
-def motor_kernels(precision: Precision) -> MotorKernels:
+def motor_kernels(precision: Precision) -> SimpleNamespace:
     """Return the kernels in this precision, for N arms with D joints at T targets, and O obstacles."""
     base, solids, convex = frame_math(precision), solid_math(precision), convex_math(precision)
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
@@ -169,4 +159,6 @@ def motor_kernels(precision: Precision) -> MotorKernels:
                 is_at_rest = 0
         clearance[arm, target] = nearest
 
-    return MotorKernels(motor_frames, self_clearance, obstacle_clearance)
+    return SimpleNamespace(
+        motor_frames=motor_frames, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance
+    )

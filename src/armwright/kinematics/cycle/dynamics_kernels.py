@@ -9,9 +9,8 @@ Along a motion, joint values are q(s) with the share s(t). The torque is
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -23,17 +22,8 @@ from armwright.robot.arm import GRAVITY
 TERMS = ("gravity", "drag", "push")
 
 
-@dataclass(frozen=True)
-class DynamicsKernels:
-    """The kernel and its types; it compiles when it is first loaded, and is cached on disk."""
-
-    real: Any
-    Bodies: Any
-    torque_terms: Any
-
-
 @cache
-def dynamics_kernels() -> DynamicsKernels:
+def dynamics_kernels() -> SimpleNamespace:
     """Return the kernel."""
     base = frame_math("float64")
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
@@ -155,4 +145,4 @@ def dynamics_kernels() -> DynamicsKernels:
                 terms[term, arm, sample, j] = load
                 after = here
 
-    return DynamicsKernels(real, Bodies, torque_terms)
+    return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms)

@@ -10,9 +10,8 @@ A joint that an update would take beyond its limit stays at the limit for the re
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -27,18 +26,8 @@ MAX_ROTATION = 0.3  # [rad] of any joint in one update
 HOPELESS, HOPELESS_ANGLE = 0.02, 0.2  # [m], [rad] off at the first sample: the rest gets one update a sample
 
 
-@dataclass(frozen=True)
-class PathKernels:
-    """The kernels and their types; they compile when they are first loaded, and are cached on disk."""
-
-    real: Any
-    Path: Any
-    follow: Any
-    tool_errors: Any
-
-
 @cache
-def path_kernels() -> PathKernels:
+def path_kernels() -> SimpleNamespace:
     """Return the kernels."""
     base, lines = frame_math("float64"), path_math()
     real, Vector3 = base.real, base.Vector3
@@ -168,4 +157,4 @@ def path_kernels() -> PathKernels:
             )
             errors[arm, sample, 1] = angle
 
-    return PathKernels(real, Path, follow, tool_errors)
+    return SimpleNamespace(real=real, Path=Path, follow=follow, tool_errors=tool_errors)

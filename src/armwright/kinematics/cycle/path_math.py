@@ -2,9 +2,8 @@
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -13,20 +12,8 @@ from armwright.kinematics.arms.frame_math import frame_math
 DAMPING = 1e-6  # of the mean square singular value of J
 
 
-@dataclass(frozen=True)
-class PathMath:
-    """Types and functions."""
-
-    Path: Any
-    Row: Any
-    Square: Any
-    in_frame: Any
-    rotation_error: Any
-    solve_damped: Any
-
-
 @cache
-def path_math() -> PathMath:
+def path_math() -> SimpleNamespace:
     """Return the functions."""
     base = frame_math("float64")
     real, Vector3 = base.real, base.Vector3
@@ -108,4 +95,6 @@ def path_math() -> PathMath:
             error[i] = error[i] / square[i, i]
         return error
 
-    return PathMath(Path, Row, Square, in_frame, rotation_error, solve_damped)
+    return SimpleNamespace(
+        Path=Path, Row=Row, Square=Square, in_frame=in_frame, rotation_error=rotation_error, solve_damped=solve_damped
+    )

@@ -43,9 +43,8 @@ squares the condition of the Jacobian, and weights near the joint limits (down t
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -57,18 +56,8 @@ from armwright.kinematics.ik.normal_equations import normal_equations
 from armwright.kinematics.ik.static_torque import static_torque_kernel
 
 
-@dataclass(frozen=True)
-class Kernels:
-    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
-
-    Lane: Any  # a vector of one number per lane
-    Arms: Any  # `ArmArrays` on the device, a Warp struct
-    solve_ik: Any
-    static_torque: Any  # and the best posture, its tip and its angle error
-
-
 @cache
-def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetKind) -> Kernels:
+def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetKind) -> SimpleNamespace:
     """Return the kernels that solve `lanes` targets per thread in this precision, for these motions and targets."""
     base, chain = lane_math(precision, lanes), ik_math(precision, lanes, motions)
     rotations, equations = pose_math(precision, lanes, motions), normal_equations(precision, lanes)
@@ -76,10 +65,10 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
     at_least, select, norm_squared = base.at_least, base.select, base.norm_squared
     at_base, advance, columns, limit = chain.at_base, chain.advance, chain.columns, chain.limit
     angular_columns, error_rotation = rotations.angular_columns, rotations.error_rotation
-    shortened, no_rows = equations.shortened, equations.no_rows
+    shortened, no_rows, pose_step = equations.shortened, equations.no_rows, equations.pose_step
     add_linear, add_angular, point_step = equations.add_linear, equations.add_angular, equations.point_step
-    pose_step, pose = equations.pose_step, kind == "pose"
-    one, infinity = real(1.0), real(1e30)
+    static_torque = static_torque_kernel(precision, lanes, motions, kind)
+    pose, one, infinity = kind == "pose", real(1.0), real(1e30)
 
     @kernel
     def solve_ik(
@@ -217,4 +206,4 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
             h_last[arm, group, j] = wp.cw_div(limit_n[j], limit_d[j])
             q_kept[arm, group, j] = kept[j]
 
-    return Kernels(Lane, Arms, solve_ik, static_torque_kernel(precision, lanes, motions, kind))
+    return SimpleNamespace(Lane=Lane, Arms=Arms, solve_ik=solve_ik, static_torque=static_torque)

@@ -2,9 +2,8 @@
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -12,25 +11,8 @@ from armwright.kinematics.arms.arm_arrays import Precision
 from armwright.kinematics.arms.lane_math import lane_math
 
 
-@dataclass(frozen=True)
-class SmallSystems:
-    """Functions of 3 x 3 systems. All here are unrolled by hand: matrices as arguments take 1.6 times as long."""
-
-    determinant: Any
-    solve_3x3: Any
-    damping: Any
-
-
-@dataclass(frozen=True)
-class LargeSystems:
-    """Functions of 6 x 6 systems."""
-
-    factor_6x6: Any
-    solve_6x6: Any
-
-
 @cache
-def small_systems(precision: Precision, lanes: int) -> SmallSystems:
+def small_systems(precision: Precision, lanes: int) -> SimpleNamespace:
     """Return the functions for a precision of the solution and a number of lanes."""
     base = lane_math(precision, lanes)
     real, Lane, Wide, roots = base.real, base.Lane, base.Wide, base.roots
@@ -70,11 +52,11 @@ def small_systems(precision: Precision, lanes: int) -> SmallSystems:
         lack = wp.max(Lane(zero), Lane(one) - (one / least_manipulability) * manipulability)
         return full_damping * wp.cw_mul(lack, lack)
 
-    return SmallSystems(determinant, solve_3x3, damping)
+    return SimpleNamespace(determinant=determinant, solve_3x3=solve_3x3, damping=damping)
 
 
 @cache
-def large_systems(precision: Precision, lanes: int) -> LargeSystems:
+def large_systems(precision: Precision, lanes: int) -> SimpleNamespace:
     """Return the functions for a precision of the solution and a number of lanes."""
     base = lane_math(precision, lanes)
     Lane, Wide = base.Lane, base.Wide
@@ -209,4 +191,4 @@ def large_systems(precision: Precision, lanes: int) -> LargeSystems:
         x1 -= wp.cw_mul(l21, x2)
         return Lane(x1), Lane(x2), Lane(x3), Lane(x4), Lane(x5), Lane(x6)
 
-    return LargeSystems(factor_6x6, solve_6x6)
+    return SimpleNamespace(factor_6x6=factor_6x6, solve_6x6=solve_6x6)

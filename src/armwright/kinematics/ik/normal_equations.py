@@ -5,9 +5,8 @@ All are unrolled by hand, as in `linear_systems`.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -16,20 +15,8 @@ from armwright.kinematics.arms.lane_math import lane_math
 from armwright.kinematics.ik.linear_systems import large_systems, small_systems
 
 
-@dataclass(frozen=True)
-class NormalEquations:
-    """Functions of one variant."""
-
-    shortened: Any
-    no_rows: Any
-    add_linear: Any
-    add_angular: Any
-    point_step: Any
-    pose_step: Any
-
-
 @cache
-def normal_equations(precision: Precision, lanes: int) -> NormalEquations:
+def normal_equations(precision: Precision, lanes: int) -> SimpleNamespace:
     """Return the functions for a precision of the solution and a number of lanes."""
     base, small, large = lane_math(precision, lanes), small_systems(precision, lanes), large_systems(precision, lanes)
     Lane, Wide, roots = base.Lane, base.Wide, base.roots
@@ -138,4 +125,11 @@ def normal_equations(precision: Precision, lanes: int) -> NormalEquations:
             d1, d2, d3, d4, d5, d6,
         )  # fmt: skip
 
-    return NormalEquations(shortened, no_rows, add_linear, add_angular, point_step, pose_step)
+    return SimpleNamespace(
+        shortened=shortened,
+        no_rows=no_rows,
+        add_linear=add_linear,
+        add_angular=add_angular,
+        point_step=point_step,
+        pose_step=pose_step,
+    )

@@ -118,7 +118,7 @@ class ProcessBackend(EvaluationBackend):
         if measured is None:
             return None
         (number, design), self._current = self._current, None
-        outcome = self._problem.outcomes_of([design], [measured])[0]
+        outcome = self._problem.evaluate([design], [measured])[0]
         return number, Evaluated(outcome, time.perf_counter() - self._started)
 
     def close(self) -> None:
@@ -129,10 +129,7 @@ class ProcessBackend(EvaluationBackend):
 def evaluate_design(problem: Problem, design: Design, process: EvaluationProcess | None = None) -> Evaluated:
     """Evaluate a design; `process` runs the custom evaluator if there is one."""
     started = time.perf_counter()
-    if process is None:
-        outcomes = problem.evaluate([design])
-    else:
-        outcomes = problem.outcomes_of([design], [process.measure(design)])
+    outcomes = problem.evaluate([design], None if process is None else [process.measure(design)])
     return Evaluated(outcomes[0], time.perf_counter() - started)
 
 
