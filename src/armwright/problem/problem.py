@@ -321,7 +321,7 @@ class Problem:
             yield exact
             near = exact.entry_postures
             for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
-                yield self.physics(rows, case, near)
+                yield self.physics(self.arms(rows), case, near)
 
     @cached_property
     def _postures(self) -> int:
