@@ -19,8 +19,6 @@ from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
 from armwright.robot.arm import GRAVITY
 
-TERMS = ("gravity", "drag", "push")
-
 
 @cache
 def dynamics_kernels() -> SimpleNamespace:
