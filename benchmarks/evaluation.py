@@ -30,7 +30,7 @@ from armwright.kinematics.ik.ik import UPDATES, solve_postures
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import paper_space
 from armwright.spaces.link_mass import MassPerMetre
 from armwright.tasks.catalogue import load_task
@@ -49,7 +49,7 @@ def main() -> None:
         print("Evaluation: designs/s, 8 targets, D = 4, 100 updates")
         print(f"  armwright, {cores} cores {rate(armwright, len(ARMS)):10.0f}   (kernels alone {kernels_alone():.0f})")
         sys.stdout.flush()
-        print(f"  designs as rows, {cores} cores {evaluate_matrix_alone():5.0f}")
+        print(f"  designs as rows, {cores} cores {evaluate_alone():5.0f}")
         sys.stdout.flush()
         # In a process of its own, which never had more threads than that.
         subprocess.run(
@@ -62,7 +62,7 @@ def main() -> None:
         return
     ours = rate(armwright, len(ARMS))
     print(f"  armwright, 1 core  {ours:10.0f}   (kernels alone {kernels_alone():.0f})")
-    print(f"  designs as rows    {evaluate_matrix_alone():10.0f}")
+    print(f"  designs as rows    {evaluate_alone():10.0f}")
     print_joints_and_targets()
     print(f"  armwright, one design at a time: {single_design_ms():.2f} ms")
     compare_with_yardstick()
@@ -103,12 +103,12 @@ def kernels_alone() -> float:
     return rate(work, len(ARMS))
 
 
-def evaluate_matrix_alone() -> float:
+def evaluate_alone() -> float:
     """Designs a second from rows to both objectives."""
     matrix = PROBLEM.space.matrix(PROBLEM.space.sample(len(ARMS), seed=0))
 
     def work(n: int) -> None:
-        PROBLEM.evaluate_matrix(matrix[:n])
+        PROBLEM.evaluate(matrix[:n])
 
     return rate(work, len(matrix))
 
@@ -134,9 +134,9 @@ def print_joints_and_targets() -> None:
 def print_memory_of_a_million() -> None:
     """What the process grows by at its peak while a million designs are evaluated from rows, results included."""
     matrix = np.tile(PROBLEM.space.matrix(PROBLEM.space.sample(1000, seed=0)), (1000, 1))
-    PROBLEM.evaluate_matrix(matrix[:10])
+    PROBLEM.evaluate(matrix[:10])
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    PROBLEM.evaluate_matrix(matrix)
+    PROBLEM.evaluate(matrix)
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     print(f"  a million designs at {len(TARGETS)} targets: {grown / 1024:.0f} MiB more at the peak")
 

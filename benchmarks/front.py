@@ -89,7 +89,7 @@ def ours(problem: Problem, reference_point: tuple[float, ...], seed: int, budget
     def evaluate(rows: Array) -> Array:
         nonlocal kernels
         started = time.perf_counter()
-        values = problem.evaluate_matrix(rows).values
+        values = problem.evaluate(rows).values
         kernels += time.perf_counter() - started
         return values
 

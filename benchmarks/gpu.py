@@ -1,6 +1,6 @@
 """Compare kernels and search on a GPU with those on the CPU beside it: rates, differences of results, and fronts.
 
-rates         designs per second of `Problem.evaluate_matrix`, the best of three, after a first call
+rates         designs per second of `Problem.evaluate`, the best of three, after a first call
 differences   the share of designs of which an objective differs by more than 1 % between the devices. The iteration
               of the inverse kinematics amplifies rounding; beside it is the share on the CPU alone when the designs'
               numbers move by one bit of single precision
@@ -77,10 +77,10 @@ def rates(name: str, batch: int) -> None:
     values: list[Array] = []
     speeds: list[float] = []
     for problem in problems:
-        values.append(problem.evaluate_matrix(matrix).values[: len(few)])
-        speeds.append(batch / best_of_three(lambda problem=problem: problem.evaluate_matrix(matrix)))
+        values.append(problem.evaluate(matrix).values[: len(few)])
+        speeds.append(batch / best_of_three(lambda problem=problem: problem.evaluate(matrix)))
     off = differing(*values)
-    control = differing(values[0], problems[0].evaluate_matrix(moved_by_a_bit(few, space)).values)
+    control = differing(values[0], problems[0].evaluate(moved_by_a_bit(few, space)).values)
     print(
         f"  {f'{name}, {batch:,d}':34s}{speeds[0]:12,.0f}{speeds[1]:12,.0f}{speeds[1] / speeds[0]:8.2f}   "
         f"{off:6.2%} {control:6.2%}",

@@ -53,7 +53,7 @@ class Nsga2:
     def evaluate(self, x: Array) -> Array:
         rows = np.where(self._categorical, np.floor(x), x)
         started = time.perf_counter()
-        values = self._problem.evaluate_matrix(rows).penalised
+        values = self._problem.evaluate(rows).penalised
         done = time.perf_counter()
         self._kernels += done - started
         self.evaluations += len(rows)

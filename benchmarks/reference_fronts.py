@@ -76,7 +76,7 @@ def make(problem: Problem) -> None:
 
     # Rounded first, so that the values are those of the numbers in the file.
     everything = np.round(np.vstack(rows), DECIMALS)
-    worth = problem.evaluate_matrix(everything).penalised
+    worth = problem.evaluate(everything).penalised
     on_front = front(worth, np.asarray(reference))
     volume = hypervolume(worth[on_front], reference)
     print(f"  {problem.task.name}: together {volume:.4f} in {time.perf_counter() - started:.0f} s", flush=True)

@@ -19,7 +19,7 @@ def new_search(problem: Problem, reference_point: tuple[float, ...], seed: int, 
     """A search that has not begun; `screen` chooses its designs, if there is one."""
 
     def evaluate(matrix: Array) -> Array:
-        outcomes = problem.evaluate_matrix(matrix)
+        outcomes = problem.evaluate(matrix)
         if screen is not None:
             screen.learn(matrix, outcomes)
         return outcomes.penalised

@@ -41,7 +41,7 @@ from armwright.problem.evaluation import Scene, evaluate_arrays
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Outcomes, Problem, worst_case
 from armwright.rotations import rotation_from_rpy
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.tolerance import TOLERANCE, perturbed
 from armwright.tasks.catalogue import load_task
@@ -169,8 +169,8 @@ def clearance() -> None:
     print("Clearance: designs/s, D = 6, 8 targets, 3 obstacles")
     rates = measure(
         {
-            "position error and torque": lambda: paper.evaluate_matrix(matrix),
-            "with collision": lambda: with_clearance.evaluate_matrix(matrix),
+            "position error and torque": lambda: paper.evaluate(matrix),
+            "with collision": lambda: with_clearance.evaluate(matrix),
             "clearance alone": lambda: clearances(arms, q, task.obstacles),
             "self-clearance alone": lambda: clearances(arms, q),
         },
@@ -188,8 +188,8 @@ def real_arms() -> None:
     print("Real arms: designs/s, D = 6, 8 targets")
     measure(
         {
-            "the paper's objectives, points alone": lambda: paper.evaluate_matrix(matrix),
-            "axes, capsules, obstacles and motors": lambda: real.evaluate_matrix(matrix),
+            "the paper's objectives, points alone": lambda: paper.evaluate(matrix),
+            "axes, capsules, obstacles and motors": lambda: real.evaluate(matrix),
         },
         N,
         ROUNDS,
@@ -199,23 +199,23 @@ def real_arms() -> None:
 def cycles() -> None:
     problem = Problem(CYCLE, CYCLE_SPACE)
     matrix = CYCLE_SPACE.matrix(CYCLE_SPACE.sample(N_CYCLES, seed=0))
-    feasible = matrix[(problem.evaluate_matrix(matrix).violations <= 0.0).all(axis=1)]
+    feasible = matrix[(problem.evaluate(matrix).violations <= 0.0).all(axis=1)]
     many = feasible[np.arange(N_CYCLES) % len(feasible)]
     robust = replace(problem, tolerance=TOLERANCE)
     print(f"Cycles a second; {len(feasible)} of {N_CYCLES} random designs are feasible")
     measure(
         {
-            "random designs": lambda: problem.evaluate_matrix(matrix),
-            "feasible designs": lambda: problem.evaluate_matrix(many),
-            "feasible designs, robust": lambda: robust.evaluate_matrix(many),
+            "random designs": lambda: problem.evaluate(matrix),
+            "feasible designs": lambda: problem.evaluate(many),
+            "feasible designs, robust": lambda: robust.evaluate(many),
         },
         N_CYCLES,
         CYCLE_ROUNDS,
     )
-    single = min(seconds(lambda: problem.evaluate_matrix(feasible[:1])) for _ in range(20))
+    single = min(seconds(lambda: problem.evaluate(feasible[:1])) for _ in range(20))
     print(f"  a single design: {1e3 * single:.2f} ms")
-    chosen = worst_case([problem.evaluate_matrix(rows) for rows in (feasible, *perturbed(CYCLE_SPACE, feasible))])
-    compare_copies(robust.evaluate_matrix(feasible), chosen)
+    chosen = worst_case([problem.evaluate(rows) for rows in (feasible, *perturbed(CYCLE_SPACE, feasible))])
+    compare_copies(robust.evaluate(feasible), chosen)
 
 
 def compare_copies(kept: Outcomes, chosen: Outcomes) -> None:
@@ -235,7 +235,7 @@ def motor_bodies() -> None:
     for motor in MOTORS:
         for name, bodies in BODIES.items():
             space = DesignSpace.model_validate(CYCLE_SPACE.model_dump() | {"actuators": [motor], **bodies})
-            work[f"{motor}: {name}"] = partial(Problem(CYCLE, space).evaluate_matrix, matrix)
+            work[f"{motor}: {name}"] = partial(Problem(CYCLE, space).evaluate, matrix)
     print("Cycles a second with solid bodies")
     rates = measure(work, N_CYCLES, CYCLE_ROUNDS)
     for motor in MOTORS:

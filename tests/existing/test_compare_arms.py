@@ -105,7 +105,7 @@ def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compa
         assert np.subtract(first, arm.base) == pytest.approx(arm_at_origin.base)  # on the first axis of both arms
         others = rng.uniform((-0.5, -1.0, 0.0), (0.5, 1.0, 0.0), (1000, 3))
         moved = [replace(arm_at_origin, base=tuple(np.add(arm_at_origin.base, place).tolist())) for place in others]
-        evaluation = compared.problem.physics_of_arms(stack_arms(moved))
+        evaluation = compared.problem.physics(stack_arms(moved))
         missed = np.maximum(evaluation.position_error - 1e-3, 0.0).sum(axis=1)
         torque = 40 * np.linalg.norm(evaluation.joint_torques, axis=2).sum(axis=1)
         assert arm.value("unreached_targets") == 0

@@ -16,7 +16,6 @@ from armwright.kinematics.contact.clearance import clearances
 from armwright.problem.evaluation import evaluate
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.obstacles import Box, Cylinder, Ground, Obstacle, Sphere
 from armwright.tasks.tool import Tool
@@ -308,40 +307,6 @@ def test_first_link_may_stand_on_an_obstacle_at_its_base() -> None:
     arm = replace(planar((0.2, 0.3)), base=(0.0, 0.0, 0.0))
     out = clearances(stack_arms([arm]), np.array([[[np.pi / 2, 0.0]]]), wall)[1][0, 0]
     assert out == pytest.approx(0.2 - 0.015), "straight out of a wall"
-
-
-def test_stacked_designs_and_arms_have_equal_radii() -> None:
-    space = paper_space(5)
-    designs = space.sample(20, 0)
-    one, other = stack_designs(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
-    assert np.array_equal(one.radius, other.radius)
-    assert one.radius.dtype == other.radius.dtype == np.float32
-    assert one[3:5].radius.shape == (2, 5)
-
-
-def test_clearance_is_computed_on_demand() -> None:
-    arms = moving_arms(4, 4, 0)
-    targets = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 3))
-    ground = (Ground(kind="ground", z=-1.0),)
-    evaluation = evaluate(arms, targets, obstacles=ground)
-    assert "_clearances" not in vars(evaluation)
-    own, clear = clearances(evaluation.arms, evaluation.q, ground)
-    assert np.array_equal(evaluation.self_clearance, own)
-    assert np.array_equal(evaluation.obstacle_clearance, clear)
-    assert np.array_equal(evaluation.clearance, np.minimum(own, clear))
-    plain = evaluate(arms, targets)
-    assert np.array_equal(plain.q, evaluation.q), "obstacles change no posture"
-    assert np.all(np.isinf(plain.obstacle_clearance))
-
-
-def test_threads_do_not_change_clearance() -> None:
-    arms = moving_arms(700, 4, 9)
-    q = random_postures(arms, 8, 2)
-    obstacles = [random_obstacle(np.random.default_rng(1), kind) for kind in SHAPES]
-    all_at_once = np.array(clearances(stack_arms(arms), q, obstacles))
-    for n in (0, 333, 699):
-        one = np.array(clearances(stack_arms(arms[n : n + 1]), q[n : n + 1], obstacles))
-        assert np.array_equal(one[:, 0], all_at_once[:, n])
 
 
 def test_prismatic_and_fixed_joints_place_their_links() -> None:

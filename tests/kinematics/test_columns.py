@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -19,7 +18,7 @@ from armwright.robot.collision_pairs import joined_by_column
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground
 from armwright.tasks.payload import POINT_LOAD
@@ -90,26 +89,6 @@ def test_contacts_in_mujoco_agree_with_the_clearance(has_motors: bool) -> None:
     assert free > 100
 
 
-def test_stacked_designs_and_arms_have_equal_columns() -> None:
-    space = DesignSpace.model_validate(WITH_FIXED)
-    designs = space.sample(100, 5)
-    arms = [space.arm(design) for design in designs]
-    one, other = stack_designs(space, space.matrix(designs)), stack_arms(arms)
-    assert one.columns is not None
-    assert other.columns is not None
-    assert one.columns.half.dtype == other.columns.half.dtype
-    assert np.array_equal(one.columns.half, other.columns.half)
-    lengths = 2.0 * one.columns.half[:, 2]
-    assert lengths == pytest.approx([max(design.origin[2] - 0.1, 0.0) for design in designs], abs=1e-7)
-    assert 0.0 == lengths.min() < lengths.max()
-    q = postures(arms, 3, 6)
-    assert np.array_equal(clearances(one, q), clearances(other, q))
-    assert np.array_equal(np.array(clearances(one, q))[:, 3:9], clearances(one[3:9], q[3:9]))
-    for n in range(20):
-        assert np.array_equal(clearances(stack_arms([arms[n]]), q[n : n + 1, :, : len(arms[n].joints)])[0][0],
-                              clearances(one, q)[0][n])  # fmt: skip
-
-
 def test_bases_at_the_foot_have_no_column() -> None:
     low = SPACE.model_copy(update={"origin_z": (0.0, 0.1)})
     designs = low.sample(20, 7)
@@ -169,15 +148,6 @@ def test_column_implies_that_nothing_collides() -> None:
     assert [constraint.description for constraint in problem.constraints] == ["self_clearance >= 0.01"]
     folded = space.clipped((0.0, 0.0, 0.5), "PP", (0.1, 0.3))  # its tip is inside the column at the target
     assert problem.evaluate([folded]).violations[0, 0] > 0.01
-
-
-def cylinder_of(urdf: ElementTree.Element) -> tuple[float, float, float]:
-    """Length, radius and height of the middle of the column, from the base."""
-    solid: Any = urdf.find("link[@name='column']/collision")
-    shape, joint = solid.find("geometry/cylinder"), urdf.find("joint[@name='column_joint']")
-    assert joint is not None
-    assert joint.find("parent").get("link") == "base"
-    return float(shape.get("length")), float(shape.get("radius")), float(solid.find("origin").get("xyz").split()[2])
 
 
 def test_column_does_not_change_dynamics_in_mujoco() -> None:

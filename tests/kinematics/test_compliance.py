@@ -120,19 +120,6 @@ def test_rigid_arms_do_not_yield_and_displacement_is_linear_in_load_and_complian
     assert sag(arms, q, soft, 3.0, own=False) == pytest.approx(3.0 * sag(arms, q, soft, 1.0, own=False))
 
 
-def test_arms_of_a_stack_do_not_depend_on_each_other() -> None:
-    arms = [random_arm(seed) for seed in range(5)]
-    stack = stack_arms(arms, "float64")
-    q = np.random.default_rng(1).uniform(-0.3, 0.3, (5, 2, stack.dof)) * (stack.motion < FIXED)[:, None]
-    stiffness = random_stiffness(stack, 9)
-    together = sag(stack, q, stiffness, 1.0)
-    for i, arm in enumerate(arms):
-        alone, own = stack_arms([arm], "float64"), slice(len(arm.joints))
-        parts = (stiffness.bending, stiffness.torsional, stiffness.joints)
-        found = sag(alone, q[i : i + 1, :, own], Stiffness(*(part[i : i + 1, own] for part in parts)), 1.0)
-        assert found[0] == pytest.approx(together[i], rel=1e-9)
-
-
 def test_backlash_error_bounds_every_combination_of_half_backlashes() -> None:
     arms, rng = stacked(random_arm(4)), np.random.default_rng(2)
     q = rng.uniform(-0.3, 0.3, (1, 1, arms.dof)) * (arms.motion < FIXED)

@@ -174,17 +174,6 @@ def test_durations_of_the_motions_of_a_step_add_up_to_its_time() -> None:
     assert of_cycle.cycle_time == pytest.approx(3 * 1.5 + 2 * 0.3)  # dwells after pick and place
 
 
-def test_torques_of_motion_grow_with_the_square_of_speed() -> None:
-    slow, fast = loads(case(6, "axis", time=3.0)), loads(case(6, "axis", time=1.5))
-    holding = loads(case(6, "axis", time=1e4)).torques
-    assert fast.durations * 2.0 == pytest.approx(slow.durations)
-    rows = smooth_rows(case(6, "axis"))
-    assert rows
-    moving = [one.torques[rows] - holding[rows] for one in (fast, slow)]
-    assert moving[0] == pytest.approx(4.0 * moving[1], rel=1e-4, abs=1e-4)
-    assert fast.speeds == pytest.approx(2.0 * slow.speeds)
-
-
 def test_drives_add_inertia_and_friction_at_the_joint() -> None:
     """By hand, of the same path without drives; a joint that does not move has no friction."""
     found, bare = case(5, "position", driven=True), case(5, "position")

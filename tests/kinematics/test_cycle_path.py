@@ -123,19 +123,6 @@ def test_errors_along_lines_equal_those_of_pinocchio(dof: int, kind: str) -> Non
                 assert (other.max(axis=0) <= 1.5 * np.array(errors) + 1e-6).all()
 
 
-@pytest.mark.parametrize(("dof", "kind"), CASES[1::4])
-def test_batch_equals_single_arms_to_the_bit(dof: int, kind: str) -> None:
-    found = case(dof, kind)
-    for row in range(3):
-        alone = find_paths(stack_arms([found.arms[row]], "float64"), found.plan)
-        padded = found.paths.of_arm(row)[1]
-        for mine, theirs in zip(alone.of_arm(0)[1], padded, strict=True):
-            own = mine.q.shape[2]
-            assert np.array_equal(mine.q, theirs.q[..., :own])
-        for name in ("path_error", "path_angle", "jumps", "self_clearance", "limit_distance"):
-            assert np.array_equal(getattr(alone, name)[0], getattr(found.paths, name)[row]), name
-
-
 def test_more_samples_converge_to_one_path() -> None:
     """The postures of redundant arms depend on the samples too, by less with each doubling."""
     for dof, kind in ((5, "position"), (6, "position"), (6, "axis"), (7, "position")):
@@ -151,14 +138,6 @@ def test_more_samples_converge_to_one_path() -> None:
         change = [np.abs(b - a).max() for a, b in pairwise(ends)]
         assert change[2] <= 0.7 * change[0] + 1e-6
         assert change[2] < 0.02
-
-
-def test_postures_at_targets_are_those_of_the_path() -> None:
-    found = case(6, "axis")
-    q = found.paths.postures(3)
-    for row in range(3):
-        for path in found.paths.of_arm(row)[1]:
-            assert np.array_equal(q[row, path.motion.end], path.q[0, -1])
 
 
 # Closed forms, and paths that no arm can follow
@@ -312,12 +291,6 @@ def test_candidate_that_collides_gives_way_to_one_that_does_not() -> None:
     assert tolerated(paths).all()
     assert paths.obstacle_clearance.min() > 0.1
     assert np.sign(paths.of_arm(0)[1][0].q[0, 0, 1]) == -np.sign(elbow[1])
-
-
-def test_first_candidates_stay_when_there_are_more() -> None:
-    found = case(6, "axis")
-    few, many = (entry_postures(found.arrays, found.plan, candidates=k) for k in (4, 8))
-    assert np.array_equal(few, many[:, :, :4])
 
 
 def test_paths_of_no_rows_are_refused() -> None:

@@ -12,7 +12,6 @@ from armwright.exceptions import FailureError, SettingsError
 from armwright.kinematics import devices
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.ik import ik as solve
-from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem import problem
 from armwright.problem.problem import Problem
 from armwright.tasks.catalogue import load_task
@@ -96,7 +95,7 @@ def test_unavailable_devices_are_refused(monkeypatch: pytest.MonkeyPatch) -> Non
     with pytest.raises(SettingsError, match="no NVIDIA GPU"):
         asking.evaluate(designs)
     with pytest.raises(SettingsError, match="no NVIDIA GPU"):
-        asking.evaluate_matrix(asking.space.matrix(designs))
+        asking.evaluate(asking.space.matrix(designs))
 
 
 def test_problem_resolves_auto_device_once() -> None:
@@ -166,21 +165,12 @@ def test_results_do_not_depend_on_chunks(monkeypatch: pytest.MonkeyPatch) -> Non
     """This holds for the solver's chunks and for chunks of designs."""
     asked = Problem(load_task("target-2"))
     matrix = asked.space.matrix(asked.space.sample(100, 3))
-    whole = asked.evaluate_matrix(matrix).values
+    whole = asked.evaluate(matrix).values
     assert np.array_equal(whole, asked.evaluate(asked.space.designs(matrix)).values)
     monkeypatch.setitem(solve.MAX_CHUNK, "cpu", 1)
     monkeypatch.setitem(problem.POSTURES_AT_ONCE, "cpu", 200)
-    assert np.array_equal(asked.evaluate_matrix(matrix).values, whole)
-    assert asked.evaluate_matrix(matrix[:0]).values.shape == (0, 2)
-
-
-def test_many_targets_are_solved_in_chunks() -> None:
-    asked = Problem(load_task("target-1"))
-    arms = asked.arms(asked.space.matrix(asked.space.sample(3, 4)))
-    targets = np.random.default_rng(4).uniform(-0.7, 0.7, (2000, 3))
-    postures = solve_postures(arms, targets, updates=5)
-    assert postures.q.shape == (3, 2000, 4)
-    assert np.array_equal(postures.q[:, 1234:1235], solve_postures(arms, targets[1234:1235], updates=5).q)
+    assert np.array_equal(asked.evaluate(matrix).values, whole)
+    assert asked.evaluate(matrix[:0]).values.shape == (0, 2)
 
 
 @pytest.mark.parametrize(("said", "most"), [("1", 1), ("3,1", 3), ("", 8), ("many", 8), ("0", 8), ("99", 8)])
@@ -192,7 +182,7 @@ def test_omp_num_threads_limits_cores(monkeypatch: pytest.MonkeyPatch, said: str
 
 def test_concurrent_threads_get_the_same_bits() -> None:
     problems = [Problem(load_task(name)) for name in ("target-1", "target-2", "autodesign-1")]
-    known = [(rows := p.space.matrix(p.space.sample(700, 0)), p.evaluate_matrix(rows).values) for p in problems]
+    known = [(rows := p.space.matrix(p.space.sample(700, 0)), p.evaluate(rows).values) for p in problems]
     wrong: list[tuple[int, int]] = []
 
     def work(seed: int) -> None:
@@ -202,7 +192,7 @@ def test_concurrent_threads_get_the_same_bits() -> None:
             rows, values = known[which]
             first = int(rng.integers(0, 700 - n))
             part = slice(first, first + n)
-            if not np.array_equal(problems[which].evaluate_matrix(rows[part]).values, values[part]):
+            if not np.array_equal(problems[which].evaluate(rows[part]).values, values[part]):
                 wrong.append((which, n))
 
     threads = [threading.Thread(target=work, args=(seed,)) for seed in range(3)]

@@ -14,7 +14,7 @@ from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.catalogue import load_task
 from tests.support.arms import general_arms, moving_arms
@@ -87,30 +87,6 @@ def test_planar_arm_has_the_closed_form_manipulability() -> None:
     (anisotropy,) = named_objectives(["anisotropy"])
     assert anisotropy(evaluation)[0] > 0.95, "a stretched arm, which misses its target, cannot go farther"
     assert anisotropy(evaluate([planar], [[0.2, 0.0, 0.3]]))[0] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_three_orthogonal_rails_have_dexterity_one() -> None:
-    rails = tuple(Joint("prismatic", axis, -0.5, 0.5) for axis in ("x", "y", "z"))
-    links = tuple(uniform_link((0.0, 0.0, 0.05), 0.1, 0.01) for _ in rails)
-    evaluation = evaluate([Arm((0.0, 0.0, 0.0), rails, links)], [[0.1, 0.2, 0.3]])
-    assert evaluation.manipulability[0, 0] == pytest.approx(1.0)
-    assert evaluation.dexterity[0, 0] == pytest.approx(1.0)
-
-
-def test_dexterity_does_not_depend_on_arm_size() -> None:
-    """Manipulability is a volume and grows with the arm; dexterity is comparable between sizes."""
-    small = moving_arms(30, 5, 1)
-    large = [
-        Arm(
-            tuple(3 * x for x in arm.base),
-            arm.joints,
-            tuple(uniform_link(tuple(3 * x for x in link.offset), 0.1, 0.01) for link in arm.links),
-        )
-        for arm in small
-    ]
-    q = postures(small, 4, 5)
-    one, other = (np.linalg.svd(jacobians(stack_arms(arms, "float64"), q), compute_uv=False) for arms in (small, large))
-    assert other == pytest.approx(3.0 * one)
 
 
 def test_anisotropy_is_of_the_worst_target_and_computed_on_demand() -> None:

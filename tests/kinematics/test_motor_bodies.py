@@ -1,7 +1,7 @@
 """Motor bodies: clearances against Coal with the exported geometry, and contacts in MuJoCo."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import coal
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from armwright.exceptions import ArmError, SpaceError
 from armwright.kinematics.arms.arm_arrays import Precision, stack_arms
 from armwright.kinematics.arms.forward import link_lines
-from armwright.kinematics.arms.motor_bodies import MotorBodies
 from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
@@ -24,8 +23,7 @@ from armwright.robot.collision_pairs import joined_by_motors
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
 from armwright.robot.urdf_writer import to_urdf
-from armwright.sheet.joint_lines import joint_lines
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground, Obstacle
 from armwright.tasks.payload import POINT_LOAD
@@ -178,33 +176,6 @@ def test_depth_of_overlapping_boxes_is_the_least_translation_apart() -> None:
 # What must hold whatever the arm
 
 
-def test_stacked_designs_and_arms_have_equal_bodies() -> None:
-    space = DesignSpace.model_validate({**CONTENT, "joint_types": ["R", "P", "Y", "S", "X", "F"], "bracket_mass": 0.02})
-    designs = space.sample(100, 5)
-    arms = [space.arm(design) for design in designs]
-    one, other = stack_designs(space, space.matrix(designs)), stack_arms(arms)
-    assert one.motor_bodies is not None
-    assert other.motor_bodies is not None
-    for field in fields(MotorBodies):
-        mine, theirs = (getattr(arrays.motor_bodies, field.name) for arrays in (one, other))
-        assert mine.dtype == theirs.dtype
-        assert np.array_equal(mine, theirs), field.name
-    for name in ("mass", "com", "base_mass"):
-        assert np.array_equal(getattr(one, name), getattr(other, name)), name
-    q = postures(arms, 3, 6)
-    obstacles = [random_obstacle(np.random.default_rng(7), kind) for kind in SHAPES]
-    assert np.array_equal(clearances(one, q, obstacles), clearances(other, q, obstacles))
-    assert np.array_equal(np.array(clearances(one, q, obstacles))[:, 3:9], clearances(one[3:9], q[3:9], obstacles))
-
-
-def test_spaces_without_the_key_have_no_bodies() -> None:
-    plain = DesignSpace.model_validate({**CONTENT, "motor_bodies": False})
-    designs = plain.sample(20, 0)
-    assert stack_designs(plain, plain.matrix(designs)).motor_bodies is None
-    assert not any(plain.arm(design).has_motor_bodies for design in designs)
-    assert "motor_1_joint" not in to_urdf(plain.arm(designs[0]))
-
-
 def test_motors_need_longer_links_and_a_higher_base() -> None:
     """The longer edge of an XM540-W270 is 58.5 mm, its shaft 12.5 mm off the middle, so 41.75 mm from the lower end."""
     lengths = (0.05, 0.0585, 0.07, 0.2)
@@ -259,14 +230,6 @@ def test_bodies_do_not_change_dynamics_in_mujoco() -> None:
                 mujoco.mj_inverse(model, data)
                 forces.append(data.qfrc_inverse.copy())
             assert forces[0] == pytest.approx(forces[1], rel=1e-6, abs=1e-6)
-
-
-def test_data_sheet_says_where_motors_are() -> None:
-    arm = PITCH.arm(PITCH.clipped((0.0, 0.0, 0.1), "PPP", (0.2, 0.2, 0.2)))
-    where = "box of 33.5 x 44 x 58.5 mm along x, y and z, shaft along y, middle at (0, 0, -12.5) mm"
-    assert [line.body for line in joint_lines(arm)] == [where] * 3
-    plain = replace(arm, joints=tuple(replace(joint, body=None) for joint in arm.joints))
-    assert [line.body for line in joint_lines(plain)] == [""] * 3
 
 
 def test_motor_bodies_may_not_collide() -> None:

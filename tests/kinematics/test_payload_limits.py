@@ -6,8 +6,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.reach.payload_limits import held_payloads, payloads_over_reach
-from armwright.kinematics.reach.reach_postures import postures_over_reach
+from armwright.kinematics.reach.payload_limits import payloads_over_reach
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import PAYLOAD_CAPACITY, TORQUE_UTILISATION
 from armwright.robot.arm import GRAVITY, Actuator, Arm, Joint, uniform_link
@@ -54,12 +53,6 @@ def test_capacity_exceeds_the_payload_where_the_torque_utilisation_is_below_one(
         assert (held | (used > 1.0 - 1e-5) | (bare > 1.0 - 1e-5)).all()
 
 
-def test_capacity_does_not_depend_on_the_payload_of_the_task() -> None:
-    arms = [driven(arm, 60.0) for arm in moving_arms(10, 4, 2)]
-    none, some = (PAYLOAD_CAPACITY(evaluate(arms, TARGETS, payload=payload)) for payload in (0.0, 1.0))
-    assert some == pytest.approx(none, rel=1e-4, abs=1e-5)
-
-
 def test_upright_axes_hold_any_payload() -> None:
     links = (uniform_link((0.2, 0.0, 0.0), 0.1, 0.01),) * 2
     arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "z", -2.0, 2.0),) * 2, links)
@@ -81,14 +74,6 @@ def test_payload_at_full_reach_has_the_closed_form() -> None:
     assert found.payloads[0] == pytest.approx((12.0 / FACTOR - own) / (0.5 * GRAVITY), rel=5e-3)
 
 
-def test_payload_grows_towards_the_base() -> None:
-    found = payloads_over_reach(planar_arm(12.0), (0.1, 0.5, 0.75, 1.0))
-    folded, *others = found.payloads
-    assert np.isnan(folded), "the elbow does not fold so far"
-    assert others == sorted(others, reverse=True)
-    assert 1.5 * others[2] < others[0] < 12.0 / FACTOR / (0.25 * GRAVITY)
-
-
 def test_payload_at_full_reach_is_that_of_the_worst_posture() -> None:
     """A shoulder of two axes may hold the arm by one that stands upright, which carries nothing."""
     arm = planar_arm(12.0)
@@ -98,25 +83,3 @@ def test_payload_at_full_reach_is_that_of_the_worst_posture() -> None:
     (found,) = payloads_over_reach(universal, (1.0,)).payloads
     own = 0.2 * GRAVITY * (0.05 + 0.25 + 0.5)
     assert found == pytest.approx((12.0 / FACTOR - own) / (0.6 * GRAVITY), rel=5e-2)
-
-
-def test_weak_motors_hold_nothing_over_the_reach() -> None:
-    assert payloads_over_reach(planar_arm(0.1)).payloads == (0.0, 0.0)
-
-
-def test_motors_are_at_their_limit_over_the_reach() -> None:
-    """By Pinocchio: they hold the stated payload in all postures found, and no more in one of them."""
-    arm = driven(moving_arms(1, 5, 3)[0], 90.0)
-    postures = postures_over_reach(arm, (1.0,))
-    (payload,) = held_payloads(postures).payloads
-    assert payload > 0.0
-    model = pinocchio.buildModelFromXML(to_urdf(arm))
-    tip = model.frames[model.getFrameId("tip")]
-    model.appendBodyToJoint(tip.parentJoint, pinocchio.Inertia(payload, np.zeros(3), np.zeros((3, 3))), tip.placement)
-    data = model.createData()
-    shares = [
-        FACTOR * np.abs(pinocchio.computeGeneralizedGravity(model, data, q.astype(float))).max() / 90.0
-        for found, is_there in postures.found()
-        for q in found.q[0, is_there]
-    ]
-    assert max(shares) == pytest.approx(1.0, rel=1e-3)

@@ -4,22 +4,18 @@ As in tests/kinematics/test_position_ik.py, single updates are compared exactly 
 """
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.arms.arm_arrays import FIXED, stack_arms
-from armwright.kinematics.ik import ik as solve
+from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.ik.ik import solve_postures
-from armwright.problem.evaluation import Evaluation, Scene, evaluate, evaluate_arrays
+from armwright.problem.evaluation import evaluate
 from armwright.robot.arm import Arm, Joint, MountedTool, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
-from armwright.spaces.joint_modules import MOUNTS
 from armwright.tasks.targets import TargetArrays, position_targets
 from tests.support import reference_kinematics as reference
 from tests.support import reference_poses
@@ -113,34 +109,6 @@ def test_single_updates_in_float64_agree_with_the_reference(dof: int, rows: int)
     assert np.abs((gradient[:, moving] - expected_h[:, 0]) / (1.0 + expected_h[:, 0])).max() < 1e-12
 
 
-@KINDS
-@pytest.mark.parametrize("dof", [3, 6, 7])
-@pytest.mark.slow
-def test_single_updates_in_float32_agree_with_float64(dof: int, rows: int) -> None:
-    """Within 2e-4 rad but for 1 in 200: arms near a singular posture, or with a joint near its limit."""
-    arms = tooled_arms(1000, dof, 6)
-    narrow = stack_arms(arms)
-    wide = stack_arms(arms, "float64")
-    wide = replace(
-        wide,
-        **{
-            name: getattr(narrow, name).astype(np.float64)
-            for name in ("base", "lower", "upper", "offset", "tool_axis", "tool_side")
-        },
-    )
-    rng = np.random.default_rng(dof)
-    q = rng.uniform(narrow.lower, narrow.upper).astype(np.float32)
-    q[narrow.motion == FIXED] = 0.0
-    h = np.zeros_like(q)
-    points = np.float64(narrow.base) + np.float32(rng.uniform(-1.0, 1.0, (len(arms), 3)))
-    asked = target_arrays([rows], dof)
-    off = np.abs(
-        update_once(narrow, points, q, h, asked)[0] - update_once(wide, points, np.float64(q), np.float64(h), asked)[0]
-    ).max(axis=1)
-    assert np.median(off) < 1e-5
-    assert (off > 2e-4).mean() < 5e-3
-
-
 def states(chains: reference.Chains, seed: int) -> tuple[Array, Array, Array]:
     rng = np.random.default_rng(seed)
     q = rng.uniform(chains.lower, chains.upper)
@@ -185,14 +153,6 @@ def test_point_target_does_not_depend_on_other_targets() -> None:
         assert abs(reached[0].mean() - reached[1].mean()) < 5e-3
 
 
-def test_point_targets_use_position_kernels() -> None:
-    arms, points = stack_arms(paper_arms(50, 4, 3)), np.array([[0.3, 0.2, 0.4]] * 3)
-    plain, asked = solve_postures(arms, points), solve_postures(arms, points, target_arrays=position_targets(3))
-    assert np.array_equal(plain.q, asked.q)
-    assert np.array_equal(plain.torque, asked.torque)
-    assert not asked.angle.any()
-
-
 @KINDS
 def test_reachable_poses_are_reached(rows: int) -> None:
     """Six joints with a wrist at postures of their own: from 20 starts nearly all of these are reached again."""
@@ -211,41 +171,6 @@ def test_reachable_poses_are_reached(rows: int) -> None:
 
 
 # Properties
-
-
-@pytest.mark.parametrize("lanes", [1, 2])
-@pytest.mark.slow
-def test_results_do_not_depend_on_simd_lanes(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    arms, asked = stack_arms(tooled_arms(60, 6, 12)), target_arrays([2, 3, 0, 3, 2, 2, 3, 0, 2])
-    points = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 3))
-    whole = solve_postures(arms, points, target_arrays=asked)
-    monkeypatch.setitem(solve.LANES, "cpu", lanes)
-    part = solve_postures(arms, points, target_arrays=asked)
-    for name in ("q", "reached", "torque", "angle"):
-        assert np.array_equal(getattr(whole, name), getattr(part, name))
-
-
-def test_result_does_not_depend_on_the_batch() -> None:
-    arms, asked = tooled_arms(60, 6, 12), target_arrays([2, 3, 0, 3, 2], restarts=2)
-    points = np.random.default_rng(1).uniform(-0.5, 0.5, (5, 3))
-    whole, alone = (evaluate(some, points, target_arrays=asked) for some in (arms, arms[17:18]))
-    for name in ("q", "reached", "joint_torques", "angle_error"):
-        assert np.array_equal(getattr(whole, name)[17:18], getattr(alone, name))
-
-
-@KINDS
-def test_best_posture_never_gets_worse_within_limits(rows: int) -> None:
-    arms, asked = stack_arms(tooled_arms(300, 6, 13)), target_arrays([rows] * 2, 5)
-    points = np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
-    off = [
-        np.hypot(np.linalg.norm(p.reached - points, axis=-1), asked.metres_per_radian * p.angle)
-        for p in (solve_postures(arms, points, updates, target_arrays=asked) for updates in (0, 5, 50, 100))
-    ]
-    for before, after in pairwise(off):
-        assert np.all(after <= before + 1e-6)
-    assert (off[-1] < off[0]).mean() > 0.95
-    q = solve_postures(arms, points, target_arrays=asked).q
-    assert np.all((q >= arms.lower[:, None]) & (q <= arms.upper[:, None]))
 
 
 @KINDS
@@ -287,40 +212,6 @@ def _turned_arm(arm: Arm) -> Arm:
     )  # fmt: skip
 
 
-def test_mirrored_arm_gives_the_mirrored_result() -> None:
-    """In the xz-plane, axis targets, to the bit: a change of sign does not round, and no choice prefers a side."""
-    mirror = np.array([1.0, -1.0, 1.0])
-    arms, points, asked = (
-        tooled_arms(300, 5, 13),
-        np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]]),
-        target_arrays([2, 2], 7),
-    )
-    z = asked.rotation[:, :, 2] * mirror
-    mirrored_arrays = replace(asked, rotation=np.array([rotation_to_axis(tuple(axis)) for axis in z]))
-    mirrored_arrays.rotation[:, :, 2] = z
-    sign = np.array([[1.0 if joint.axis == "y" else -1.0 for joint in arm.joints] for arm in arms])
-    plain = solve_postures(stack_arms(arms), points, target_arrays=asked)
-    other = solve_postures(stack_arms([_mirrored(arm) for arm in arms]), points * mirror, target_arrays=mirrored_arrays)
-    assert np.array_equal(other.q, plain.q * sign[:, None])
-    assert np.array_equal(other.reached, plain.reached * mirror)
-    assert np.array_equal(other.angle, plain.angle)
-
-
-def _mirrored(arm: Arm) -> Arm:
-    def across(v: tuple[float, float, float]) -> tuple[float, float, float]:
-        return (v[0], -v[1], v[2])
-
-    joints = tuple(
-        joint if joint.axis == "y" else replace(joint, lower=0.0 - joint.upper, upper=0.0 - joint.lower)
-        for joint in arm.joints
-    )
-    links = tuple(replace(link, offset=across(link.offset), com=across(link.com)) for link in arm.links)
-    return replace(
-        arm, base=across(arm.base), joints=joints, links=links,
-        tool=MountedTool(axis=across(arm.tool.axis), side=across(arm.tool.side)),
-    )  # fmt: skip
-
-
 @KINDS
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_rotation_by_pi_is_defined(rows: int, precision: str) -> None:
@@ -344,34 +235,7 @@ def test_rotation_by_pi_is_defined(rows: int, precision: str) -> None:
     assert found.angle[0, 0] < np.pi - 0.1
 
 
-def test_stacked_designs_and_arms_have_equal_tools() -> None:
-    """`stack_designs` and `stack_arms` agree to the bit, for all mounts."""
-    space = DesignSpace(name="any", joints=4, mount=tuple(MOUNTS))
-    designs = space.sample(50, 0)
-    batch = stack_designs(space, space.matrix(designs))
-    one_by_one = stack_arms([space.arm(design) for design in designs])
-    assert np.array_equal(batch.tool_axis, one_by_one.tool_axis)
-    assert np.array_equal(batch.tool_side, one_by_one.tool_side)
-    assert len(np.unique(batch.tool_axis, axis=0)) == 6
-
-
 # Restarts
-
-
-def test_restarts_never_increase_the_error() -> None:
-    arms, points = stack_arms(general_arms(100, 5, 3)), np.random.default_rng(3).uniform(-0.6, 0.6, (4, 3))
-
-    def solved(restarts: int) -> Evaluation:
-        return evaluate_arrays(arms, Scene(points, np.zeros(4), position_targets(4, restarts)))
-
-    least = solved(0).position_error
-    for restarts in (1, 3):
-        more = solved(restarts)
-        assert np.all(more.position_error <= least)
-        assert (more.position_error < least - 1e-3).any()
-        least = more.position_error
-        assert np.array_equal(more.q, solved(restarts).q)
-    assert np.all(more.q[np.broadcast_to((arms.motion == FIXED)[:, None], more.q.shape)] == 0.0)
 
 
 # scikit-robot

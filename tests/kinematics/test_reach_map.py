@@ -116,13 +116,6 @@ def test_poses_of_random_postures_are_found() -> None:
         assert np.diag(search.find().reached).mean() >= 0.95
 
 
-def test_repeated_calls_agree_to_the_bit() -> None:
-    (arm,) = paper_arms(1, 5, 8)
-    first, second = (aw.reach_map(arm, spacing=0.3, n_directions=12) for _ in range(2))
-    assert np.array_equal(first.bare.reached, second.bare.reached)
-    assert np.array_equal(first.bare.q, second.bare.q, equal_nan=True)
-
-
 def test_directions_fill_their_cone_evenly() -> None:
     for axis, half_angle in (((1.0, 2.0, -0.5), 0.7), (UP, math.pi), ((0.0, 0.0, -1.0), 0.0)):
         directions = cone_directions(axis, half_angle, 200)

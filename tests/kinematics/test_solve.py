@@ -153,12 +153,6 @@ def test_values_of_a_urdf_are_those_of_its_joints(name: str) -> None:
         assert angle_between(found[:3, :3], poses[j, :3, :3]) < 2e-3
 
 
-def test_transforms_of_float32_are_accepted() -> None:
-    (arm,) = paper_arms(1, 6, 9)
-    positions, orientations = (values.astype(np.float32) for values in reachable(arm, 5))
-    assert aw.solve(arm, positions, orientations=orientations).q.shape == (1, 5, 6)
-
-
 GOOD = [[0.2, 0.1, 0.3]]
 
 

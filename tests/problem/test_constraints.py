@@ -25,7 +25,6 @@ from armwright.pareto import (
     penalised_objectives,
     total_violation,
 )
-from armwright.pictures.figures import chosen_members, write_figures
 from armwright.problem.constraints import Constraint, read_constraints
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
@@ -34,7 +33,6 @@ from armwright.proof.front_gap import known_front
 from armwright.proof.results import verify_run
 from armwright.proof.selection import numbers_of, pick
 from armwright.proposers.for_optuna.proposer import study_history
-from armwright.proposers.replay import ReplayProposer
 from armwright.runs.folder import read_run
 from armwright.runs.history import History, found_reference_point
 from armwright.runs.trial import FinishedTrial
@@ -48,9 +46,7 @@ from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
-from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.fixed_problem import FixedProblem, fixed_history
-from tests.support.wire_formats import llm_proposer
 
 SPACE = paper_space()
 BOUNDS = ("worst_error <= 0.4", "length >= 0.5", "peak_torque <= 0.06")  # of target-2, 1 in 8 random designs keeps them
@@ -147,10 +143,10 @@ def test_violations_of_matrix_and_designs_agree_and_take_the_worst_copy() -> Non
     exact = Problem(task(*BOUNDS))
     designs = SPACE.sample(20, 5)
     rows = SPACE.matrix(designs)
-    copies = [exact.evaluate_matrix(r).violations for r in (rows, *perturbed(SPACE, rows))]
-    assert np.array_equal(problem.evaluate_matrix(rows).violations, np.max(copies, axis=0))
+    copies = [exact.evaluate(r).violations for r in (rows, *perturbed(SPACE, rows))]
+    assert np.array_equal(problem.evaluate(rows).violations, np.max(copies, axis=0))
     assert np.array_equal(problem.evaluate(designs).violations, np.max(copies, axis=0))
-    assert np.array_equal(exact.evaluate(designs).violations, exact.evaluate_matrix(rows).violations)
+    assert np.array_equal(exact.evaluate(designs).violations, exact.evaluate(rows).violations)
 
 
 def test_nonfinite_constraint_value_is_refused() -> None:
@@ -188,29 +184,6 @@ def test_constrained_front_agrees_with_optuna_and_hypervolume_with_moocore(
     whole = float(moocore.hypervolume(feasible, ref=[10.0, 10.0])) if len(feasible) else 0.0
     assert history.hypervolume[-1] == pytest.approx(whole)
     assert sum(one.hypervolume_gained or 0.0 for one in attribution_by_source(history).values()) == pytest.approx(whole)
-
-
-@given(VALUES, st.data())
-def test_hypervolume_grows_with_a_looser_bound(values: np.ndarray, data: st.DataObject) -> None:
-    broken = data.draw(arrays(float, (len(values), 1), elements=st.floats(-1.0, 1.0)))
-    before = -1.0
-    for loosened in (0.0, 0.1, 0.5, 2.0):
-        volume = hypervolume(masked_objectives(values, broken - loosened), (10.0, 10.0))
-        assert volume >= before
-        before = volume
-    assert before == hypervolume(values, (10.0, 10.0))
-
-
-def test_hypervolume_grows_with_a_looser_task_bound() -> None:
-    """The same for constraints of a task, on real designs."""
-    designs = SPACE.sample(400, 0)
-    volumes = []
-    for bound in (0.1, 0.3, 0.6, 5.0):
-        problem = Problem(task(f"worst_error <= {bound}"))
-        outcomes = problem.evaluate(designs)
-        volumes.append(hypervolume(masked_objectives(outcomes.values, outcomes.violations), (5.0, 5.0)))
-    assert volumes == sorted(volumes)
-    assert volumes[0] < volumes[-1] == hypervolume(Problem(task()).evaluate(designs).values, (5.0, 5.0))
 
 
 def test_unconstrained_task_records_no_violations(tmp_path: Path) -> None:
@@ -275,26 +248,8 @@ def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
     robust = summary["verification"]["robust_numbers"]
     designs = [history.trials[number].design for number in robust]
     rows = SPACE.matrix(designs)
-    off = np.max([problem.evaluate_matrix(copies).violations for copies in perturbed(SPACE, rows)], axis=0)
+    off = np.max([problem.evaluate(copies).violations for copies in perturbed(SPACE, rows)], axis=0)
     assert np.all(off <= 0.06)  # 5 % in float64
-
-
-@pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
-@pytest.mark.slow
-def test_killed_constrained_run_resumes_identically(tmp_path: Path, sampler: str) -> None:
-    """A kill leaves whole lines and a part of one."""
-    how: dict[str, Any] = {"proposer": "rules", "sampler": sampler, "n_total": 24, "seed": 3}
-    problem = Problem(task(*BOUNDS))
-    optimize(problem, out=tmp_path / "whole", **how)
-    content = (tmp_path / "whole" / "trials.jsonl").read_bytes()
-    for length in (len(content) // 5, len(content) // 2):
-        folder = tmp_path / f"killed-{length}"
-        folder.mkdir()
-        (folder / "config.yaml").write_bytes((tmp_path / "whole" / "config.yaml").read_bytes())
-        (folder / "trials.jsonl").write_bytes(content[:length])
-        run = optimize(problem, out=folder, **how)
-        assert 0 < run.resumed < 34
-        assert lines(folder) == lines(tmp_path / "whole")
 
 
 def test_optuna_study_of_a_run_has_its_constraints(tmp_path: Path) -> None:
@@ -325,22 +280,6 @@ def test_trial_without_violations_is_damaged(tmp_path: Path) -> None:
         read_run(tmp_path / "run")
 
 
-@pytest.mark.slow
-def test_replay_has_identical_violations(chat_server: ChatServer, tmp_path: Path) -> None:
-    def answer(request: Request) -> Answer:
-        if "response_format" not in request:
-            return designer(request)
-        return json.dumps({**GOOD_DESIGN, "link_1": 0.1 + 0.001 * len(chat_server.requests)})
-
-    chat_server.answer = answer
-    problem, how = Problem(task(*BOUNDS)), {"n_init": 4, "n_step": 3, "n_total": 12, "seed": 1}
-    proposer = llm_proposer(chat_server.url, origin="scripted")
-    optimize(problem, proposer=proposer, out=tmp_path / "first", **how)  # type: ignore[arg-type]
-    optimize(problem, proposer=ReplayProposer(tmp_path / "first", strict=True), out=tmp_path / "again", **how)  # type: ignore[arg-type]
-    assert lines(tmp_path / "again") == lines(tmp_path / "first")
-    assert any("worst_error" in line or "E_worst <= 0.4" in line for line in map(str, chat_server.requests))
-
-
 def test_run_without_a_feasible_design_reports_the_nearest(tmp_path: Path) -> None:
     problem = Problem(task(*IMPOSSIBLE))
     run = optimize(problem, proposer="rules", n_total=6, seed=1, out=tmp_path / "run")
@@ -354,16 +293,6 @@ def test_run_without_a_feasible_design_reports_the_nearest(tmp_path: Path) -> No
     words = f"the nearest, #{nearest}, violates worst_error <= 1e-08 .* most"
     with pytest.raises(FailureError, match=words):
         pick(run.history)
-
-
-@pytest.mark.slow
-def test_run_without_a_feasible_design_draws_the_nearest(tmp_path: Path) -> None:
-    run = optimize(Problem(task(*IMPOSSIBLE)), proposer="rules", n_total=6, seed=1, out=tmp_path / "run")
-    nearest = run.summary["feasibility"]["nearest"]["number"]
-    assert {file.name for file in write_figures(tmp_path / "run")} >= {"front.png", "arms.png"}
-    assert [(title, member.number) for title, member in chosen_members(run.history)] == [
-        ("Nearest to feasible", nearest)
-    ]
 
 
 def test_reference_point_comes_from_feasible_designs() -> None:
@@ -436,7 +365,7 @@ def test_front_search_matches_constrained_nsga2_of_pymoo() -> None:
 
     class Arms(PymooProblem):
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
-            outcomes = problem.evaluate_matrix(np.where(categorical, np.floor(x), x))
+            outcomes = problem.evaluate(np.where(categorical, np.floor(x), x))
             out["F"], out["G"] = outcomes.values, outcomes.violations
             found.append(masked_objectives(outcomes.values, outcomes.violations))
 
@@ -446,7 +375,7 @@ def test_front_search_matches_constrained_nsga2_of_pymoo() -> None:
         arms = Arms(n_var=len(low), n_obj=2, n_ieq_constr=len(BOUNDS), xl=low, xu=high)
         minimize(arms, NSGA2(pop_size=100), ("n_eval", 40_000), seed=seed)
         theirs.append(hypervolume(np.vstack(found), (5.0, 5.0)))
-        search = FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).penalised, (5.0, 5.0), seed)
+        search = FrontSearch(SPACE.parameters, lambda rows: problem.evaluate(rows).penalised, (5.0, 5.0), seed)
         while search.evaluations < 40_000:
             search.step()
         ours.append(search.hypervolume)

@@ -7,7 +7,7 @@ import pytest
 
 from armwright.exceptions import SettingsError
 from armwright.problem.evaluation import evaluate_arrays
-from armwright.problem.objectives import MOTION_QUANTITIES, OBJECTIVES, PATH_QUANTITIES
+from armwright.problem.objectives import MOTION_QUANTITIES, OBJECTIVES
 from armwright.problem.problem import Problem
 from armwright.proof.verification import verify
 from armwright.spaces.design_space import DesignSpace
@@ -92,7 +92,7 @@ def test_bounds_of_other_quantities_replace_nothing() -> None:
 # Quantities of motions
 
 
-@pytest.mark.parametrize("name", [q.name for q in MOTION_QUANTITIES if q not in PATH_QUANTITIES])
+@pytest.mark.parametrize("name", [q.name for q in MOTION_QUANTITIES])
 def test_quantities_of_motions_need_a_cycle(name: str) -> None:
     still = task().model_copy(update={"cycle": None})
     designs = DRIVEN.sample(2, 0)
@@ -190,15 +190,13 @@ def test_robust_values_are_the_worst_of_copies_that_keep_the_postures_of_the_arm
     problem, robust = Problem(task(), DRIVEN), Problem(task(), DRIVEN, tolerance=TOLERANCE)
     rows = DRIVEN.matrix(DRIVEN.sample(N, 0))
     exact = problem.physics(rows)
-    copies = [
-        problem.physics_of_arms(problem.arms(moved), near=exact.entry_postures) for moved in perturbed(DRIVEN, rows)
-    ]
+    copies = [problem.physics(moved, near=exact.entry_postures) for moved in perturbed(DRIVEN, rows)]
     reached = ~exact.unreached.any(axis=1)
     assert reached.any()
     for copy in copies:
         assert np.abs(copy.paths.entry - exact.paths.entry)[reached].max() < 0.3  # [rad]; another branch is further
     outcomes = [problem.outcomes(one) for one in (exact, *copies)]
-    found = robust.evaluate_matrix(rows)
+    found = robust.evaluate(rows)
     assert np.array_equal(found.values, np.max([one.values for one in outcomes], axis=0))
     assert np.array_equal(found.violations, np.max([one.violations for one in outcomes], axis=0))
 

@@ -21,7 +21,7 @@ def sampled(problem: Problem, n: int, seed: int = 0) -> Any:
 
 def assert_bounded(problem: Problem, n: int) -> None:
     matrix = sampled(problem, n)
-    bounds, outcomes = lower_bounds(problem, matrix), problem.evaluate_matrix(matrix)
+    bounds, outcomes = lower_bounds(problem, matrix), problem.evaluate(matrix)
     assert np.all(bounds.values <= outcomes.values)
     assert np.all(bounds.violations <= outcomes.violations)
 
@@ -43,7 +43,7 @@ def test_targets_beyond_reach_bound_errors() -> None:
     problem = Problem(Task.model_validate(content), paper_space())
     assert_bounded(problem, 500)
     matrix = sampled(problem, 500)
-    bounds, outcomes = lower_bounds(problem, matrix), problem.evaluate_matrix(matrix)
+    bounds, outcomes = lower_bounds(problem, matrix), problem.evaluate(matrix)
     assert np.all(np.mean(bounds.values[:, :3] > 0.0, axis=0) > 0.5)
     # Some arms stretch straight at both targets, so no larger bound would hold.
     assert np.max(bounds.values[:, 1] / outcomes.values[:, 1]) > 0.9
@@ -61,7 +61,7 @@ def test_quantities_of_an_arm_at_rest_are_exact() -> None:
     space = {"name": "mixed", "joints": [3, 5], "actuators": ["XM540-W270", "RobStride-00"], "motor_bodies": False}
     problem = Problem(Task.model_validate(content), DesignSpace.model_validate(space))
     matrix = sampled(problem, 200)
-    bounds, outcomes = lower_bounds(problem, matrix), problem.evaluate_matrix(matrix)
+    bounds, outcomes = lower_bounds(problem, matrix), problem.evaluate(matrix)
     assert np.array_equal(bounds.values[:, :4], outcomes.values[:, :4])
     assert np.array_equal(bounds.violations, outcomes.violations)
 
@@ -72,7 +72,7 @@ def test_estimates_from_an_arms_own_postures_are_near_its_evaluation(name: str) 
     known = known_front(problem)
     assert known is not None
     matrix = problem.space.matrix(known.designs)
-    outcomes = problem.evaluate_matrix(matrix)
+    outcomes = problem.evaluate(matrix)
     assert outcomes.postures is not None
     found = estimates(problem, matrix, outcomes.postures)
     assert found.values == pytest.approx(outcomes.values, rel=0.15)

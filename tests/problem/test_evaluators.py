@@ -224,10 +224,6 @@ def test_what_a_task_states_of_its_objectives_does_not_apply_to_an_evaluator(tmp
     assert len(run.config.reference_point or ()) == 1
 
 
-def test_evaluator_of_one_objective_may_return_a_number() -> None:
-    assert aw.evaluator("energy [J]")(lambda arm, task: np.float32(0.5))(ARM, TASK) == (0.5,)
-
-
 def test_failed_evaluation_has_infinite_objectives_and_its_violations() -> None:
     task = TASK.model_copy(update={"constraints": ("length <= 0.5",)})
     designs = SPACE.sample(4, 0)

@@ -12,18 +12,15 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError, UsageError
-from armwright.page.content import RunContent
 from armwright.pictures.figures import chosen_members, write_figures
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, RENAMED, named_objectives
 from armwright.problem.problem import Problem
-from armwright.proof.results import verify_run
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
 from armwright.spaces.design_space import paper_space
-from armwright.study.front.front_run import find_front
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
@@ -201,44 +198,6 @@ def test_former_objective_names_are_reported_with_the_current_one(tmp_path: Path
         with pytest.raises(UsageError, match=f'"{old}".*It is now called "{new}".') as refusal:
             Problem(load_task(file))
         assert str(refusal.value).count("now called") == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "names",
-    [
-        ("worst_error",),
-        ("worst_error", "peak_torque", "mass"),
-        ("unreached_targets", "mass", "length", "rms_torque", "torque"),
-    ],
-)
-def test_task_objectives_reach_run_prompt_figures_and_page(tmp_path: Path, names: tuple[str, ...]) -> None:
-    """Follow objectives from the task file to run, prompt, page and front search."""
-    task = LOADED.model_copy(update={"objectives": names})
-    file = tmp_path / "task.yaml"
-    file.write_text(yaml.safe_dump(task.model_dump(mode="json")), encoding="utf-8")
-    result = CliRunner().invoke(
-        app, ["optimize", str(file), "--n-init", "5", "--n-total", "12", "--out", str(tmp_path / "run")]
-    )
-    assert result.exit_code == 0, result.output
-    config, history = read_run(tmp_path / "run")
-    assert tuple(objective.name for objective in config.objectives) == names
-    assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
-    for name in names:
-        assert name.replace("_", " ") in result.output
-    prompt = CliRunner().invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
-    assert "payloads, point masses of [kg], for each TARGET in this order: 0.5, 0.2, 0." in prompt
-    for objective in history.problem.objectives:
-        assert objective.description in prompt
-    front = find_front(Problem(task), evaluations=2000, out=tmp_path / "front")
-    values = np.array([member.values for member in front.front])
-    point = front.summary["hypervolume"]["reference_point"]
-    assert front.summary["hypervolume"]["final"] == pytest.approx(moocore.hypervolume(values, ref=point), rel=0.02)
-    assert front.summary["front_gap"] is None
-    verification = verify_run(tmp_path / "run")[1]["verification"]
-    assert verification["robust"] + verification["sensitive"] == len(history.front)
-    page = RunContent(tmp_path / "run")
-    assert page.packed()
 
 
 def test_objectives_option_drops_a_foreign_reference_point(tmp_path: Path) -> None:

@@ -35,8 +35,8 @@ def alone() -> list[Task]:
 def test_objectives_are_the_worst_over_all_cases() -> None:
     problem = Problem(ROBUST, objectives=named_objectives(NAMES))
     rows = problem.space.matrix(problem.space.sample(60, 1))
-    each = [Problem(task, objectives=named_objectives(NAMES)).evaluate_matrix(rows) for task in alone()]
-    outcomes = problem.evaluate_matrix(rows)
+    each = [Problem(task, objectives=named_objectives(NAMES)).evaluate(rows) for task in alone()]
+    outcomes = problem.evaluate(rows)
     values = outcomes.values
     assert np.array_equal(values, np.max([case.values for case in each], axis=0))
     assert np.array_equal(outcomes.violations, np.max([case.violations for case in each], axis=0))

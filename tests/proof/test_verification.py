@@ -97,8 +97,8 @@ def test_design_near_a_flip_of_the_solver_is_sensitive() -> None:
 def test_robust_values_are_the_worst_case(designs: list[Design]) -> None:
     robust = Problem(PROBLEM.task, tolerance=1e-3)
     rows = PROBLEM.space.matrix(designs)
-    worst = np.max([PROBLEM.evaluate_matrix(r).values for r in (rows, *perturbed(PROBLEM.space, rows))], axis=0)
-    assert np.array_equal(robust.evaluate_matrix(rows).values, worst)
+    worst = np.max([PROBLEM.evaluate(r).values for r in (rows, *perturbed(PROBLEM.space, rows))], axis=0)
+    assert np.array_equal(robust.evaluate(rows).values, worst)
     assert np.array_equal(robust.evaluate(designs).values, worst)
 
 

@@ -340,7 +340,7 @@ def test_search_matches_nsga2_of_pymoo_over_five_seeds():
 
     class Arms(PymooProblem):
         def _evaluate(self, x, out, *args, **kwargs):
-            out["F"] = problem.evaluate_matrix(np.where(categorical, np.floor(x), x)).values
+            out["F"] = problem.evaluate(np.where(categorical, np.floor(x), x)).values
             found.append(out["F"])
 
     theirs, ours = [], []
@@ -350,7 +350,7 @@ def test_search_matches_nsga2_of_pymoo_over_five_seeds():
         arms = Arms(n_var=len(bounds), n_obj=2, xl=low, xu=high)
         minimize(arms, NSGA2(pop_size=100), ("n_eval", 20_000), seed=seed)
         theirs.append(hypervolume(np.vstack(found), (5.0, 5.0)))
-        search = FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).values, (5.0, 5.0), seed)
+        search = FrontSearch(SPACE.parameters, lambda rows: problem.evaluate(rows).values, (5.0, 5.0), seed)
         while search.evaluations < 20_000:
             search.step()
         ours.append(search.hypervolume)

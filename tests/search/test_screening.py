@@ -32,7 +32,7 @@ def pool() -> Any:
 
 def learnt(pool: Any, problem: Problem = PROBLEM, point: tuple[float, ...] = POINT) -> Screen:
     screen = Screen(problem, lambda: point)
-    screen.learn(pool, problem.evaluate_matrix(pool))
+    screen.learn(pool, problem.evaluate(pool))
     return screen
 
 
@@ -43,7 +43,7 @@ def screened(screen: Screen, pool: Any, seed: int = 1) -> Any:
 def test_chosen_offspring_are_feasible_more_often(pool: Any) -> None:
     chosen = screened(learnt(pool), pool)
     others = offspring(pool, np.zeros(len(pool)), ENCODING, len(chosen), np.random.default_rng(1))
-    shares = [feasible_mask(PROBLEM.evaluate_matrix(matrix).violations).mean() for matrix in (chosen, others)]
+    shares = [feasible_mask(PROBLEM.evaluate(matrix).violations).mean() for matrix in (chosen, others)]
     assert shares[0] > 0.85
     assert shares[1] < 0.6
 
@@ -57,7 +57,7 @@ def test_a_share_of_the_evaluations_goes_to_rejected_designs(pool: Any) -> None:
 
 
 def test_designs_that_bounds_discard_are_not_chosen(pool: Any) -> None:
-    dearest = PROBLEM.evaluate_matrix(pool).values[:, 0]
+    dearest = PROBLEM.evaluate(pool).values[:, 0]
     limit = float(np.median(np.unique(dearest)))
     problem = Problem(TASK.model_copy(update={"constraints": (f"price <= {limit}",)}), SPACE)
     screen = learnt(pool, problem)
@@ -71,11 +71,11 @@ def test_designs_that_bounds_discard_are_not_chosen(pool: Any) -> None:
 
 
 def test_near_misses_would_enlarge_the_front_and_miss_the_least(pool: Any) -> None:
-    outcomes = PROBLEM.evaluate_matrix(pool)
+    outcomes = PROBLEM.evaluate(pool)
     state = learnt(pool).state()
     near, front = state["screen_near_matrix"], state["screen_front"]
     assert 0 < len(near) <= NEAR_MISSES
-    found = PROBLEM.evaluate_matrix(near)
+    found = PROBLEM.evaluate(near)
     assert not feasible_mask(found.violations).any()
     assert not np.any(np.all(front <= found.values[:, None], axis=2))
     assert np.all(found.values < POINT)
@@ -100,14 +100,14 @@ def test_restored_screen_equals_uninterrupted_one(pool: Any) -> None:
     for seed in range(3):
         chosen = screened(screen, pool, seed)
         assert np.array_equal(screened(restored, pool, seed), chosen)
-        outcomes = PROBLEM.evaluate_matrix(chosen)
+        outcomes = PROBLEM.evaluate(chosen)
         screen.learn(chosen, outcomes)
         restored.learn(chosen, outcomes)
     assert restored.counts == screen.counts
 
 
 def test_screen_forgets_the_oldest_designs(pool: Any) -> None:
-    screen, outcomes = Screen(PROBLEM, lambda: POINT), PROBLEM.evaluate_matrix(pool)
+    screen, outcomes = Screen(PROBLEM, lambda: POINT), PROBLEM.evaluate(pool)
     for _ in range(2 + REMEMBERED // len(pool)):
         screen.learn(pool, outcomes)
     state = screen.state()

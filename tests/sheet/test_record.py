@@ -162,9 +162,7 @@ def test_sensitivities_are_those_of_designs_edited_by_hand(sheet: DataSheet, his
             expected = float(quantity(changed)[0] - quantity(start)[0])
             assert getattr(possible[key], name) == pytest.approx(expected, rel=1e-3, abs=1e-6), (key, name)
     prices = {key: line.price for key, line in possible.items()}
-    assert prices["link 1", "+10 mm"] == pytest.approx(
-        12.0 * 0.01 * space.link_section.options[space.tube_of(design, 0)].mass_per_metre
-    )
+    assert prices["link 1", "+10 mm"] == pytest.approx(12.0 * 0.01 * space.arm(design).links[0].mass / design.links[0])
 
 
 def test_impossible_changes_say_so(sheet: DataSheet) -> None:
@@ -262,7 +260,7 @@ def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
     places = [model.joints[model.getJointId(joint.name)].idx_q for joint in sheet.joints]
     assert [joint.lower for joint in sheet.joints] == pytest.approx(model.lowerPositionLimit[places], abs=1e-12)
     assert [joint.upper for joint in sheet.joints] == pytest.approx(model.upperPositionLimit[places], abs=1e-12)
-    q = there.values_in_urdf(problem.physics_of_arms(stack_arms([there.arm])).q[0])
+    q = there.values_in_urdf(problem.physics(stack_arms([there.arm])).q[0])
     assert [joint.used for joint in sheet.joints] == [
         pytest.approx(ends) for ends in zip(q.min(axis=0), q.max(axis=0), strict=True)
     ]
@@ -292,7 +290,7 @@ def test_efforts_and_speeds_that_the_cycle_exceeds_are_stated() -> None:
     arm = replace(read_urdf(robot("ur5_robot")).arm, safety_factor=1.5)
     described = replace(read_urdf(robot("ur5_robot")), arm=arm)
     sheet = urdf_sheet(described, job=Job(problem, Mounting(), "here"))
-    evaluation = problem.physics_of_arms(stack_arms([arm]))
+    evaluation = problem.physics(stack_arms([arm]))
     torque = np.abs(evaluation.loads.torques[0]).max(axis=(0, 1))
     speed = np.abs(evaluation.loads.speeds[0]).max(axis=(0, 1))
     efforts = np.array([joint.effort for joint in arm.joints])

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import SpaceError
-from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.contact.clearance import clearances
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.objectives import MASS, PRICE
 from armwright.problem.problem import Problem
 from armwright.spaces.base_support import supported_space
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 
@@ -70,15 +68,6 @@ def test_default_column_is_an_aluminium_tube_without_a_price() -> None:
     assert column is not None
     assert (column.length, column.outer_diameter, column.wall, column.price) == (0.5, 0.06, 0.003, 0.0)
     assert column.mass == pytest.approx(2700 * math.pi * (0.03**2 - 0.027**2) * 0.5)
-
-
-def test_batches_with_columns_equal_arms_to_the_bit() -> None:
-    of = problem(space(column=PRICED), GROUND).space
-    designs = of.sample(100, 1)
-    one, other = stack_designs(of, of.matrix(designs)), stack_arms([of.arm(design) for design in designs])
-    assert np.array_equal(one.base_mass, other.base_mass)
-    assert np.array_equal(one.structure_price, other.structure_price)
-    assert one.base_mass.tolist() == [of.arm(design).standing_mass for design in designs]
 
 
 def test_bounds_of_mass_and_price_include_the_column() -> None:

@@ -11,7 +11,6 @@ from optuna.distributions import CategoricalDistribution, FloatDistribution, Int
 
 import armwright as aw
 from armwright.exceptions import DesignError, SettingsError, SpaceError
-from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.llm.answer import answer_schema, read_answer, read_text
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt
@@ -22,7 +21,6 @@ from armwright.proof.selection import pick
 from armwright.runs.folder import read_run
 from armwright.search.encoding import DesignEncoding
 from armwright.search.front.variation import offspring
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import FloatParameter
 from armwright.spaces.tolerance import length_columns
@@ -135,14 +133,11 @@ def test_restrictions_grids_and_ties_apply() -> None:
         space_of(restrict={"cells": [1.5, 2]})
 
 
-def test_custom_parameters_do_not_change_arms_and_batches() -> None:
+def test_custom_parameters_do_not_change_arms() -> None:
     space, plain = space_of(joints=[2, 4]), aw.paper_space().model_copy(update={"joints": (2, 4)})
     designs = space.sample(20, 3)
     bare = [plain.design({k: v for k, v in d.params.items() if k not in space.custom_names}) for d in designs]
     assert [space.arm(design) for design in designs] == [plain.arm(design) for design in bare]
-    batch, single = stack_designs(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
-    for name in ("base", "motion", "lower", "upper", "offset", "com", "mass", "n_joints", "length"):
-        assert np.array_equal(getattr(batch, name), getattr(single, name))
     assert [space.parameters[i].name for i in length_columns(space)] == [
         plain.parameters[i].name for i in length_columns(plain)
     ]

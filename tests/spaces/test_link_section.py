@@ -21,7 +21,7 @@ from armwright.search.encoding import DesignEncoding
 from armwright.search.front.variation import offspring
 from armwright.sheet.arm_drawing import link_line
 from armwright.sheet.parts import parts_list
-from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import CategoricalParameter
 from armwright.tasks.catalogue import load_task

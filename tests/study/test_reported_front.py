@@ -42,13 +42,13 @@ def problem(**update: Any) -> Problem:
 def test_no_reported_design_is_worse_than_itself_without_an_idle_joint() -> None:
     plane = problem()
     matrix = plane.space.matrix(plane.space.sample(300, 0))
-    values = plane.evaluate_matrix(matrix).penalised
+    values = plane.evaluate(matrix).penalised
     kept = front_mask(values) & np.all(values < (1.0, 1000.0), axis=1)
     front = reported_front(plane, matrix[kept], values[kept], (1.0, 1000.0), 300)
     assert 0 < front.reduced <= front.evaluations
     assert front_mask(front.values).all()
-    assert np.array_equal(plane.evaluate_matrix(front.matrix).penalised, front.values)
-    candidates = plane.evaluate_matrix(reduced(plane, front.matrix)).penalised
+    assert np.array_equal(plane.evaluate(front.matrix).penalised, front.values)
+    candidates = plane.evaluate(reduced(plane, front.matrix)).penalised
     for candidate in candidates:
         assert not np.any(np.all(candidate <= front.values, axis=1) & np.any(candidate < front.values, axis=1))
     assert hypervolume(front.values, (1.0, 1000.0)) > hypervolume(values, (1.0, 1000.0))

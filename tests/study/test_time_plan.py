@@ -53,7 +53,7 @@ def plan_of(clock: Clock, drawing: bool = False, **budget: Any) -> TimePlan:
 def slow_evaluation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
     """Return a function that sets how long evaluating a design takes by the clock; verifying it takes 35 times that."""
     seconds = 0.0
-    evaluate, verify, verify_front = Problem.evaluate_matrix, direct_search.verify, direct_search.verify_front
+    evaluate, verify, verify_front = Problem.evaluate, direct_search.verify, direct_search.verify_front
 
     def slow_evaluate(self: Problem, matrix: Any) -> Outcomes:
         clock.wait(seconds * len(matrix))
@@ -67,7 +67,7 @@ def slow_evaluation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Callable[[
         clock.wait(seconds * PER_VERIFIED * len(history.front))
         return verify_front(history)
 
-    monkeypatch.setattr(Problem, "evaluate_matrix", slow_evaluate)
+    monkeypatch.setattr(Problem, "evaluate", slow_evaluate)
     monkeypatch.setattr(direct_search, "verify", slow_verify)
     monkeypatch.setattr(direct_search, "verify_front", slow_verify_front)
     monkeypatch.setattr(direct_search, "MANY_ARMS", 1)

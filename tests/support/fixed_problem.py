@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.cycle.cycle_path import CyclePaths
 from armwright.pareto import default_reference_point
 from armwright.problem.evaluation import Evaluation
@@ -24,7 +25,11 @@ from armwright.tasks.workspace import sample_regions
 class FixedProblem(Problem):
     """The tip comes a part of the way to each target; joint j turns by j steps; torques fall from base to tip."""
 
-    def physics(self, designs: Sequence[Design] | Array) -> Evaluation:
+    def physics(
+        self, designs: Sequence[Design] | Array | ArmArrays, case: int = 0, near: Array | None = None
+    ) -> Evaluation:
+        if case > 0 or isinstance(designs, ArmArrays):
+            return super().physics(designs, case, near)
         rows = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
         targets = self.task.target_positions
         built = self.space.designs(rows)

@@ -108,7 +108,7 @@ def test_objectives_of_clearance() -> None:
     for row in range(40):
         assert values[row, 0] == pytest.approx(sum(max(0.0, -at) for at in free[row]))
         assert values[row, 1] == pytest.approx(max(max(0.0, 0.1 - at) for at in free[row]))
-    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)).values, values)
+    assert np.array_equal(problem.evaluate(problem.space.matrix(designs)).values, values)
     for quantity in CLEARANCES:
         least = getattr(evaluation, quantity.name).min(axis=1)
         assert np.array_equal(quantity(evaluation), np.minimum(least, FAR))

@@ -76,7 +76,7 @@ def test_problem_carries_the_payload_of_its_task_and_factors_multiply_it() -> No
     designs = SPACE.sample(20, 1)
     arms = problem.arms(SPACE.matrix(designs))
     for case, factor in enumerate((1.0, 0.0, 1.5)):
-        evaluation = problem.physics_of_arms(arms, case)
+        evaluation = problem.physics(arms, case)
         for row, design in enumerate(designs):
             peer = carrying_peer(to_urdf(problem.arm(design)), body_of(BODY, factor))
             for t in range(len(POINTS)):

@@ -99,7 +99,7 @@ def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
         for first in range(0, len(rows), batch):
             part = slice(first, first + batch)
             arms = [mounted(described, Mounting.of(row)).arm for row in rows[part].tolist()]
-            losses[part] = _losses(problem, problem.physics_of_arms(stack_arms(arms)))
+            losses[part] = _losses(problem, problem.physics(stack_arms(arms)))
         return losses
 
     rows = DesignEncoding(parameters).random(RANDOM_PLACES, np.random.default_rng(derived_seed(seed, 0)))

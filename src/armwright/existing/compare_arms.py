@@ -241,7 +241,7 @@ def _compared(
     price: float | None,
 ) -> ComparedArm:
     """Evaluate an existing arm in its place; price: as stated [USD], in place of that of its parts."""
-    existing = ExistingArm(problem, problem.physics_of_arms(stack_arms([arm])), price)
+    existing = ExistingArm(problem, problem.physics(stack_arms([arm])), price)
     values, violated = existing.objectives, existing.violated
     unknown = [o.name for o, one in zip(problem.objectives, values, strict=True) if one is None]
     notes = [*notes, *(f"{name} unknown, so the arm cannot be compared with the front" for name in unknown)]

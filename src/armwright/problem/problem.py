@@ -26,8 +26,8 @@ from armwright.problem.objectives import (
     named_objectives,
 )
 from armwright.robot.arm import Arm
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.base_support import supported_space
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
 from armwright.spaces.tolerance import perturbed
@@ -226,53 +226,51 @@ class Problem:
         """The length of the longest possible arm, with its tool and all slides extended [m]."""
         return self.space.max_reach + self.task.tool.length
 
-    def evaluate(self, designs: Sequence[Design]) -> Outcomes:
+    def evaluate(
+        self, designs: Sequence[Design] | Array, measurements: Sequence[Measurement] | None = None
+    ) -> Outcomes:
         """Evaluate N designs: objectives and constraint violations, the worst of all cases and tolerances.
+
+        Args:
+            designs: N designs, or (N, P) their matrix, as `DesignSpace.matrix` returns it.
+            measurements: what the custom evaluator measured of each; None to call it, if there is one.
 
         Raises:
             SettingsError: a built-in objective or a violation is not a finite number.
         """
-        return self.outcomes_of(designs, [] if self.evaluator is None else list(map(self.measure, designs)))
+        is_matrix = isinstance(designs, np.ndarray)
+        matrix = self.space.normalised(designs) if is_matrix else self.space.matrix(designs)
+        if self.evaluator is None:
+            return self._evaluate(matrix, NO_MEASUREMENTS)
+        if measurements is None:
+            measurements = [self.measure(design) for design in (self.space.designs(matrix) if is_matrix else designs)]
+        failures = {row: one for row, one in enumerate(measurements) if isinstance(one, Failure)}
+        names = [objective.name for objective in self.evaluator.objectives]
+        nothing = (0.0,) * len(names)  # of failed ones
+        table = [nothing if isinstance(one, Failure) else one for one in measurements]
+        columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
+        found = self._evaluate(matrix, dict(zip(names, columns, strict=True)))
+        found.values[list(failures)] = np.inf
+        return Outcomes(found.values, found.violations, failures)
 
     def measure(self, design: Design) -> Measurement:
         """Return what the custom evaluator measures of a design, or why it fails."""
         assert self.evaluator is not None
         return self.evaluator.attempt(self.arm(design), self.task, design)
 
-    def outcomes_of(self, designs: Sequence[Design], measurements: Sequence[Measurement]) -> Outcomes:
-        """Evaluate N designs, given what the custom evaluator measured of each; nothing without one."""
-        failures = {row: one for row, one in enumerate(measurements) if isinstance(one, Failure)}
-        measured = NO_MEASUREMENTS
-        if self.evaluator is not None:
-            names = [objective.name for objective in self.evaluator.objectives]
-            nothing = (0.0,) * len(names)  # of failed ones
-            table = [nothing if isinstance(one, Failure) else one for one in measurements]
-            columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
-            measured = dict(zip(names, columns, strict=True))
-        found = self._evaluate(self.space.matrix(designs), measured)
-        found.values[list(failures)] = np.inf
-        return Outcomes(found.values, found.violations, failures)
-
-    def evaluate_matrix(self, matrix: Array) -> Outcomes:
-        """Evaluate a large number of designs, given as rows.
+    def physics(
+        self, designs: Sequence[Design] | Array | ArmArrays, case: int = 0, near: Array | None = None
+    ) -> Evaluation:
+        """Return the kinematics and statics of exact arms at all targets in one case.
 
         Args:
-            matrix: (N, P) as `DesignSpace.matrix` returns it. Custom evaluators are not called.
+            designs: N designs, (N, P) their matrix, which may lie outside the ranges of the space, or their arms.
+            case: the number of the case of the task.
+            near: postures as in `evaluate_arrays`.
         """
-        return self._evaluate(self.space.normalised(matrix), NO_MEASUREMENTS)
-
-    def physics(self, designs: Sequence[Design] | Array) -> Evaluation:
-        """Return the kinematics and statics of designs at all targets, exact and in the task's first case.
-
-        Args:
-            designs: N designs, or (N, P) their matrix, which may lie outside the ranges of the space.
-        """
-        matrix = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
-        return self.physics_of_arms(self.arms(matrix))
-
-    def physics_of_arms(self, arms: ArmArrays, case: int = 0, near: Array | None = None) -> Evaluation:
-        """Return the kinematics and statics of arms at all targets in one case; near as in `evaluate_arrays`."""
-        return evaluate_arrays(arms, self.scenes[case], self.device, near=near)
+        if not isinstance(designs, ArmArrays):
+            designs = self.arms(designs if isinstance(designs, np.ndarray) else self.space.matrix(designs))
+        return evaluate_arrays(designs, self.scenes[case], self.device, near=near)
 
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
@@ -319,11 +317,11 @@ class Problem:
     def _variants(self, matrix: Array) -> Iterator[Evaluation]:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
         for case in range(len(self.scenes)):
-            exact = self.physics(matrix) if case == 0 else self.physics_of_arms(self.arms(matrix), case)
+            exact = self.physics(matrix, case)
             yield exact
             near = exact.entry_postures
             for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
-                yield self.physics_of_arms(self.arms(rows), case, near)
+                yield self.physics(self.arms(rows), case, near)
 
     @cached_property
     def _postures(self) -> int:

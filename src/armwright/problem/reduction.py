@@ -55,7 +55,7 @@ def idle_joints(problem: Problem, matrix: Array) -> NDArray[np.bool_]:
 
 def _largest(problem: Problem, matrix: Array, case: int) -> Array:
     """Return (N, J) the largest distance of each joint from 0 at the targets and along the cycle of one case."""
-    evaluation = problem.physics_of_arms(problem.arms(matrix), case)
+    evaluation = problem.physics(matrix, case)
     largest = np.abs(evaluation.q).max(axis=1)
     if evaluation.cycle_paths is not None:
         for group in evaluation.cycle_paths.groups:

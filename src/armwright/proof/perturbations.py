@@ -131,7 +131,7 @@ def evaluate_survival(history: History, designs: Mapping[int, bool]) -> dict[int
     if not problem.constraints or not numbers:
         return {}
     matrix = problem.space.matrix([history.trials[number].design for number in numbers])
-    near = [problem.physics_of_arms(problem.arms(matrix), case).entry_postures for case in range(len(problem.scenes))]
+    near = [problem.physics(matrix, case).entry_postures for case in range(len(problem.scenes))]
     found: list[dict[Change, list[Broken]]] = [{} for _ in numbers]
     simulated: list[list[str]] = [[] for _ in numbers]
     for batch in (_moved(problem, matrix), *_loaded(problem, matrix)):

@@ -61,7 +61,7 @@ def sensitivities(problem: Problem, design: Design) -> tuple[Sensitivity, ...]:
     found = list(variations(problem.space, design))
     possible = [variation for variation in found if not variation.impossible]
     designs = [design, *(varied(problem.space, design, variation) for variation in possible)]
-    evaluation = problem.physics_of_arms(stack_arms([problem.arm(each) for each in designs]))
+    evaluation = problem.physics(stack_arms([problem.arm(each) for each in designs]))
     changes = [_changes(measure, evaluation) for measure in MEASURES]
     violations = problem.violations(evaluation)
     lines: list[Sensitivity] = []

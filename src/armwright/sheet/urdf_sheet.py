@@ -97,7 +97,7 @@ def urdf_sheet(
         arm = replace(arm, safety_factor=SAFETY_FACTOR)
         existing, payload, targets = None, 0.0, np.zeros((0, 3))
     else:
-        existing = ExistingArm(job.problem, job.problem.physics_of_arms(stack_arms([arm])), price)
+        existing = ExistingArm(job.problem, job.problem.physics(stack_arms([arm])), price)
         payload, targets = float(job.problem.task.payloads.max()), existing.evaluation.targets
     over_reach = reach_lines(arm, payload)
     sheet = DataSheet(

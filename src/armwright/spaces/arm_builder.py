@@ -1,120 +1,339 @@
-"""The arm that a design builds."""
+"""Designs, built into arms: many as stacked arrays, or one as an `Arm`.
 
-from dataclasses import replace
-from typing import cast
+There are N designs of up to M modules. A module has up to K joints at one place, K = 2 if the space has a module of two
+joints, else 1; its link follows the last joint. The D = M K joint slots of stacked arms are compacted: joints that an
+arm has come first.
+"""
 
-from armwright.robot.arm import Actuator, Arm, Axis, Joint, Link, Vector
-from armwright.robot.motor_body import MotorBody, placed_body
-from armwright.spaces.joint_modules import (
-    DIRECTIONS,
-    Direction,
-    Mount,
-    mounted,
-    mounted_body,
-    mounted_vector,
-)
-from armwright.spaces.parameters import Design
+from dataclasses import fields
+from functools import cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints, ratings_of
+from armwright.kinematics.arms.arm_arrays import FIXED, PRISMATIC, ArmArrays, Precision, exact_arms, stack_tools
+from armwright.kinematics.arms.columns import columns_of
+from armwright.kinematics.arms.motor_bodies import MotorBodies, bodies_in, body_values, without_bodies
+from armwright.kinematics.arms.rigid_bodies import Bodies, Tools
+from armwright.robot.arm import AXES, Arm, Joint, Link, Vector
+from armwright.robot.motor_body import placed_body
+from armwright.spaces.design_columns import DesignColumns, Indices
+from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS, mounted_body
 from armwright.spaces.space_schema import SpaceSchema
 from armwright.spaces.tool_mount import mounted_tools
-from armwright.tasks.tool import Tool
+from armwright.tasks.tool import NO_TOOL, Tool
+
+Bools = NDArray[np.bool_]
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
+_KINDS = {"revolute": 0, "prismatic": PRISMATIC, "fixed": FIXED}
+_ABSENT = -1  # no joint in this slot of a module
+_PLANS = np.full(
+    (len(MODULES), 2), _ABSENT
+)  # local motions of each module's joints; a single joint is in the last slot
+for _row, _module in zip(_PLANS, MODULES.values(), strict=True):
+    for _slot, (_kind, _axis) in enumerate(_module.joints, start=2 - len(_module.joints)):
+        _row[_slot] = _KINDS[_kind] + (0 if _kind == "fixed" else AXES.index(_axis))
+# (mounts, 3) the world axis that each local axis lies along, and 1 if it points the same way, else -1
+_WORLD_AXES = np.array([[AXES.index(world[1]) for world in row] for row in MOUNTS.values()])  # pyright: ignore[reportArgumentType]
+_SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row in MOUNTS.values()])
+_VECTORS = np.array(list(DIRECTIONS.values()))  # (directions, 3)
+_UPRIGHT = tuple(DIRECTIONS).index("+z")  # from the surface that the arm is mounted on to the first joint
 
-class ArmBuilder:
-    """Builder of the joints and links of one design; modules are counted from 0."""
 
-    def __init__(self, space: SpaceSchema, design: Design, tool: Tool) -> None:
-        self._space, self._design, self._params, self._tool = space, design, design.params, tool
-        self._modules = design.modules
-        self._lengths = design.links
-        self._mount: Mount = space.mount_of(design)
-        self._actuators = {actuator.name: actuator for actuator in space.arm_actuators}
+def stack_designs(
+    space: SpaceSchema, matrix: Array, tool: Tool = NO_TOOL, precision: Precision = "float32"
+) -> ArmArrays:
+    """Build the arms of a matrix of designs.
 
-    def arm(self) -> Arm:
-        """Return the arm."""
-        every = range(len(self._modules))
-        return Arm(
-            base=self._design.origin,
-            joints=tuple(self._joint(i, slot) for i in every for slot in range(len(self._modules[i].joints))),
-            links=tuple(link for i in every for link in self._links(i)),
-            tool=mounted_tools(self._tool)[self._mount],
-            base_mass=self._carried_mass(0),
-            safety_factor=self._space.safety_factor,
-            column=None if self._space.column is None else self._space.column.under(self._design.origin[2]),
+    Args:
+        space: The design space.
+        matrix: (N, P) designs, as from `DesignSpace.matrix`; values outside the ranges of the space are allowed.
+        tool: The tool at the end of each arm.
+        precision: The precision of the arrays that the kernels read.
+    """
+    return _Parts(space, matrix).stacked(tool, precision)
+
+
+def build_arm(space: SpaceSchema, matrix: Array, tool: Tool = NO_TOOL) -> Arm:
+    """Build the arm of a single design; matrix: (1, P)."""
+    return _Parts(space, matrix).arm(0, tool)
+
+
+class _Parts:
+    """Joints (N, M, K), links (N, M) and actuators of N designs, exact."""
+
+    def __init__(self, space: SpaceSchema, matrix: Array) -> None:
+        self._space = space
+        columns = self._columns = DesignColumns(space, matrix)
+        plan = _PLANS[columns.choices("joint", tuple(MODULES).index, space.joint_types[0])]  # (N, M, 2)
+        if all(len(MODULES[kind].joints) == 1 for kind in space.joint_types):
+            plan = plan[..., 1:]
+        self._has = np.broadcast_to(columns.present[..., None], plan.shape) & (plan != _ABSENT)
+        self._plan = np.where(self._has, plan, FIXED)  # motions in the axes of the base
+        self._moves = self._plan < FIXED  # joints that need an actuator
+        self._slides = (self._plan >= PRISMATIC) & self._moves
+        self._stroke = columns.reals("stroke", space.min_stroke)  # (N, M) [m]
+        actuators = space.arm_actuators
+        self._motor = (
+            columns.choices("motor", [a.name for a in actuators].index, actuators[0].name) if actuators else None
+        )
+        self._direction = columns.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
+        self._weigh()
+
+    def _weigh(self) -> None:
+        """Find the masses of links, and of the rails and actuators that modules add to the end of the link before."""
+        space, columns, count = self._space, self._columns, self._moves.sum(axis=2)
+        self._rails = np.where(self._slides[..., -1], space.link_mass(self._stroke, columns.tubes), 0.0)
+        each = 0.0 if self._motor is None else _catalogue(space)[0][self._motor]
+        self._carried = self._rails + count * (each + space.bracket_mass)
+        self._mass = np.where(columns.present, space.link_mass(columns.links, columns.tubes), 0.0)
+        vectors = _rotate(_VECTORS[self._direction], columns.mount)
+        self._middle = vectors * (columns.links / 2)[..., None]
+        self._offset = vectors * columns.links[..., None]
+        self._end_mass = np.concatenate([self._carried[:, 1:], np.zeros((columns.n, 1))], axis=1)
+        self._end_shift = self._shifts()
+
+    def _shifts(self) -> Array | float:
+        """Return the (N, M, 3) vectors from the end of each link to the centre of the mass carried there [m]."""
+        rails, carried = self._rails, self._carried
+        if not rails.any():
+            return 0.0
+        share = np.where(rails > 0.0, rails / np.where(carried > 0.0, carried, 1.0), 0.0)
+        local = np.eye(3)[self._plan[..., -1] % PRISMATIC] * (share * (self._stroke / 2))[..., None]
+        shifts = np.zeros_like(local)
+        shifts[:, :-1] = _rotate(local, self._columns.mount)[:, 1:]
+        return shifts
+
+    def _limits(self, sign: Array) -> tuple[Array, Array]:
+        """Return (N, M, K) lower and upper limits [rad] or [m]; sign: 1 if an axis of the base is one of the world."""
+        space, (low, high) = self._space, self._space.joint_range
+        if space.limit is not None:
+            upper = self._columns.reals("limit", space.limit[0])[..., None]
+            lower = -upper
+        else:
+            lower, upper = np.full((1, 1, 1), low), np.full((1, 1, 1), high)
+        lower = np.where(self._plan < PRISMATIC, lower, np.where(self._moves, 0.0, -1.0))
+        upper = np.where(self._plan < PRISMATIC, upper, np.where(self._moves, self._stroke[..., None], 1.0))
+        return np.where(sign < 0.0, 0.0 - upper, lower), np.where(sign < 0.0, 0.0 - lower, upper)
+
+    def _world_axes(self) -> tuple[Indices, Array]:
+        """Return the (N, M, K) world axis of each joint, and its sign (1 or -1) relative to the axis of the base."""
+        own, mount = self._plan % PRISMATIC, self._columns.mount
+        if not mount.any():
+            return own, np.ones(own.shape)
+        return _WORLD_AXES[mount[:, None, None], own], _SIGNS[mount[:, None, None], own]
+
+    def _columns_below(self) -> Array:
+        """Return the (N,) lengths of the columns below the bases [m]."""
+        column = self._space.column
+        return np.zeros(self._columns.n) if column is None else column.lengths(self._columns.matrix[:, 2])
+
+    def stacked(self, tool: Tool, precision: Precision) -> ArmArrays:
+        """Return the arms, stacked."""
+        space, columns, n_slots = self._space, self._columns, self._plan.shape[2]
+        axis, sign = self._world_axes()
+        lower, upper = self._limits(sign)
+        bodies, com = self._bodies()
+        per_joint: dict[str, Any] = {
+            "motion": np.where(self._moves, self._plan // PRISMATIC * PRISMATIC + axis, FIXED),
+            "lower": lower,
+            "upper": upper,
+            "travel": np.where(self._slides, space.travel, 1.0),
+            "com": _in_last_slot(com, n_slots),
+            "total_mass": _in_last_slot(bodies.total_mass, n_slots),
+            "link_radius": _in_last_slot(self._of_links("radius", 0.0), n_slots),
+        }
+        for name in ("bending_stiffness", "torsional_stiffness"):
+            per_joint[name] = _in_last_slot(self._of_links(name, np.inf), n_slots, np.inf)
+        per_joint |= {f"body_{f.name}": _in_last_slot(getattr(bodies, f.name), n_slots) for f in fields(Bodies)}
+        if self._motor is not None:
+            ratings = np.repeat(_catalogue(space)[2][self._motor][:, :, None], n_slots, axis=2)
+            ratings[~self._moves] = FIXED_RATINGS
+            per_joint["ratings"] = ratings
+        if space.has_motor_bodies:
+            per_joint |= {f"motor_{name}": values for name, values in self._motor_bodies().items()}
+        present = _flatten(self._has)
+        flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
+        below, column = self._columns_below(), space.column
+        prices = space.tube_values("price_per_metre")[columns.tubes] * columns.links
+        return exact_arms(
+            precision,
+            base=columns.matrix[:, :3],
+            motion=np.ascontiguousarray(flat["motion"], dtype=np.int32),
+            lower=flat["lower"],
+            upper=flat["upper"],
+            offset=flat["body_offset"].copy(),
+            com=flat["com"],
+            mass=flat["total_mass"],
+            radius=flat["link_radius"],
+            bending_stiffness=flat["bending_stiffness"],
+            torsional_stiffness=flat["torsional_stiffness"],
+            tool=_stacked_tools(tool)[columns.mount],
+            n_joints=present.sum(axis=1).astype(np.int32),
+            travel=flat["travel"],
+            length=np.cumsum(columns.links, axis=1)[:, -1],
+            base_mass=self._carried[:, 0] + (0.0 if column is None else column.mass_per_metre * below),
+            structure_price=np.cumsum(prices, axis=1)[:, -1]
+            + (0.0 if column is None else column.price_per_metre * below),
+            bodies=Bodies(**{f.name: flat[f"body_{f.name}"] for f in fields(Bodies)}),
+            actuation=self._actuation(flat),
+            motor_bodies=bodies_in({f.name: flat[f"motor_{f.name}"] for f in fields(MotorBodies)}, precision)
+            if space.has_motor_bodies
+            else None,
+            columns=None if column is None else columns_of(column.outer_diameter, below, precision),
         )
 
-    def _joint(self, i: int, slot: int) -> Joint:
-        kind, local_axis = self._modules[i].joints[slot]
-        axis, sign = mounted(local_axis, self._mount)
-        if kind == "fixed":
-            return Joint(kind, axis)
-        lower, upper = self._limits(i)
-        if sign < 0.0:
-            lower, upper = 0.0 - upper, 0.0 - lower  # no -0.0
-        travel = self._space.travel if kind == "prismatic" else 1.0
-        return Joint(kind, axis, lower, upper, self._actuator(i), travel, self._body(i, local_axis))
+    def _of_links(self, name: str, without: float) -> Array:
+        """Return the (N, M) values of links, from those of the tubes; `without` for links without length."""
+        return np.where(self._columns.links > 0.0, self._space.tube_values(name)[self._columns.tubes], without)
 
-    def _body(self, i: int, local_axis: Axis) -> MotorBody | None:
-        """Return the body of the actuator of a module, if it counts."""
-        actuator = self._actuator(i)
-        if not self._space.motor_bodies or actuator is None or actuator.shape is None:
+    def _bodies(self) -> tuple[Bodies, Array]:
+        """Return the links as bodies, (N, M, ...) each, and (N, M, 3) their centres of mass from the joint [m]."""
+        mass, end_mass, place = self._mass, self._end_mass, self._offset + self._end_shift
+        total = mass + end_mass
+        both = mass[..., None] * self._middle + end_mass[..., None] * place
+        com = np.where(end_mass[..., None] > 0.0, both / np.where(total > 0.0, total, 1.0)[..., None], self._middle)
+        radius = np.where(self._columns.present, self._space.tube_values("radius")[self._columns.tubes], 0.0)
+        return Bodies(mass, self._middle, self._offset, radius, end_mass, place), com
+
+    def _actuation(self, flat: dict[str, Any]) -> Actuation | None:
+        if self._motor is None:
             return None
-        carrier = DIRECTIONS[self._direction(i - 1) if i else "+z"]
-        return mounted_body(placed_body(actuator.shape, local_axis, carrier), self._mount)
+        count, prices = self._moves.sum(axis=2), _catalogue(self._space)[1]
+        price = np.where(count > 0, count * prices[self._motor], 0.0).sum(axis=1)
+        factor = np.full(self._columns.n, self._space.safety_factor)
+        return actuation_at_joints(flat["ratings"], flat["travel"], price, factor)
 
-    def _limits(self, i: int) -> tuple[float, float]:
-        """Return the joint limits of a module along its local axis [rad] or [m]."""
-        if self._modules[i].is_prismatic:
-            return 0.0, self._stroke(i)
-        if self._space.limit is None:
-            return self._space.joint_range
-        limit = float(self._params.get(f"limit_{i + 1}", self._space.limit[0]))
-        return -limit, limit
+    def _carriers(self) -> Indices:
+        """Return the (N, M) direction of the link before each module, or from the surface to the first joint."""
+        return np.concatenate([np.full((self._columns.n, 1), _UPRIGHT), self._direction[:, :-1]], axis=1)
 
-    def _links(self, i: int) -> list[Link]:
-        """Return the links of a module: massless ones between its joints, then its own."""
-        x, y, z = mounted_vector(DIRECTIONS[self._direction(i)], self._mount)
-        length, tube = self._lengths[i], self._space.link_section.options[self._space.tube_of(self._design, i)]
-        link = tube.link((x * length, y * length, z * length), self._link_mass(i, length), length)
-        if i + 1 < len(self._modules):
-            link = replace(link, end_mass=self._carried_mass(i + 1), end_shift=self._carried_shift(i + 1))
-        return [tube.link(ORIGIN, 0.0, 0.0)] * (len(self._modules[i].joints) - 1) + [link]
+    def _motor_bodies(self) -> dict[str, NDArray[Any]]:
+        """Return the bodies of actuators by field of `MotorBodies`, (N, M, 1, ...)."""
+        plan, mount = self._plan[..., 0], self._columns.mount[:, None]
+        values = without_bodies(*self._plan.shape)
+        for name, table in _body_table(self._space).items():
+            found = table[self._motor, plan % PRISMATIC, self._carriers(), mount]
+            values[name][self._moves] = found[self._moves[..., 0]]
+        return values
 
-    def _link_mass(self, i: int, length: float) -> float:
-        """Return the mass of this length of a module's tube [kg]."""
-        return float(self._space.link_mass(length, self._space.tube_of(self._design, i)))
+    def arm(self, row: int, tool: Tool) -> Arm:
+        """Return the arm of a row."""
+        space, columns = self._space, self._columns
+        x, y, z = columns.matrix[row, :3].tolist()
+        return Arm(
+            base=(x, y, z),
+            joints=self._arm_joints(row),
+            links=tuple(link for i in range(int(columns.present[row].sum())) for link in self._arm_links(row, i)),
+            tool=mounted_tools(tool)[tuple(MOUNTS)[int(columns.mount[row])]],
+            base_mass=float(self._carried[row, 0]),
+            safety_factor=space.safety_factor,
+            column=None if space.column is None else space.column.under(z),
+        )
 
-    def _direction(self, i: int) -> Direction:
-        return cast("Direction", self._params.get(f"direction_{i + 1}", self._space.link_directions[0]))
+    def _arm_joints(self, row: int) -> tuple[Joint, ...]:
+        space, mount = self._space, tuple(MOUNTS)[int(self._columns.mount[row])]
+        axes, sign = self._world_axes()
+        lower, upper = self._limits(sign)
+        carriers = tuple(DIRECTIONS.values())
+        joints: list[Joint] = []
+        for i, slot in np.argwhere(self._has[row]).tolist():
+            here, motion = (row, i, slot), int(self._plan[row, i, slot])
+            if motion == FIXED:
+                joints.append(Joint("fixed", AXES[int(_WORLD_AXES[self._columns.mount[row], AXES.index("z")])]))
+                continue
+            actuator = None if self._motor is None else space.arm_actuators[int(self._motor[row, i])]
+            body = None
+            if space.has_motor_bodies and actuator is not None and actuator.shape is not None:
+                carrier = carriers[int(self._carriers()[row, i])]
+                body = mounted_body(placed_body(actuator.shape, AXES[motion % PRISMATIC], carrier), mount)
+            kind, travel = ("revolute", 1.0) if motion < PRISMATIC else ("prismatic", space.travel)
+            limits = float(lower[here]), float(upper[here])
+            joints.append(Joint(kind, AXES[int(axes[here])], *limits, actuator, travel, body))
+        return tuple(joints)
 
-    def _stroke(self, i: int) -> float:
-        return float(self._params.get(f"stroke_{i + 1}", self._space.min_stroke))
+    def _arm_links(self, row: int, i: int) -> list[Link]:
+        """Return the links of module `i`: massless ones between its joints, then its own."""
+        tube = self._space.link_section.options[int(self._columns.tubes[row, i])]
+        x, y, z = self._offset[row, i].tolist()
+        shift = ORIGIN
+        if i + 1 < self._columns.modules and self._rails[row, i + 1] > 0.0:
+            u, v, w = np.broadcast_to(self._end_shift, self._offset.shape)[row, i].tolist()
+            shift = (u, v, w)
+        mass, length, end_mass = (float(each[row, i]) for each in (self._mass, self._columns.links, self._end_mass))
+        between = int(self._has[row, i].sum()) - 1
+        return [tube.link(ORIGIN, 0.0, 0.0)] * between + [tube.link((x, y, z), mass, length, end_mass, shift)]
 
-    def _actuator(self, i: int) -> Actuator | None:
-        """Return the actuator of each joint of a module."""
-        if not self._actuators:
-            return None
-        return self._actuators[str(self._params.get(f"motor_{i + 1}", self._space.arm_actuators[0].name))]
 
-    def _carried_mass(self, i: int) -> float:
-        """Return the mass at the start of a module: its actuators with their brackets, and its rail [kg]."""
-        module = self._modules[i]
-        if not module.is_actuated:
-            return self._rail_mass(i)
-        actuator = self._actuator(i)
-        mass = 0.0 if actuator is None else actuator.mass
-        return self._rail_mass(i) + len(module.joints) * (mass + self._space.bracket_mass)
+@cache
+def _catalogue(space: SpaceSchema) -> tuple[Array, Array, Array]:
+    """Return mass [kg], price [USD] and (A, R) ratings of the A actuators of a space."""
+    actuators = space.arm_actuators
+    return (
+        np.array([actuator.mass for actuator in actuators]),
+        np.array([np.nan if actuator.price is None else actuator.price for actuator in actuators]),
+        np.array([ratings_of(actuator) for actuator in actuators]),
+    )
 
-    def _rail_mass(self, i: int) -> float:
-        return self._link_mass(i, self._stroke(i)) if self._modules[i].is_prismatic else 0.0
 
-    def _carried_shift(self, i: int) -> Vector:
-        """Return the vector from the start of a module to the centre of the mass there: a rail's is at its middle."""
-        rail = self._rail_mass(i)
-        if not rail:
-            return ORIGIN
-        ((_, axis),) = self._modules[i].joints
-        distance = rail / self._carried_mass(i) * (self._stroke(i) / 2)
-        x, y, z = mounted_vector(DIRECTIONS[cast("Direction", f"+{axis}")], self._mount)
-        return (distance * x, distance * y, distance * z)
+@cache
+def _body_table(space: SpaceSchema) -> dict[str, NDArray[Any]]:
+    """Return the values of bodies by actuator, local axis of the joint, direction of the link before and mount."""
+    shapes = [actuator.shape for actuator in space.arm_actuators]
+    values = without_bodies(len(shapes), len(AXES), len(DIRECTIONS), len(MOUNTS))
+    cases = product(enumerate(shapes), enumerate(AXES), enumerate(DIRECTIONS.values()), enumerate(MOUNTS))
+    for (a, shape), (i, axis), (d, carrier), (m, mount) in cases:
+        if shape is not None and mount in space.mount:
+            body = mounted_body(placed_body(shape, axis, carrier), mount)
+            for name, value in zip(values, body_values(body), strict=True):
+                values[name][a, i, d, m] = value
+    return values
+
+
+@cache
+def _stacked_tools(tool: Tool) -> Tools:
+    """Return a tool for each mount."""
+    return stack_tools(list(mounted_tools(tool).values()))
+
+
+def _rotate(vectors: Array, mount: Indices) -> Array:
+    """Rotate (N, M, 3) vectors from base axes into world axes."""
+    if not mount.any():  # all on a floor
+        return np.array(vectors)
+    rotated = np.zeros(vectors.shape)
+    for axis in range(3):
+        world, sign = _WORLD_AXES[mount, axis], _SIGNS[mount, axis]
+        np.put_along_axis(rotated, np.broadcast_to(world[:, None, None], (*vectors.shape[:2], 1)),
+                          (sign[:, None] * vectors[..., axis])[..., None], axis=2)  # fmt: skip
+    return rotated
+
+
+def _in_last_slot(values: Array, n_slots: int, fill: float = 0.0) -> Array:
+    """Return values of modules (N, M, ...) in the last of K slots of each (N, M, K, ...); `fill` in the others."""
+    if n_slots == 1:
+        return values[:, :, None]
+    n, modules, *size = values.shape
+    slots = np.full((n, modules, n_slots, *size), fill)
+    slots[:, :, -1] = values
+    return slots
+
+
+def _flatten(values: Any) -> Any:
+    """Return (N, M, K, ...) as (N, M K, ...)."""
+    n, modules, n_slots, *size = values.shape
+    return values.reshape(n, modules * n_slots, *size)
+
+
+def _compact(arrays: dict[str, Any], present: Bools) -> dict[str, Any]:
+    """Move the joints (N, D, ...) that a design has to the front, in their order."""
+    if present.all():
+        return arrays
+    order = np.argsort(~present, axis=1, kind="stable")
+    rows = np.arange(len(present))[:, None]
+    return {name: values[rows, order] for name, values in arrays.items()}

@@ -16,7 +16,7 @@ from pydantic import model_validator
 from armwright.arrays import Array
 from armwright.exceptions import DesignError, SpaceError, did_you_mean
 from armwright.robot.arm import Arm
-from armwright.spaces.arm_builder import ArmBuilder
+from armwright.spaces.arm_builder import build_arm
 from armwright.spaces.custom_parameters import NUMBERED
 from armwright.spaces.design_parameters import ConditionalParameter, check_parameters, conditional_parameters
 from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, ParameterValue
@@ -207,7 +207,7 @@ class DesignSpace(SpaceSchema, frozen=True):
         """
         if not self.min_joints <= len(design.joints) == len(design.links) <= self.max_joints:
             self.design(design.params)  # raises the reason
-        return ArmBuilder(self, design, tool).arm()
+        return build_arm(self, self.matrix([design]), tool)
 
     @property
     def is_toy(self) -> bool:

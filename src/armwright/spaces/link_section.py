@@ -34,7 +34,9 @@ class LinkTube:
     torsional_stiffness: float | None = None
     price_per_metre: float = 0.0
 
-    def link(self, offset: Vector, mass: float, length: float) -> Link:
+    def link(
+        self, offset: Vector, mass: float, length: float, end_mass: float = 0.0, end_shift: Vector = (0.0, 0.0, 0.0)
+    ) -> Link:
         """Return a link of this tube, with its centre of mass halfway along `offset` [m]."""
         x, y, z = offset
         return Link(
@@ -42,6 +44,8 @@ class LinkTube:
             mass,
             (x / 2, y / 2, z / 2),
             self.radius,
+            end_mass,
+            end_shift,
             bending_stiffness=self.bending_stiffness,
             torsional_stiffness=self.torsional_stiffness,
             wall=self.wall,

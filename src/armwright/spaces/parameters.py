@@ -122,8 +122,11 @@ class CategoricalParameter:
         return value if value in self.choices else self.default
 
     def encode(self, value: Any) -> float:
-        """Return `value` as an entry of a design matrix: its index."""
-        return self.choices.index(value)
+        """Return `value` as an entry of a design matrix: its index; DesignError if it is not one of the choices."""
+        try:
+            return self.choices.index(value)
+        except ValueError:
+            return self.choices.index(self.check(value))  # which raises the reason
 
     def decode(self, number: float) -> str:
         """Return the value that an entry of a design matrix stands for."""

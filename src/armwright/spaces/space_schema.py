@@ -204,11 +204,6 @@ class SpaceSchema(
         """Return the surface that the arm of a design is mounted on."""
         return cast("Mount", design.mount or self.mount[0])
 
-    def tube_of(self, design: Design, module: int) -> int:
-        """Return the index of the tube of a design's module, counted from 0."""
-        name = design.params.get(f"tube_{module + 1}", design.params.get("tube", self.tube_names[0]))
-        return self.tube_names.index(str(name))
-
     @property
     def max_reach(self) -> float:
         """The length of the longest possible arm without a tool, with all slides extended [m]."""

@@ -140,26 +140,20 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         stiffness[:, i, own] = np.transpose([_stiffness(link) for link in arm.links])
         for part in fields(Bodies):
             getattr(bodies, part.name)[i, own] = [getattr(link, part.name) for link in arm.links]
-    n_joints = np.array([len(arm.joints) for arm in arms], dtype=np.int32)
-    tool = stack_tools([arm.tool for arm in arms])
-    add_tools(tool, n_joints - 1, offset, com, mass)
-    return ArmArrays(
-        base=np.array([arm.base for arm in arms], dtype=precision),
+    return exact_arms(
+        precision,
+        base=np.array([arm.base for arm in arms]),
         motion=motion,
-        lower=-round_down(-lower, precision),
-        upper=round_down(upper, precision),
-        offset=offset.astype(precision),
-        com=com.astype(precision),
-        mass=mass.astype(precision),
-        radius=radius.astype(precision),
+        lower=lower,
+        upper=upper,
+        offset=offset,
+        com=com,
+        mass=mass,
+        radius=radius,
         bending_stiffness=stiffness[0],
         torsional_stiffness=stiffness[1],
-        tool=tool,
-        tool_axis=tool.axis.astype(precision),
-        tool_side=tool.side.astype(precision),
-        payload_center=np.zeros((n, 3), dtype=precision),
-        payload_gyration=np.zeros((n, 3, 3)),
-        n_joints=n_joints,
+        tool=stack_tools([arm.tool for arm in arms]),
+        n_joints=np.array([len(arm.joints) for arm in arms], dtype=np.int32),
         travel=travel,
         length=np.array([arm.length for arm in arms]),
         base_mass=np.array([arm.standing_mass for arm in arms]),
@@ -171,25 +165,35 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
     )
 
 
+def exact_arms(
+    precision: Precision, *, tool: Tools, n_joints: Ints, lower: Array, upper: Array, offset: Array, com: Array,
+    mass: Array, base: Array, radius: Array, **others: Any,
+) -> ArmArrays:  # fmt: skip
+    """Return arms in a precision, from exact values of their fields.
+
+    The last links get the tools, in place, which `offset`, `com` and `mass` lack. No limit is rounded to a wider one.
+    """
+    last = np.arange(len(n_joints)), n_joints - 1
+    if tool.mass.any():
+        mass[last], com[last] = joined(mass[last], com[last], tool.mass, offset[last] + tool.com)
+    offset[last] += tool.tip
+    floats = {"base": base, "offset": offset, "com": com, "mass": mass, "radius": radius}
+    floats |= {"tool_axis": tool.axis, "tool_side": tool.side}
+    return ArmArrays(
+        **{name: np.ascontiguousarray(values, dtype=precision) for name, values in floats.items()},
+        lower=-_round_down(-lower, precision),
+        upper=_round_down(upper, precision),
+        tool=tool,
+        payload_center=np.zeros((len(n_joints), 3), dtype=precision),
+        payload_gyration=np.zeros((len(n_joints), 3, 3)),
+        n_joints=n_joints,
+        **others,
+    )
+
+
 def stack_tools(tools: Sequence[MountedTool]) -> Tools:
     """Stack tools into arrays."""
     return Tools(*(np.array([getattr(tool, part.name) for tool in tools]) for part in fields(Tools)))
-
-
-def add_tools(tools: Tools, last: NDArray[np.integer], offset: Array, com: Array, mass: Array) -> None:
-    """Add tools to the last links of N arms, in place.
-
-    Args:
-        tools: The tools.
-        last: (N,) index of the last link.
-        offset: (N, D, 3) of the links [m].
-        com: (N, D, 3) [m].
-        mass: (N, D) [kg].
-    """
-    own = np.arange(len(last)), last
-    if tools.mass.any():
-        mass[own], com[own] = joined(mass[own], com[own], tools.mass, offset[own] + tools.com)
-    offset[own] += tools.tip
 
 
 def carrying(arms: ArmArrays, shape: LoadShape) -> ArmArrays:
@@ -203,7 +207,7 @@ def carrying(arms: ArmArrays, shape: LoadShape) -> ArmArrays:
     return replace(arms, payload_center=center, payload_gyration=gyration)
 
 
-def round_down(limits: Array, precision: Precision) -> Any:
+def _round_down(limits: Array, precision: Precision) -> Any:
     """Return upper limits in this precision, none above its exact value.
 
     2.4 rad in float32 is 1e-7 rad above the limit, which no joint angle may exceed.

@@ -10,6 +10,7 @@ from armwright.kinematics.arms.arm_arrays import PRISMATIC, ArmArrays, stack_arm
 from armwright.kinematics.arms.motor_bodies import body_values
 from armwright.robot.arm import Arm
 from armwright.robot.axes import Axis
+from armwright.rotations import rotation_about
 from armwright.tasks.obstacles import Solid
 
 
@@ -33,9 +34,7 @@ def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
     n, k, dof = q.shape
     revolute, prismatic = arms.motion < PRISMATIC, arms.prismatic  # (N, D)
     local = np.where((revolute | prismatic)[..., None], np.eye(3)[arms.motion % PRISMATIC], 0.0)  # (N, D, 3)
-    cross = np.cross(local[:, :, None], np.eye(3)).swapaxes(-1, -2)[:, None]  # (N, 1, D, 3, 3): v ↦ local x v
-    angle = np.where(revolute[:, None], q, 0.0)[..., None, None]
-    rotated = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)  # Rodrigues' formula
+    rotated = rotation_about(local[:, None], np.where(revolute[:, None], q, 0.0))
     displacement = np.where(prismatic[:, None], q, 0.0)[..., None]
     rotation, position, axis = np.empty((n, k, dof, 3, 3)), np.empty((n, k, dof, 3)), np.empty((n, k, dof, 3))
     frame = np.broadcast_to(np.eye(3), (n, k, 3, 3))

@@ -2,29 +2,16 @@
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
 from armwright.kinematics.arms.arm_arrays import PRISMATIC, Precision
 
 
-@dataclass(frozen=True)
-class FrameMath:
-    """Types and functions in one precision."""
-
-    real: Any
-    Vector3: Any
-    Matrix3: Any
-    translate: Any
-    rotate: Any
-    axis_of: Any
-
-
 @cache
-def frame_math(precision: Precision) -> FrameMath:
+def frame_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
     real, Vector3, Matrix3 = {
         "float32": (wp.float32, wp.vec3f, wp.mat33f),
@@ -54,6 +41,16 @@ def frame_math(precision: Precision) -> FrameMath:
         return x, y, z
 
     @wp.func
+    def advance(motion: int, offset: Vector3, q: real, p: Vector3, x: Vector3, y: Vector3, z: Vector3):
+        """Return the position of a joint at a value [rad] or [m], that of the next joint, and the frame between them.
+
+        p: where the joint is at 0.  x, y, z: the frame before it.
+        """
+        place = translate(motion, p, q, x, y, z)
+        x, y, z = rotate(motion, x, y, z, wp.sin(q), wp.cos(q))
+        return place, place + offset[0] * x + offset[1] * y + offset[2] * z, x, y, z
+
+    @wp.func
     def axis_of(motion: int, x: Vector3, y: Vector3, z: Vector3):
         """Return the axis of a joint in the world; 0 for a fixed joint."""
         if motion == 0 or motion == wp.static(PRISMATIC):
@@ -64,4 +61,4 @@ def frame_math(precision: Precision) -> FrameMath:
             return z
         return Vector3()
 
-    return FrameMath(real, Vector3, Matrix3, translate, rotate, axis_of)
+    return SimpleNamespace(real=real, Vector3=Vector3, Matrix3=Matrix3, advance=advance, axis_of=axis_of)

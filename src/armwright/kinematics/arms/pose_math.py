@@ -3,29 +3,19 @@
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
 import math
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
 from armwright.kinematics.arms.arm_arrays import PRISMATIC, Motions, Precision
-from armwright.kinematics.arms.ik_math import ik_math
-
-
-@dataclass(frozen=True)
-class PoseMath:
-    """Functions of one variant."""
-
-    dot: Any
-    angular: Any
-    error_rotation: Any
+from armwright.kinematics.arms.lane_math import lane_math
 
 
 @cache
-def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
+def pose_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespace:
     """Return the functions for a precision, a number of lanes and joint motions, as in `ik_math`."""
-    base = ik_math(precision, lanes, motions)
+    base = lane_math(precision, lanes)
     real, Vector3, Lane = base.real, base.Vector3, base.Lane
     roots, at_least, select, norm_squared = base.roots, base.at_least, base.select, base.norm_squared
 
@@ -81,6 +71,18 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
     @wp.func
     def dot(ax: Lane, ay: Lane, az: Lane, bx: Lane, by: Lane, bz: Lane):
         return wp.cw_mul(ax, bx) + wp.cw_mul(ay, by) + wp.cw_mul(az, bz)
+
+    @wp.func
+    def angular_columns(
+        motion: int, has_axis: Lane, has_frame: Lane, sx: Lane, sy: Lane, sz: Lane, tx: Lane, ty: Lane, tz: Lane,
+        fx: Lane, fy: Lane, fz: Lane, ax: Lane, ay: Lane, az: Lane,
+    ):  # fmt: skip
+        """Return how much a joint rotates about the tool's own x, y and z, which are s, t and f in the world."""
+        return (
+            wp.cw_mul(has_axis, angular(motion, dot(sx, sy, sz, ax, ay, az))),
+            wp.cw_mul(has_axis, angular(motion, dot(tx, ty, tz, ax, ay, az))),
+            wp.cw_mul(has_frame, angular(motion, dot(fx, fy, fz, ax, ay, az))),
+        )
 
     @wp.func
     def larger_row(
@@ -159,4 +161,4 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         )
         return sx, sy, sz, tx, ty, tz, fx, fy, fz, angle, rx, ry, rz
 
-    return PoseMath(dot, angular, error_rotation)
+    return SimpleNamespace(angular_columns=angular_columns, error_rotation=error_rotation)

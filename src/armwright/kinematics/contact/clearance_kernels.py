@@ -6,9 +6,8 @@ branches: a bound excludes distant obstacles. docs/method.md §13 defines the di
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -18,24 +17,12 @@ from armwright.kinematics.arms.ik_math import kernel
 from armwright.kinematics.contact.solid_math import solid_math
 
 
-@dataclass(frozen=True)
-class ClearanceKernels:
-    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
-
-    real: Any
-    Vector3: Any
-    Matrix3: Any
-    link_axes: Any
-    self_clearance: Any
-    obstacle_clearance: Any
-
-
 @cache
-def clearance_kernels(precision: Precision) -> ClearanceKernels:
+def clearance_kernels(precision: Precision) -> SimpleNamespace:
     """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
     base = frame_math(precision)
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
-    translate, rotate = base.translate, base.rotate
+    advance = base.advance
     solids = solid_math(precision)
     signed_distance, along_segment = solids.signed_distance, solids.along_segment
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
@@ -59,12 +46,8 @@ def clearance_kernels(precision: Precision) -> ClearanceKernels:
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
         p = base[arm]
         for j in range(motion.shape[1]):
-            value = q[arm, target, j]
-            p = translate(motion[arm, j], p, value, x, y, z)
-            x, y, z = rotate(motion[arm, j], x, y, z, wp.sin(value), wp.cos(value))
-            starts[arm, target, j] = p
-            along = offset[arm, j]
-            p = p + along[0] * x + along[1] * y + along[2] * z
+            place, p, x, y, z = advance(motion[arm, j], offset[arm, j], q[arm, target, j], p, x, y, z)
+            starts[arm, target, j] = place
             ends[arm, target, j] = p
 
     @wp.func
@@ -179,4 +162,7 @@ def clearance_kernels(precision: Precision) -> ClearanceKernels:
                                 nearest = wp.min(nearest, distance)
         clearance[arm, target] = nearest
 
-    return ClearanceKernels(real, Vector3, Matrix3, link_axes, self_clearance, obstacle_clearance)
+    return SimpleNamespace(
+        real=real, Vector3=Vector3, Matrix3=Matrix3,
+        link_axes=link_axes, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance,
+    )  # fmt: skip

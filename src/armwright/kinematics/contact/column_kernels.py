@@ -6,9 +6,8 @@ pairs. docs/method.md §13 defines the distances and which pairs count.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -19,16 +18,8 @@ from armwright.kinematics.contact.convex_math import convex_math
 from armwright.kinematics.contact.solid_math import CYLINDER, solid_math
 
 
-@dataclass(frozen=True)
-class ColumnKernels:
-    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
-
-    link_clearance: Any
-    motor_clearance: Any
-
-
 @cache
-def column_kernels(precision: Precision) -> ColumnKernels:
+def column_kernels(precision: Precision) -> SimpleNamespace:
     """Return the kernels in this precision, for N arms with D joints at T targets."""
     base, solids, convex = frame_math(precision), solid_math(precision), convex_math(precision)
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
@@ -105,4 +96,4 @@ def column_kernels(precision: Precision) -> ColumnKernels:
                     is_at_rest = 0
             clearance[arm, target] = nearest
 
-    return ColumnKernels(link_clearance, motor_clearance)
+    return SimpleNamespace(link_clearance=link_clearance, motor_clearance=motor_clearance)

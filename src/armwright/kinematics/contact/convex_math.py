@@ -12,33 +12,25 @@ and Automation 4, 1988) finds the maximum.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
 from armwright.kinematics.arms.arm_arrays import Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.contact.simplex_math import simplex_math
-from armwright.kinematics.contact.solid_math import CYLINDER
+from armwright.kinematics.contact.solid_math import CYLINDER, GROUND, SPHERE, solid_math
 
 ITERATIONS = 40  # of the search for the nearest points; boxes take about 5, cylinders about 15
 ACCURACY = 1e-5  # [m] below the distance at most
 
 
-@dataclass(frozen=True)
-class ConvexMath:
-    """Functions in one precision."""
-
-    extent: Any
-    separation: Any
-
-
 @cache
-def convex_math(precision: Precision) -> ConvexMath:
+def convex_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
     base, simplex = frame_math(precision), simplex_math(precision)
+    signed_distance = solid_math(precision).signed_distance
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
     Simplex, nearest_point = simplex.Simplex, simplex.nearest_point
     zero, one = real(0.0), real(1.0)
@@ -141,4 +133,16 @@ def convex_math(precision: Precision) -> ConvexMath:
             distance = nearer
         return bound
 
-    return ConvexMath(extent, separation)
+    @wp.func
+    def from_obstacle(
+        kind: int, half: Vector3, into: Matrix3, d: Vector3, shape: int, size: Vector3, frame: Matrix3, enough: real
+    ):
+        """Return the distance of a body from an obstacle whose middle is at d from the body's, in the world."""
+        if shape == wp.static(GROUND):
+            up = wp.transpose(frame) * Vector3(zero, zero, one)
+            return -wp.dot(d, up) - extent(kind, half, into * up)
+        if shape == wp.static(SPHERE):
+            return signed_distance(kind, into * d, half) - size[0]
+        return separation(into * d, kind, half, frame * wp.transpose(into), shape, size, enough)
+
+    return SimpleNamespace(separation=separation, from_obstacle=from_obstacle)

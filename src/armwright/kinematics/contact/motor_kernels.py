@@ -6,9 +6,8 @@ distances and which pairs count.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -16,26 +15,16 @@ from armwright.kinematics.arms.arm_arrays import FIXED, Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
 from armwright.kinematics.contact.convex_math import convex_math
-from armwright.kinematics.contact.solid_math import GROUND, SPHERE, solid_math
-
-
-@dataclass(frozen=True)
-class MotorKernels:
-    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
-
-    motor_frames: Any
-    self_clearance: Any
-    obstacle_clearance: Any
+from armwright.kinematics.contact.solid_math import solid_math
 
 
 @cache
-def motor_kernels(precision: Precision) -> MotorKernels:
+def motor_kernels(precision: Precision) -> SimpleNamespace:
     """Return the kernels in this precision, for N arms with D joints at T targets, and O obstacles."""
     base, solids, convex = frame_math(precision), solid_math(precision), convex_math(precision)
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
-    translate, rotate = base.translate, base.rotate
-    signed_distance, nearer_link = solids.signed_distance, solids.nearer_link
-    extent, separation = convex.extent, convex.separation
+    advance, signed_distance, nearer_link = base.advance, solids.signed_distance, solids.nearer_link
+    separation, from_obstacle = convex.separation, convex.from_obstacle
     zero, one = real(0.0), real(1.0)
 
     @kernel
@@ -68,11 +57,7 @@ def motor_kernels(precision: Precision) -> MotorKernels:
                     into[arm, target, j] = wp.matrix_from_rows(z, x, y)
                 else:
                     into[arm, target, j] = wp.matrix_from_rows(x, y, z)
-            value = q[arm, target, j]
-            p = translate(motion[arm, j], p, value, x, y, z)
-            x, y, z = rotate(motion[arm, j], x, y, z, wp.sin(value), wp.cos(value))
-            along = offset[arm, j]
-            p = p + along[0] * x + along[1] * y + along[2] * z
+            _place, p, x, y, z = advance(motion[arm, j], offset[arm, j], q[arm, target, j], p, x, y, z)
 
     @wp.func
     def from_link(
@@ -137,18 +122,6 @@ def motor_kernels(precision: Precision) -> MotorKernels:
                         n_joints += 1
         clearance[arm, target] = nearest
 
-    @wp.func
-    def from_obstacle(
-        kind: int, half: Vector3, into: Matrix3, d: Vector3, shape: int, size: Vector3, frame: Matrix3, enough: real
-    ):
-        """Return the distance of a body from an obstacle whose middle is at d from the body's, in the world."""
-        if shape == wp.static(GROUND):
-            up = wp.transpose(frame) * Vector3(zero, zero, one)
-            return -wp.dot(d, up) - extent(kind, half, into * up)
-        if shape == wp.static(SPHERE):
-            return signed_distance(kind, into * d, half) - size[0]
-        return separation(into * d, kind, half, frame * wp.transpose(into), shape, size, enough)
-
     @kernel
     def obstacle_clearance(
         motion: wp.array2d(dtype=int),
@@ -186,4 +159,6 @@ def motor_kernels(precision: Precision) -> MotorKernels:
                 is_at_rest = 0
         clearance[arm, target] = nearest
 
-    return MotorKernels(motor_frames, self_clearance, obstacle_clearance)
+    return SimpleNamespace(
+        motor_frames=motor_frames, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance
+    )

@@ -2,9 +2,8 @@
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -12,16 +11,8 @@ from armwright.kinematics.arms.arm_arrays import Precision
 from armwright.kinematics.arms.frame_math import frame_math
 
 
-@dataclass(frozen=True)
-class SimplexMath:
-    """Types and functions in one precision."""
-
-    Simplex: Any
-    nearest_point: Any
-
-
 @cache
-def simplex_math(precision: Precision) -> SimplexMath:
+def simplex_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
     base = frame_math(precision)
     real, Vector3 = base.real, base.Vector3
@@ -105,4 +96,4 @@ def simplex_math(precision: Precision) -> SimplexMath:
                 kept += 1
         return p, s, kept
 
-    return SimplexMath(Simplex, nearest_point)
+    return SimpleNamespace(Simplex=Simplex, nearest_point=nearest_point)

@@ -5,9 +5,8 @@ docs/method.md §13 defines the distances.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -19,17 +18,8 @@ HALVINGS = 20  # of a link, in the search for its point nearest to a solid: to 1
 BOX, SPHERE, CYLINDER, GROUND = map(SHAPES.index, ("box", "sphere", "cylinder", "ground"))
 
 
-@dataclass(frozen=True)
-class SolidMath:
-    """Functions in one precision."""
-
-    signed_distance: Any
-    along_segment: Any
-    nearer_link: Any
-
-
 @cache
-def solid_math(precision: Precision) -> SolidMath:
+def solid_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
     base = frame_math(precision)
     real, Vector3 = base.real, base.Vector3
@@ -99,4 +89,4 @@ def solid_math(precision: Precision) -> SolidMath:
             return wp.min(nearest, along_segment(shape, p, v, size) - radius)
         return nearest
 
-    return SolidMath(signed_distance, along_segment, nearer_link)
+    return SimpleNamespace(signed_distance=signed_distance, along_segment=along_segment, nearer_link=nearer_link)

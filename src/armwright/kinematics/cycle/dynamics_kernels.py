@@ -9,9 +9,8 @@ Along a motion, joint values are q(s) with the share s(t). The torque is
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
@@ -20,24 +19,13 @@ from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
 from armwright.robot.arm import GRAVITY
 
-TERMS = ("gravity", "drag", "push")
-
-
-@dataclass(frozen=True)
-class DynamicsKernels:
-    """The kernel and its types; it compiles when it is first loaded, and is cached on disk."""
-
-    real: Any
-    Bodies: Any
-    torque_terms: Any
-
 
 @cache
-def dynamics_kernels() -> DynamicsKernels:
+def dynamics_kernels() -> SimpleNamespace:
     """Return the kernel."""
     base = frame_math("float64")
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
-    translate, rotate, axis_of = base.translate, base.rotate, base.axis_of
+    advance, axis_of = base.advance, base.axis_of
     Vectors = wp.types.matrix(shape=(MAX_JOINTS, 3), dtype=real)
     zero, one, two = real(0.0), real(1.0), real(2.0)
 
@@ -81,17 +69,13 @@ def dynamics_kernels() -> DynamicsKernels:
         p = bodies.base[arm]
         for j in range(bodies.dof):
             motion = bodies.motion[arm, j]
-            value = q[arm, sample, j]
-            p = translate(motion, p, value, x, y, z)
             a = axis_of(motion, x, y, z)
-            x, y, z = rotate(motion, x, y, z, wp.sin(value), wp.cos(value))
-            offset = bodies.offset[arm, j]
+            here, p, x, y, z = advance(motion, bodies.offset[arm, j], q[arm, sample, j], p, x, y, z)
             for i in range(3):
-                place[j, i] = p[i]
+                place[j, i] = here[i]
                 axis[j, i] = a[i]
                 along_x[j, i] = x[i]
                 along_y[j, i] = y[i]
-            p = p + offset[0] * x + offset[1] * y + offset[2] * z
         tip = p
         for term in range(3):
             force, moment = Vectors(), Vectors()  # on each link, about the joint
@@ -159,4 +143,4 @@ def dynamics_kernels() -> DynamicsKernels:
                 terms[term, arm, sample, j] = load
                 after = here
 
-    return DynamicsKernels(real, Bodies, torque_terms)
+    return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms)

@@ -10,81 +10,35 @@ A joint that an update would take beyond its limit stays at the limit for the re
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
 from armwright.kinematics.arms.arm_arrays import MAX_JOINTS, PRISMATIC
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
+from armwright.kinematics.cycle.path_math import path_math
 
 UPDATES = 6  # at most, of a sample
 CONVERGED = 1e-7  # [m], [rad]
-DAMPING = 1e-6  # of the mean square singular value of J
 MAX_ROTATION = 0.3  # [rad] of any joint in one update
 HOPELESS, HOPELESS_ANGLE = 0.02, 0.2  # [m], [rad] off at the first sample: the rest gets one update a sample
 
 
-@dataclass(frozen=True)
-class PathKernels:
-    """The kernels and their types; they compile when they are first loaded, and are cached on disk."""
-
-    real: Any
-    Path: Any
-    follow: Any
-    tool_errors: Any
-
-
 @cache
-def path_kernels() -> PathKernels:
+def path_kernels() -> SimpleNamespace:
     """Return the kernels."""
-    base = frame_math("float64")
+    base, lines = frame_math("float64"), path_math()
     real, Vector3 = base.real, base.Vector3
-    translate, rotate, axis_of = base.translate, base.rotate, base.axis_of
+    advance, axis_of = base.advance, base.axis_of
+    Path, Row, Square = lines.Path, lines.Row, lines.Square
+    in_frame, rotation_error, solve_damped = lines.in_frame, lines.rotation_error, lines.solve_damped
     Columns = wp.types.matrix(shape=(MAX_JOINTS, 6), dtype=real)
     Values = wp.types.vector(length=MAX_JOINTS, dtype=real)
-    Row = wp.types.vector(length=6, dtype=real)
-    Square = wp.types.matrix(shape=(6, 6), dtype=real)
     hopeless, hopeless_angle = real(HOPELESS), real(HOPELESS_ANGLE)
-    zero, one, half = real(0.0), real(1.0), real(0.5)
-    converged, damping, max_rotation, tiny = real(CONVERGED), real(DAMPING), real(MAX_ROTATION), real(1e-18)
-
-    @wp.struct
-    class Path:
-        """Arms, and the samples of S poses in B blocks."""
-
-        dof: int
-        base: wp.array(dtype=Vector3)  # (N,)
-        motion: wp.array2d(dtype=int)  # (N, D)
-        lower: wp.array2d(dtype=real)  # (N, D)
-        upper: wp.array2d(dtype=real)  # (N, D)
-        offset: wp.array2d(dtype=Vector3)  # (N, D)
-        tool_axis: wp.array(dtype=Vector3)  # (N,)
-        tool_side: wp.array(dtype=Vector3)  # (N,)
-        first: wp.array(dtype=int)  # (B + 1,)
-        n_angular: wp.array(dtype=int)  # (S,)
-        position: wp.array(dtype=Vector3)  # (S,)
-        x: wp.array(dtype=Vector3)  # (S,) of the tool
-        y: wp.array(dtype=Vector3)  # (S,)
-        z: wp.array(dtype=Vector3)  # (S,)
-
-    @wp.func
-    def in_frame(v: Vector3, x: Vector3, y: Vector3, z: Vector3):
-        """Return the world components of a vector that is fixed in a frame."""
-        return v[0] * x + v[1] * y + v[2] * z
-
-    @wp.func
-    def rotation_error(kind: int, s: Vector3, t: Vector3, a: Vector3, x: Vector3, y: Vector3, z: Vector3):
-        """Return the rotation vector in the world from the tool s, t, a to the sample x, y, z [rad]."""
-        v = wp.cross(a, z)
-        cosine = wp.dot(a, z)
-        if kind > 2:
-            v = half * (wp.cross(s, x) + wp.cross(t, y) + v)
-            cosine = half * (wp.dot(s, x) + wp.dot(t, y) + cosine - one)
-        sine = wp.length(v)
-        return (wp.atan2(sine, cosine) / wp.max(sine, tiny)) * v, wp.atan2(sine, cosine)
+    zero, one = real(0.0), real(1.0)
+    converged, max_rotation, tiny = real(CONVERGED), real(MAX_ROTATION), real(1e-18)
 
     @kernel
     def follow(
@@ -118,14 +72,11 @@ def path_kernels() -> PathKernels:
                 p = path.base[arm]
                 for j in range(path.dof):
                     motion = path.motion[arm, j]
-                    p = translate(motion, p, q[j], x, y, z)
                     axis = axis_of(motion, x, y, z)
+                    place, p, x, y, z = advance(motion, path.offset[arm, j], q[j], p, x, y, z)
                     for i in range(3):
-                        columns[j, i] = p[i]  # the joint's position, for now
+                        columns[j, i] = place[i]  # for now
                         columns[j, i + 3] = axis[i]
-                    x, y, z = rotate(motion, x, y, z, wp.sin(q[j]), wp.cos(q[j]))
-                    along = path.offset[arm, j]
-                    p = p + along[0] * x + along[1] * y + along[2] * z
                 e = path.position[sample] - p
                 tool_z = in_frame(path.tool_axis[arm], x, y, z)
                 tool_x = in_frame(path.tool_side[arm], x, y, z)
@@ -163,42 +114,12 @@ def path_kernels() -> PathKernels:
                         for row in range(6):
                             for col in range(row + 1):
                                 square[row, col] += columns[j, row] * columns[j, col]
-                trace = real(0.0)
-                for i in range(6):
-                    trace += square[i, i]
-                for i in range(6):
-                    square[i, i] += damping * trace / real(6.0) + tiny
-                if kind == 0:
-                    square[3, 3] = one
-                    square[4, 4] = one
-                    error[3] = zero
-                    error[4] = zero
-                if kind < 3:
-                    square[5, 5] = one
-                    error[5] = zero
-                # Cholesky factor in the lower triangle, then forward and back substitution.
-                for i in range(6):
-                    for k in range(i):
-                        inner = square[i, k]
-                        for m in range(k):
-                            inner -= square[i, m] * square[k, m]
-                        square[i, k] = inner / square[k, k]
-                        error[i] -= square[i, k] * error[k]
-                    inner = square[i, i]
-                    for m in range(i):
-                        inner -= square[i, m] * square[i, m]
-                    square[i, i] = wp.sqrt(wp.max(inner, tiny))
-                    error[i] = error[i] / square[i, i]
-                for step in range(6):
-                    i = 5 - step
-                    for k in range(i + 1, 6):
-                        error[i] -= square[k, i] * error[k]
-                    error[i] = error[i] / square[i, i]
+                update_by = solve_damped(square, error, kind)
                 largest = real(0.0)
                 for j in range(path.dof):
                     change = real(0.0)
                     for row in range(6):
-                        change += columns[j, row] * error[row]
+                        change += columns[j, row] * update_by[row]
                     columns[j, 0] = free[j] * change
                     largest = wp.max(largest, wp.abs(columns[j, 0]))
                 shorten = wp.min(one, max_rotation / wp.max(largest, tiny))
@@ -224,12 +145,7 @@ def path_kernels() -> PathKernels:
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
         p = path.base[arm]
         for j in range(path.dof):
-            motion = path.motion[arm, j]
-            value = q[arm, sample, j]
-            p = translate(motion, p, value, x, y, z)
-            x, y, z = rotate(motion, x, y, z, wp.sin(value), wp.cos(value))
-            along = path.offset[arm, j]
-            p = p + along[0] * x + along[1] * y + along[2] * z
+            _place, p, x, y, z = advance(path.motion[arm, j], path.offset[arm, j], q[arm, sample, j], p, x, y, z)
         errors[arm, sample, 0] = wp.length(path.position[sample] - p)
         errors[arm, sample, 1] = zero
         kind = path.n_angular[sample]
@@ -241,4 +157,4 @@ def path_kernels() -> PathKernels:
             )
             errors[arm, sample, 1] = angle
 
-    return PathKernels(real, Path, follow, tool_errors)
+    return SimpleNamespace(real=real, Path=Path, follow=follow, tool_errors=tool_errors)

@@ -2,32 +2,24 @@
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
 
 import warp as wp
 
 from armwright.kinematics.arms.arm_arrays import Precision
-from armwright.kinematics.arms.ik_math import ik_math
-
-
-@dataclass(frozen=True)
-class LinearSystems:
-    """Functions of one variant. All are unrolled by hand: matrices as arguments take 1.6 times as long."""
-
-    determinant: Any
-    solve_3x3: Any
-    factor_6x6: Any
-    solve_6x6: Any
+from armwright.kinematics.arms.lane_math import lane_math
 
 
 @cache
-def linear_systems(precision: Precision, lanes: int) -> LinearSystems:
-    """Return the functions for a precision of the solution and a number of lanes, as in `ik_math`."""
-    base = ik_math(precision, lanes, "any")
-    Lane, Wide = base.Lane, base.Wide
-    ones, least = Wide(wp.float64(1.0)), Wide(wp.float64(1e-18))
+def small_systems(precision: Precision, lanes: int) -> SimpleNamespace:
+    """Return the functions for a precision of the solution and a number of lanes."""
+    base = lane_math(precision, lanes)
+    real, Lane, Wide, roots = base.real, base.Lane, base.Wide, base.roots
+    zero, one = real(0.0), real(1.0)
+    ones = Wide(wp.float64(1.0))
+    least_manipulability = real(0.1)  # below it the update is damped
+    full_damping = real(0.001)
 
     @wp.func
     def determinant(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide):
@@ -52,6 +44,23 @@ def linear_systems(precision: Precision, lanes: int) -> LinearSystems:
         vy = wp.cw_mul(scale, wp.cw_mul(cxy, x) + wp.cw_mul(cyy, y) + wp.cw_mul(cyz, z))
         vz = wp.cw_mul(scale, wp.cw_mul(cxz, x) + wp.cw_mul(cyz, y) + wp.cw_mul(czz, z))
         return Lane(vx), Lane(vy), Lane(vz)
+
+    @wp.func
+    def damping(det_jjt: Lane):
+        """Return k: 0 where the manipulability sqrt(det J Jᵀ) is large enough."""
+        manipulability = roots(wp.max(det_jjt, Lane(zero)))
+        lack = wp.max(Lane(zero), Lane(one) - (one / least_manipulability) * manipulability)
+        return full_damping * wp.cw_mul(lack, lack)
+
+    return SimpleNamespace(determinant=determinant, solve_3x3=solve_3x3, damping=damping)
+
+
+@cache
+def large_systems(precision: Precision, lanes: int) -> SimpleNamespace:
+    """Return the functions for a precision of the solution and a number of lanes."""
+    base = lane_math(precision, lanes)
+    Lane, Wide = base.Lane, base.Wide
+    ones, least = Wide(wp.float64(1.0)), Wide(wp.float64(1e-18))
 
     @wp.func
     def factor_6x6(
@@ -182,4 +191,4 @@ def linear_systems(precision: Precision, lanes: int) -> LinearSystems:
         x1 -= wp.cw_mul(l21, x2)
         return Lane(x1), Lane(x2), Lane(x3), Lane(x4), Lane(x5), Lane(x6)
 
-    return LinearSystems(determinant, solve_3x3, factor_6x6, solve_6x6)
+    return SimpleNamespace(factor_6x6=factor_6x6, solve_6x6=solve_6x6)

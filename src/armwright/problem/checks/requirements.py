@@ -8,9 +8,7 @@ from armwright.problem.drive_quantities import RATINGS, require_ratings
 from armwright.problem.evaluation import NO_CYCLE, NO_WORKSPACE
 from armwright.problem.objectives import (
     DEXTEROUS_VOLUME,
-    JUMPS,
-    PATH_ANGLE,
-    PATH_ERROR,
+    MOTION_QUANTITIES,
     QUANTITIES,
     STIFFNESS_QUANTITIES,
     TIMED_QUANTITIES,
@@ -33,7 +31,7 @@ def check_requirements(problem: Problem) -> None:
             require_ratings(actuation, quantity.name)
         if quantity in STIFFNESS_QUANTITIES:
             require_sections(arms, quantity.name)
-        if quantity in (JUMPS, PATH_ANGLE, PATH_ERROR, *TIMED_QUANTITIES) and plan is None:
+        if quantity in MOTION_QUANTITIES and plan is None:
             raise SettingsError(NO_CYCLE)
         if quantity in TIMED_QUANTITIES and plan is not None:
             check_durations(actuation, plan)

@@ -50,11 +50,11 @@ class Candidates:
         """Return the front of the built-in objectives, found with a fixed number of evaluations."""
         problem = self._built_in
         space = problem.space
-        survey = problem.evaluate_matrix(space.matrix(space.sample(self.scaled(SURVEY), seed)))
+        survey = problem.evaluate(space.matrix(space.sample(self.scaled(SURVEY), seed)))
         bound = found_reference_point(survey.values, survey.violations)
 
         def evaluate(matrix: Array) -> Array:
-            return problem.evaluate_matrix(matrix).penalised
+            return problem.evaluate(matrix).penalised
 
         search = FrontSearch(space.parameters, evaluate, bound, seed)
         while search.evaluations < self.scaled(FRONT_EVALUATIONS):

@@ -146,7 +146,7 @@ class CheapFeatures:
         problem = self._problem
         cases = [problem.violations(evaluation)]
         for case in range(1, len(problem.scenes)):
-            cases.append(problem.violations(problem.physics_of_arms(problem.arms(matrix), case)))
+            cases.append(problem.violations(problem.physics(matrix, case)))
         return np.max(cases, axis=0)
 
     def _parameters(self, matrix: Array) -> Array:

@@ -122,7 +122,7 @@ class DirectSearch:
         """Load the kernels. Those of a cycle are loaded by one design: evaluating many of them takes seconds."""
         few = self.problem.space.matrix(self.problem.space.sample(1, 0))
         is_fast = self.problem.task.cycle is None and self.problem.tolerance == 0.0
-        self.problem.evaluate_matrix(np.repeat(few, MANY_ARMS if is_fast else 1, axis=0))
+        self.problem.evaluate(np.repeat(few, MANY_ARMS if is_fast else 1, axis=0))
 
     def _end_reason(self, stop_at_stall: bool) -> str:
         """Return why the search ends; empty if it goes on."""
@@ -221,7 +221,7 @@ class DirectSearch:
                 self._report(done)
             end = done + self.chunk_size.value
             chunk, started = matrix[done : min(end, cut) if done < cut else end], self.plan.elapsed
-            outcomes = self.problem.evaluate_matrix(chunk)
+            outcomes = self.problem.evaluate(chunk)
             self.chunk_size.adapt(len(chunk), self.plan.elapsed - started)
             parts.append(outcomes.penalised)
             done += len(chunk)
@@ -341,7 +341,7 @@ class DirectSearch:
         matrix, values = front.matrix, front.values
         violations = np.empty((len(matrix), 0))
         if self.problem.constraints:  # the search knows penalised values only
-            outcomes = self.problem.evaluate_matrix(matrix)
+            outcomes = self.problem.evaluate(matrix)
             values, violations = outcomes.values, outcomes.violations
         return [
             FinishedTrial(number, FRONT_SEARCH, design, tuple(row), violations=tuple(violations[number].tolist()))

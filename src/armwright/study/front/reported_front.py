@@ -46,7 +46,7 @@ def reported_front(
         found |= {row.tobytes() for row in candidates}
         known |= found
         # The new designs come first: of designs with equal values, the first one stays on the front.
-        values = np.vstack([problem.evaluate_matrix(candidates).penalised, values])
+        values = np.vstack([problem.evaluate(candidates).penalised, values])
         matrix = np.vstack([candidates, matrix])
         on_front = front_mask(values)
         parents = candidates[on_front[: len(candidates)]]

@@ -47,10 +47,7 @@ class LocalBackend:
 def evaluate_design(problem: Problem, design: Design, process: EvaluationProcess | None = None) -> Evaluated:
     """Evaluate a design; `process` runs the custom evaluator if there is one."""
     started = time.perf_counter()
-    if process is None:
-        outcomes = problem.evaluate([design])
-    else:
-        outcomes = problem.outcomes_of([design], [process.measure(design)])
+    outcomes = problem.evaluate([design], None if process is None else [process.measure(design)])
     return Evaluated(outcomes[0], time.perf_counter() - started)
 
 
