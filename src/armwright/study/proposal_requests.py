@@ -34,7 +34,7 @@ class ProposalSlot:
         """Return the fields of trial `number`, which takes the slot."""
         proposal = self.proposal
         return {
-            **({} if proposal is None else {name: getattr(proposal, name) for name in ("reason", "expected")}),
+            **({} if proposal is None else {"reason": proposal.reason}),
             "proposal": None if proposal is None else proposal.id,
             "fault": self.fault,
             "screened": self.screened,
