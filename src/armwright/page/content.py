@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armwright.existing.compare_arms import ComparedArm, dominance_counts, read_existing_arms
 from armwright.experiments.run_record import describe_method
+from armwright.kinematics.arms.arm_arrays import carrying
 from armwright.kinematics.arms.forward import column_solid
 from armwright.kinematics.arms.motor_bodies import NO_BODY, MotorBodies
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
@@ -216,22 +217,26 @@ def _designs(history: History, numbers: range) -> Arrays:
     space = history.problem.space
     trials = [history.trials[number] for number in numbers]
     arms = [history.problem.arm(trial.design) for trial in trials]
-    evaluation = history.evaluation(numbers)
+    problem = history.problem
+    arrays = carrying(problem.arms(space.matrix([trial.design for trial in trials])), problem.scenes[0].load_shape)
+    q = np.zeros((len(trials), len(problem.task.targets), arrays.dof), dtype=np.float32)
+    angles = history.angles(numbers)[:, :, : arrays.dof]
+    q[:, :, : angles.shape[2]] = angles
     sources = list(dict.fromkeys(trial.source for trial in history))
     return {
         "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
         "values": history.values[numbers.start : numbers.stop],
         "params": space.matrix([trial.design for trial in trials]),
         "violations": history.violations[numbers.start : numbers.stop],
-        "q": evaluation.q.astype(np.float32),
+        "q": q,
         "up": np.array(
             [mounted_vector(DIRECTIONS["+z"], space.mount_of(trial.design)) for trial in trials], np.float32
         ),
-        "com": evaluation.arms.com,
-        "mass": evaluation.arms.mass,
-        "payload_center": evaluation.arms.payload_center,
-        **_arm_arrays(arms, evaluation.arms.dof),
-        **_body_arrays(evaluation.arms.motor_bodies),
+        "com": arrays.com,
+        "mass": arrays.mass,
+        "payload_center": arrays.payload_center,
+        **_arm_arrays(arms, arrays.dof),
+        **_body_arrays(arrays.motor_bodies),
         **({} if space.column is None else {"column_half": _column_halves(arms)}),
     }
 

@@ -45,11 +45,13 @@ class Outcome:
         values: the M objectives, minimised; infinite if the evaluator failed.
         violations: of the C constraints; satisfied at <= 0.
         failure: why the evaluator failed; None if it did not.
+        q: joint angles [rad] or strokes [m] at each target in the first case, 0 for joints that the design lacks.
     """
 
     values: tuple[float, ...]
     violations: tuple[float, ...] = ()
     failure: Failure | None = None
+    q: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -68,13 +70,16 @@ class Outcomes:
     violations: Array
     failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])
     postures: Array | None = None
+    q: Array | None = None  # (N, T, J) joint angles at the targets in the first case [rad] or [m]
 
     def __len__(self) -> int:
         return len(self.values)
 
     def __getitem__(self, row: int) -> Outcome:
         """Return the outcome of one design."""
-        return Outcome(tuple(self.values[row].tolist()), tuple(self.violations[row].tolist()), self.failures.get(row))
+        q = () if self.q is None else tuple(tuple(map(_single, angles)) for angles in self.q[row].tolist())
+        values, violations = (tuple(array[row].tolist()) for array in (self.values, self.violations))
+        return Outcome(values, violations, self.failures.get(row), q)
 
     def __iter__(self) -> Iterator[Outcome]:
         return (self[row] for row in range(len(self)))
@@ -90,7 +95,7 @@ def worst_case(outcomes: Sequence[Outcomes]) -> Outcomes:
     if len(outcomes) == 1:
         return outcomes[0]
     values, violations = (np.max([getattr(o, name) for o in outcomes], axis=0) for name in ("values", "violations"))
-    return Outcomes(values, violations, postures=outcomes[0].postures)
+    return Outcomes(values, violations, postures=outcomes[0].postures, q=outcomes[0].q)
 
 
 @dataclass(frozen=True)
@@ -251,7 +256,7 @@ class Problem:
         columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
         found = self._evaluate(matrix, dict(zip(names, columns, strict=True)))
         found.values[list(failures)] = np.inf
-        return Outcomes(found.values, found.violations, failures)
+        return Outcomes(found.values, found.violations, failures, q=found.q)
 
     def measure(self, design: Design) -> Measurement:
         """Return what the custom evaluator measures of a design, or why it fails."""
@@ -290,7 +295,7 @@ class Problem:
         values = [measured[o.name] if o.name in measured else o.minimised(evaluation) for o in self.objectives]
         names = [f"objective {o.name}" for o in self.objectives]
         columns = _finite(values, names, len(evaluation))
-        return Outcomes(columns, self.violations(evaluation), postures=evaluation.entry_postures)
+        return Outcomes(columns, self.violations(evaluation), postures=evaluation.entry_postures, q=evaluation.q)
 
     def violations(self, evaluation: Evaluation) -> Array:
         """Return the (N, C) violations of evaluated arms; SettingsError if one is not a finite number."""
@@ -302,12 +307,15 @@ class Problem:
         values = np.empty((len(matrix), len(self.objectives)))
         violations = np.empty((len(matrix), len(self.constraints)))
         postures: list[Array] = []
+        q: list[Array] = []
         for rows in self.chunks(len(matrix)):
             chunk = {name: column[rows] for name, column in measured.items()}
             found = worst_case([self.outcomes(physics, chunk) for physics in self._variants(matrix[rows])])
             values[rows], violations[rows] = found.values, found.violations
             postures += [] if found.postures is None else [found.postures]
-        return Outcomes(values, violations, postures=np.concatenate(postures) if postures else None)
+            q += [] if found.q is None else [found.q]
+        of_cycle, of_targets = (np.concatenate(parts) if parts else None for parts in (postures, q))
+        return Outcomes(values, violations, postures=of_cycle, q=of_targets)
 
     def chunks(self, n: int) -> Iterator[slice]:
         """Yield the rows of n designs that are evaluated at once, so that their postures fit into memory."""
@@ -329,6 +337,11 @@ class Problem:
         task, plan = self.task, self.scenes[0].plan
         along = 0 if plan is None else 4 * (len(plan.sample().poses) + 33 * len(plan.motions))
         return len(task.target_positions) + along + sum(region.points for region in task.workspace)
+
+
+def _single(value: float) -> float:
+    """Return a number of single precision, as the kernels compute, in as few digits as tell it from all others."""
+    return float(f"{value:.9g}")
 
 
 def _finite(columns: Sequence[Array], names: Sequence[str], n: int) -> Array:

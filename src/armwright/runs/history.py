@@ -221,6 +221,14 @@ class History:
     def _n_needed(self) -> int:
         return max(1, min(FEW, self.n_init))
 
+    def angles(self, numbers: Sequence[int]) -> Array:
+        """Return (n, T, J) joint angles [rad] or strokes [m] of designs at the targets; 0 for joints that they lack."""
+        rows = [self.trials[number].q for number in numbers]
+        if not all(rows):
+            return self.evaluation(numbers).q
+        width = max(len(angles[0]) for angles in rows)
+        return np.array([[(*q, *[0.0] * (width - len(q))) for q in angles] for angles in rows])
+
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
         """Evaluate the designs of these trials again; the result is equal to the bit."""
         return self.problem.physics([self.trials[number].design for number in numbers])

@@ -37,6 +37,7 @@ def _within(limit: float) -> AfterValidator:
 
 _Objectives = tuple[Annotated[float, _within(LARGEST_OBJECTIVE)], ...]
 _Violations = tuple[Annotated[float, _within(PENALTY)], ...]
+_Angles = tuple[tuple[Annotated[float, _within(LONGEST)], ...], ...]
 _Seconds = Mapping[str, Annotated[float, _within(LONGEST)]]
 
 _PARAMS: TypeAdapter[dict[str, ParameterValue]] = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True))
@@ -88,6 +89,7 @@ class FinishedTrial:
     seconds: _Seconds = field(default_factory=dict[str, float])
     # Attributes that the sampler set on its trial and study, needed to resume
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
+    q: _Angles = ()  # joint angles [rad] or strokes [m] at each target, as the design was evaluated
     violations: _Violations = ()  # of each constraint; satisfied at <= 0
     failure: Failure | None = None  # why the custom evaluator gave no values, which makes the design infeasible
     # The proposal in whose place this design was drawn, because the surrogate expected little of it
@@ -142,6 +144,8 @@ def parse_trial(line: bytes, number: int, config: RunConfig) -> FinishedTrial:
     ):
         if len(found) != len(expected):
             raise ValueError(f"expected {len(expected)} {name}, found {len(found)}")
+    if trial.q and (len(trial.q) != len(config.task.target_positions) or len(set(map(len, trial.q))) > 1):
+        raise ValueError(f"q: expected as many angles for each of {len(config.task.target_positions)} targets")
     if trial.number != number:
         raise ValueError(f"expected trial number {number}, found {trial.number}")
     if trial.failure is not None:

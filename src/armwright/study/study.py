@@ -290,7 +290,7 @@ class Study:
         pending.trial = replace(trial, duplicate_of=first)
         known = self._pending[first].trial if first in self._pending else self._record.trials[first]
         if known.values:
-            self._tell(pending, Evaluated(Outcome(known.values, known.violations, known.failure), 0.0))
+            self._tell(pending, Evaluated(Outcome(known.values, known.violations, known.failure, known.q), 0.0))
 
     def _screened(self, slot: ProposalSlot | None, number: int) -> ProposalSlot | None:
         """Return a slot without its proposal if the surrogate expects too little of it; else the slot."""
@@ -346,6 +346,7 @@ class Study:
             values=outcome.values,
             violations=outcome.violations,
             failure=outcome.failure,
+            q=outcome.q,
             sampler_notes=notes,
             seconds={part: round(value, 6) for part, value in seconds.items()},
         )

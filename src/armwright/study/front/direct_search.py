@@ -338,14 +338,10 @@ class DirectSearch:
 
     def _front_trials(self, front: ReportedFront) -> list[FinishedTrial]:
         """Return the designs of a front as trials."""
-        matrix, values = front.matrix, front.values
-        violations = np.empty((len(matrix), 0))
-        if self.problem.constraints:  # the search knows penalised values only
-            outcomes = self.problem.evaluate(matrix)
-            values, violations = outcomes.values, outcomes.violations
+        outcomes = self.problem.evaluate(front.matrix)
+        values = outcomes.values if self.problem.constraints else front.values  # penalised with constraints
+        designs = self.problem.space.designs(front.matrix)
         return [
-            FinishedTrial(number, FRONT_SEARCH, design, tuple(row), violations=tuple(violations[number].tolist()))
-            for number, (design, row) in enumerate(
-                zip(self.problem.space.designs(matrix), values.tolist(), strict=True)
-            )
+            FinishedTrial(n, FRONT_SEARCH, design, tuple(row), violations=outcome.violations, q=outcome.q)
+            for n, (design, row, outcome) in enumerate(zip(designs, values.tolist(), outcomes, strict=True))
         ]
