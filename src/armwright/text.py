@@ -22,9 +22,21 @@ def visible(text: str) -> str:
     return "".join(" " if kind == "Cc" else letter for letter, kind in kinds if kind not in ("Cf", "Cs"))
 
 
-def rounded(value: float) -> str:
+def rounded(value: float | None) -> str:
     """Return a value with three significant digits; a large one with all its digits, not with an exponent."""
+    if value is None:
+        return "–"
     return f"{value:.3g}" if abs(value) < 1e3 else f"{value:,.0f}"
+
+
+def decimals(value: float | None, places: int = 2) -> str:
+    """Return a value with this many decimal places."""
+    return "–" if value is None else f"{value:.{places}f}"
+
+
+def percent(share: float | None, places: int = 0) -> str:
+    """Return a share in percent."""
+    return "–" if share is None else f"{100.0 * share:.{places}f} %"
 
 
 _THOUGHTS = re.compile(r"<(/?)think(?:ing)?>", re.IGNORECASE)

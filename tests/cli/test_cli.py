@@ -201,8 +201,8 @@ def test_version_and_help() -> None:
     assert commands == [
         *("init", "edit", "check", "tasks", "actuators", "draft"),
         *("design", "optimize", "experiment"),
-        *("pick", "export", "simulate", "datasheet", "reach-map", "compare", "compare-arms", "runs"),
-        *("report", "live", "prompt", "doctor"),
+        *("pick", "export", "simulate", "datasheet", "reach-map", "compare", "compare-arms"),
+        *("report", "doctor"),
     ]
     assert "--n-step" in armwright("optimize", "--help").stdout
 

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from armwright.cli.app import app
 from armwright.exceptions import FailureError, SettingsError, TaskError
 from armwright.experiments.cells import plan_cells
-from armwright.experiments.outcome import collect, published
+from armwright.experiments.outcome import collect
 from armwright.experiments.plan import (
     ExperimentPlan,
     builtin_experiments,
@@ -81,10 +81,10 @@ def test_paper_experiment_matches_the_paper() -> None:
     steps = {key: method.n_step for key, method in asked.items() if method.model_options.prompt == "plus"}
     assert steps == {"llm-plus-5": 5, "llm-plus": 10, "llm-plus-50": 50}
     assert all(method.model_options.temperature == 0 for method in plan.methods.values() if method.needs_a_model)
-    table = published(plan).values
-    assert table["BBO", "target-1"] == (6.70, 2.03)
-    assert table["BBO/LLM-", "target-2"] == (13.87, 2.33)
-    assert table["BBO/LLM+", "target-3"] == (16.29, 1.53)
+    table = plan.published
+    assert table["bbo"]["target-1"] == (6.70, 2.03)
+    assert table["llm-minus"]["target-2"] == (13.87, 2.33)
+    assert table["llm-plus"]["target-3"] == (16.29, 1.53)
 
 
 def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> None:

@@ -226,7 +226,7 @@ def test_task_objectives_reach_run_prompt_figures_and_page(tmp_path: Path, names
     assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
     for name in names:
         assert name.replace("_", " ") in result.output
-    prompt = CliRunner().invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
+    prompt = CliRunner().invoke(app, ["optimize", str(tmp_path / "run"), "--print-prompt", "next"]).output
     assert "payloads, point masses of [kg], for each TARGET in this order: 0.5, 0.2, 0." in prompt
     for objective in history.problem.objectives:
         assert objective.description in prompt

@@ -269,7 +269,7 @@ def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:
     simulated = mujoco.MjModel.from_xml_string(to_mjcf(member.arm))
     assert simulated.actuator_ctrlrange[:, 1].tolist() == [joint.actuator.peak_torque for joint in member.arm.joints]
     runner = CliRunner()
-    prompt = runner.invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
+    prompt = runner.invoke(app, ["optimize", str(tmp_path / "run"), "--print-prompt", "next"]).output
     assert "- mid: 0.082 kg, 4.1 N m, 250 USD" in prompt
     assert f"MOTORS: ({', '.join(member.design.motors)})" in prompt or "MOTORS: (" in prompt
     sheet = runner.invoke(app, ["datasheet", str(tmp_path / "run"), "--design", str(member.number), "--json"])

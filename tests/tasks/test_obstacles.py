@@ -174,7 +174,7 @@ def test_obstacles_reach_prompt_and_figures(tmp_path: Path) -> None:
     config, history = read_run(tmp_path / "run")
     assert config.task.obstacles == load_task(file).obstacles
     assert np.array_equal(history.problem.evaluate([trial.design for trial in history]).values, history.values)
-    prompt = armwright("prompt", "--after", tmp_path / "run")
+    prompt = armwright("optimize", tmp_path / "run", "--print-prompt", "next")
     assert all(f"\n- {words}\n" in prompt for words in DESCRIPTIONS)
     assert "Orientation does not matter. The inverse kinematics steers around nothing" in prompt
     named = config.task.model_copy(update={"name": "random-arm"})  # close to the names of built-in tasks

@@ -166,7 +166,7 @@ def test_read_only_folder_is_read_and_not_written(tmp_path: Path, whole: Path) -
             words = one_line(run(as_a_plain_user(command(refused, "--no-figures"))))
             assert "cannot write" in words
             assert "Permission denied" in words
-        for reader in (["runs", tmp_path], ["pick", run_], ["export", run_]):
+        for reader in (["compare", "--list", tmp_path], ["pick", run_], ["export", run_]):
             done = run(as_a_plain_user([sys.executable, "-m", "armwright", *map(str, reader)]))
             assert (done.returncode, done.stderr) == (0, "")
         report = run(as_a_plain_user([sys.executable, "-m", "armwright", "report", str(run_)]))

@@ -154,13 +154,15 @@ def test_other_code_in_any_command_prints_to_stderr(tmp_path: Path, form: str) -
 
 
 def test_help_is_printed_to_stdout() -> None:
-    for arguments in (["--help"], ["runs", "--help"], ["--version"]):
+    for arguments in (["--help"], ["compare", "--help"], ["--version"]):
         done = armwright(*arguments)
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout
 
 
-@pytest.mark.parametrize("arguments", [["tasks", "--json"], ["actuators", "--csv"], ["prompt", "--variables"]])
+@pytest.mark.parametrize(
+    "arguments", [["tasks", "--json"], ["actuators", "--csv"], ["optimize", "target-1", "--print-prompt", "variables"]]
+)
 def test_closed_pipe_is_one_line(in_folder: Path, arguments: list[str]) -> None:
     reader, writer = os.pipe()
     os.close(reader)

@@ -1,4 +1,4 @@
-"""Commands that show and export what a run holds: pick, export, report, live, prompt, doctor."""
+"""Commands that show and export what a run holds: pick, export, report, doctor."""
 
 import sys
 from pathlib import Path
@@ -9,15 +9,12 @@ import typer
 from armwright.cli.activity import activity
 from armwright.cli.options import (
     Csv,
-    EvaluatorName,
     Json,
     ModelName,
     ModelOptionsFile,
     RunFolder,
-    SpaceFile,
-    load_problem,
 )
-from armwright.cli.streams import check_formats, open_console, print_csv, print_error, print_json, print_text
+from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -110,106 +107,31 @@ def export(
 
 def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
-) -> None:
-    """Write report.html into each RUN: one file for any browser, without a network."""
-    from armwright.page.page import write_report
-
-    for run in runs:
-        with activity(f"writing the page of {run}"):
-            written = write_report(run)
-        print_text(str(written))
-
-
-def live(
-    run: RunFolder,
+    live: Annotated[
+        bool, typer.Option("--live", help="Serve the live page of RUN until Ctrl-C instead (extra live).")
+    ] = False,
     host: Annotated[
         str, typer.Option(help="Address to listen on; any other than the default opens the page to a network.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to listen on; 0: any free port.")] = 0,
     follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
 ) -> None:
-    """Serve the live page of RUN to browsers on this machine until Ctrl-C."""
+    """Write report.html into each RUN: one file for any browser, without a network."""
     from armwright.page.live_server import serve
+    from armwright.page.page import write_report
     from armwright.runs.folder import read_config
 
-    if not follow:
-        read_config(run)  # report a folder without a run at once
-    serve(run, print_text, host, port, sys.stdin.buffer if follow else None)
-
-
-def prompt(
-    task: Annotated[str | None, typer.Argument(metavar="TASK", help="A built-in task, or a YAML file.")] = None,
-    after: Annotated[
-        Path | None,
-        typer.Option(help="Print the prompt for the next proposal of this run.", show_default="of a new run"),
-    ] = None,
-    number: Annotated[
-        int | None, typer.Option(help="With --after: print the prompt of this trial as it was sent.")
-    ] = None,
-    space: SpaceFile = None,
-    evaluator: EvaluatorName = None,
-    prompt: Annotated[
-        str | None,
-        typer.Option(help="Prompt: plus, minus, full, or a template file.", show_default="the run's, else plus"),
-    ] = None,
-    memory: Annotated[
-        str | None, typer.Option(help="Memory: none, own or chat.", show_default="the run's, else none")
-    ] = None,
-    model_options: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE",
-            help="answer, proposals and others, in a YAML file or in place, such as '{proposals: 2}'.",
-            show_default="the run's",
-        ),
-    ] = None,
-    n_init: Annotated[int | None, typer.Option(help="Random trials of the new run.", show_default="10")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the new run.", show_default="0")] = None,
-    schema: Annotated[bool, typer.Option("--schema", help="Print the answer's JSON schema instead.")] = False,
-    template: Annotated[
-        bool, typer.Option("--template", help="Print the template of --prompt instead, as a basis for a custom one.")
-    ] = False,
-    variables: Annotated[bool, typer.Option("--variables", help="Print the variables of templates instead.")] = False,
-) -> None:
-    """Print exactly what would be sent to a model for TASK, or what a custom prompt needs."""
-    from armwright.llm.configuration import load_model_options
-    from armwright.llm.prompt import whole_template
-    from armwright.llm.prompt_values import VARIABLES
-    from armwright.spaces.design_space import load_space
-    from armwright.study.prompt_preview import preview, preview_after
-    from armwright.tasks.catalogue import load_task
-
-    if variables:
-        print_text("\n".join(f"{name}: {description}" for name, description in VARIABLES.items()))
+    if live:
+        if len(runs) > 1:
+            raise SettingsError(f"--live: expected one run folder, got {len(runs)}")
+        if not follow:
+            read_config(runs[0])  # report a folder without a run at once
+        serve(runs[0], print_text, host, port, sys.stdin.buffer if follow else None)
         return
-    if template:
-        print_text(whole_template(prompt or "plus"), end="")
-        return
-    options = load_model_options(model_options, prompt=prompt, memory=memory)
-    if after is None:
-        if task is None:
-            raise SettingsError("expected a TASK, --after RUN, --template or --variables")
-        if number is not None:
-            raise SettingsError(f"--number {number} needs --after RUN")
-        n_init = 10 if n_init is None else n_init
-        shown = preview(load_problem(task, space, evaluator=evaluator), options, n_init=n_init, seed=seed or 0)
-    else:
-        for option, value in (("--n-init", n_init), ("--seed", seed), ("--evaluator", evaluator)):
-            if value is not None:
-                raise SettingsError(f"{option} {value} is for a new run; {after} has its own")
-        shown = preview_after(
-            after,
-            options,
-            task=None if task is None else load_task(task),
-            space=None if space is None else load_space(space),
-            number=number,
-        )
-    if schema:
-        print_json(shown.schema)
-        return
-    print_text(shown.prompt, end="")
-    note = f"; {shown.note}" if shown.note else ""
-    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}{note}")
+    for run in runs:
+        with activity(f"writing the page of {run}"):
+            written = write_report(run)
+        print_text(str(written))
 
 
 def doctor(

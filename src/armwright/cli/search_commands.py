@@ -1,6 +1,7 @@
 """Commands that search designs: design, optimize."""
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,7 @@ import typer
 from armwright.cli.activity import activity
 from armwright.cli.options import (
     EVALUATION,
+    MODEL,
     OUTPUT,
     SEARCH,
     AllowFailures,
@@ -170,6 +172,15 @@ def optimize(
     memory: MemoryName = None,
     max_cost: MaxCost = None,
     model_options: ModelOptionsFile = None,
+    print_prompt: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHAT",
+            help="Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run folder), the "
+            "number of a trial of a run, schema (of the answer), template (of the prompt), variables (of templates).",
+            rich_help_panel=MODEL,
+        ),
+    ] = None,
     device: DeviceName = "auto",
     workers: Annotated[
         int,
@@ -208,11 +219,17 @@ def optimize(
 
     console = open_console(json_)
     announce_compilation(console)
-    problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
+    given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
+    load = partial(load_problem, task, space, robust, device, objectives=objectives, evaluator=evaluator)
+    if print_prompt is not None:
+        from armwright.cli.show_prompt import show_prompt
+
+        show_prompt(print_prompt, task, space, load, given, n_init, n_total, seed)
+        return
+    problem = load()
     if space is None and (note := space_note(problem)):
         console.print(note)
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
-    given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
     choice = choose_proposer(proposer, given)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)

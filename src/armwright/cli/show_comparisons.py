@@ -13,10 +13,8 @@ from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.existing.compare_arms import MEASURES, ArmComparison, ComparedArm
 from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_runs import Comparison
-from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
 from armwright.experiments.runner import CellOutcome
-from armwright.experiments.table_cells import remarks_on
-from armwright.experiments.tables import markdown, sections
+from armwright.experiments.tables import markdown, remarks_on, sections
 from armwright.extras import install_command, missing_packages
 from armwright.llm.servers import describe_server
 from armwright.problem.objectives import TORQUE_SCALE
@@ -74,26 +72,15 @@ def show_comparison(
     console: Console,
     comparison: Comparison,
     title: str,
-    published: Published = NOTHING_PUBLISHED,
     notes: Sequence[str] = (),
 ) -> None:
-    """Print a comparison: in a terminal its tables as wide as that, elsewhere Markdown.
-
-    Args:
-        console: The console.
-        comparison: The comparison.
-        title: Its title.
-        published: Published values to show beside it.
-        notes: Further remarks.
-    """
+    """Print a comparison: in a terminal its tables as wide as that, elsewhere Markdown."""
     if not console.is_terminal:
-        console.print(markdown(comparison, title, published, notes), end="")
+        console.print(markdown(comparison, title, notes), end="")
         return
     console.print(title)
-    for section in sections(comparison, published):
-        columns = [
-            Column(head, is_number=i in section.right, rank=max(0, i - 1)) for i, head in enumerate(section.head)
-        ]
+    for section in sections(comparison):
+        columns = [Column(head, rank=max(0, i - 1)) for i, head in enumerate(section.head)]
         console.print(f"\n{section.title}: {section.caption}")
         print_table(console, Table(columns, section.rows, "--json and table.md have all"))
     for note in (*remarks_on(comparison), *notes):

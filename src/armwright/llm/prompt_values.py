@@ -68,7 +68,7 @@ class Limits:
         return replace(self, designs=1, lines=max(5, 3 * self.lines // 4), proposed=proposed)
 
 
-# Variables of a template, as `armwright prompt --variables` lists them.
+# Variables of a template, as `--print-prompt variables` lists them.
 VARIABLES = {
     "space": "the design space: min_joints, max_joints, joint_types, joint_range, origin_x, origin_y, origin_z, "
     "link, mass_note, and all other keys of a space file",

@@ -1,0 +1,62 @@
+"""Print the prompt that a run would send to a language model, or what a custom prompt needs."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from armwright.cli.streams import print_error, print_json, print_text
+from armwright.exceptions import SettingsError
+from armwright.llm.model_options import ModelOptions
+from armwright.llm.prompt import whole_template
+from armwright.llm.prompt_values import VARIABLES
+from armwright.problem.problem import Problem
+from armwright.runs.folder import CONFIG
+from armwright.spaces.design_space import load_space
+from armwright.study.prompt_preview import preview, preview_after
+
+WHAT = ("next", "schema", "template", "variables")
+
+
+def show_prompt(
+    what: str,
+    task: str,
+    space: Path | None,
+    load: Callable[[], Problem],
+    options: ModelOptions,
+    n_init: int,
+    n_total: int,
+    seed: int,
+) -> None:
+    """Print the prompt, schema or template.
+
+    Args:
+        what: One of WHAT, or the number of a trial.
+        task: A run folder for the prompts of that run; else the task of a new run.
+        space: The design space, if stated.
+        load: Loads the problem of a new run.
+        options: The options of the model.
+        n_init: Random trials of a new run.
+        n_total: Counted trials of a new run.
+        seed: Seed of a new run.
+    """
+    number = int(what) if what.isdecimal() else None
+    if number is None and what not in WHAT:
+        raise SettingsError(f'--print-prompt "{what}": expected {", ".join(WHAT)}, or the number of a trial of a run')
+    if what == "variables":
+        print_text("\n".join(f"{name}: {description}" for name, description in VARIABLES.items()))
+        return
+    if what == "template":
+        print_text(whole_template(options.prompt), end="")
+        return
+    if os.path.isfile(os.path.join(task, CONFIG)):
+        shown = preview_after(Path(task), options, space=None if space is None else load_space(space), number=number)
+    elif number is None:
+        shown = preview(load(), options, n_init=n_init, n_total=n_total, seed=seed)
+    else:
+        raise SettingsError(f"--print-prompt {number}: expected a run folder, got {task}")
+    if what == "schema":
+        print_json(shown.schema)
+        return
+    print_text(shown.prompt, end="")
+    note = f"; {shown.note}" if shown.note else ""
+    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}{note}")
