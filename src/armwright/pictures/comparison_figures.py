@@ -17,13 +17,13 @@ from armwright.pictures.drawing import (
     draw_dominated,
     frame_plane,
     legend_below,
-    method_handle,
     one_panel,
     several_panels,
     write_drawn,
 )
 from armwright.pictures.figures import draw_samples
 from armwright.pictures.reason_figures import draw_reasons
+from armwright.pictures.solids import extent_of
 from armwright.pictures.style import BEST_KNOWN, FRONT, MISSED, TARGET, line
 from armwright.proof.results import FIGURES
 
@@ -92,12 +92,10 @@ def draw_targets(comparison: Comparison) -> Figure:
         points = comparison.first_run(task).config.task.target_positions
         axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
         axes.scatter(*points.T, marker="*", s=90, color=TARGET, edgecolors=FRONT, linewidths=0.5, depthshade=False)
-        low, high = points.min(axis=0), points.max(axis=0)
-        half = float(max(0.1, 0.55 * (high - low).max()))
-        floor = (low + high)[2] / 2 - half
+        centre, half = extent_of([points])
         for x, y, z in points.tolist():
-            axes.plot([x, x], [y, y], [floor, z], color="#BBBBBB", linewidth=0.6)
-        frame(axes, ((low + high) / 2, half))
+            axes.plot([x, x], [y, y], [centre[2] - half, z], color="#BBBBBB", linewidth=0.6)
+        frame(axes, (centre, half))
         axes.set_title(f"{task}: {len(points)} targets", y=1.0)
     if len(shown) < len(comparison.tasks):
         figure.suptitle(f"{len(shown)} of {len(comparison.tasks)} tasks", fontsize=10)
@@ -155,7 +153,8 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
         axes.set_xlim(left=0)
     for axes in panels[:: _columns(comparison.tasks)]:
         axes.set_ylabel("Hypervolume")
-    handles = [method_handle(comparison, method) for method in methods]
+    styles = {method: line(comparison.methods.index(method)) for method in methods}
+    handles = [Line2D([], [], **s.curve, marker=s.marker, label=comparison.label(m)) for m, s in styles.items()]
     if any(comparison.best_known(task) is not None for task in comparison.tasks):
         handles.append(Line2D([], [], **BEST_KNOWN, label="best known"))
     legend_below(figure, handles)
