@@ -16,6 +16,7 @@ from armwright.cli.options import (
     ModelOptionsFile,
     Scheduler,
     SpaceFile,
+    option,
     select_workers,
 )
 from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_json, print_records, print_text
@@ -27,29 +28,27 @@ def experiment(
         str,
         typer.Argument(help="A built-in experiment (paper, recorded, rules, n-step, samplers, ...), or a YAML file."),
     ],
-    seeds: Annotated[int | None, typer.Option(help="Number of seeds, from 0, instead of the file's.")] = None,
-    method: Annotated[list[str] | None, typer.Option(help="Only this method of the file (may be repeated).")] = None,
-    task: Annotated[list[str] | None, typer.Option(help="Only this task of the file (may be repeated).")] = None,
+    seeds: Annotated[int | None, option("Number of seeds, from 0, instead of the file's.")] = None,
+    method: Annotated[list[str] | None, option("Only this method of the file (may be repeated).")] = None,
+    task: Annotated[list[str] | None, option("Only this task of the file (may be repeated).")] = None,
     model: ModelName = None,
     model_options: ModelOptionsFile = None,
     replay: Annotated[
         Path | None,
-        typer.Option(help="Replay the recorded calls of this experiment folder."),
+        option("Replay the recorded calls of this experiment folder."),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(
-            help="Local processes that run the cells; 0: this process.",
-            show_default="one per core with the extra distributed, else 0",
+        option(
+            "Local processes that run the cells; 0: this process.",
+            default="one per core with the extra distributed, else 0",
         ),
     ] = None,
     scheduler: Scheduler = None,
-    print_commands: Annotated[
-        bool, typer.Option("--print-commands", help="Print one command per cell to run, and exit.")
-    ] = False,
-    print_: Annotated[bool, typer.Option("--print", help="Print the file of a built-in experiment, and exit.")] = False,
+    print_commands: Annotated[bool, option("Print one command per cell to run, and exit.", "--print-commands")] = False,
+    print_: Annotated[bool, option("Print the file of a built-in experiment, and exit.", "--print")] = False,
     figures: Figures = True,
-    out: Annotated[Path | None, typer.Option(help="Folder.", show_default="experiments/NAME")] = None,
+    out: Annotated[Path | None, option("Folder.", default="experiments/NAME")] = None,
     json_: Json = False,
 ) -> None:
     """Run methods on tasks with several seeds, and compare them.
@@ -116,14 +115,12 @@ def compare(
     folders: Annotated[
         list[Path] | None, typer.Argument(help="Run folders, or folders that contain them.", show_default="runs")
     ] = None,
-    list_: Annotated[bool, typer.Option("--list", help="Only list the runs and their progress.")] = False,
+    list_: Annotated[bool, option("Only list the runs and their progress.", "--list")] = False,
     baseline: Annotated[
-        str | None, typer.Option(help="The method that the others are compared with.", show_default="of the first run")
+        str | None, option("The method that the others are compared with.", default="of the first run")
     ] = None,
     figures: Figures = True,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for tables and figures.", show_default="none are written")
-    ] = None,
+    out: Annotated[Path | None, option("Folder for tables and figures.", default="none are written")] = None,
     json_: Json = False,
     csv_: Csv = False,
 ) -> None:
@@ -170,17 +167,17 @@ def compare_arms(
     ],
     run: Annotated[
         Path | None,
-        typer.Option(help="A run of the task to compare with; its figures then show the arms."),
+        option("A run of the task to compare with; its figures then show the arms."),
     ] = None,
     base: BasePose = None,
     tip: Tip = None,
     base_link: BaseLink = None,
     space: SpaceFile = None,
     figures: Figures = True,
-    seed: Annotated[int, typer.Option(help="Seed of the base search.")] = 0,
+    seed: Annotated[int, option("Seed of the base search.")] = 0,
     price: Annotated[
         list[str] | None,
-        typer.Option(metavar="ARM=USD", help="Price of an existing arm, such as ur5e=28000 (may be repeated)."),
+        option("Price of an existing arm, such as ur5e=28000 (may be repeated).", metavar="ARM=USD"),
     ] = None,
     json_: Json = False,
     csv_: Csv = False,

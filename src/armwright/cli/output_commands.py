@@ -13,6 +13,7 @@ from armwright.cli.options import (
     ModelName,
     ModelOptionsFile,
     RunFolder,
+    option,
 )
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
@@ -20,19 +21,17 @@ from armwright.exceptions import FailureError, SettingsError
 
 def pick(
     run: RunFolder,
-    where: Annotated[
-        list[str] | None, typer.Option(help='A condition such as "position_error<=0.05" (may be repeated).')
-    ] = None,
-    by: Annotated[str | None, typer.Option(help="The quantity to minimise: torque, mass, link_1, …")] = None,
+    where: Annotated[list[str] | None, option('A condition such as "position_error<=0.05" (may be repeated).')] = None,
+    by: Annotated[str | None, option("The quantity to minimise: torque, mass, link_1, …")] = None,
     weights: Annotated[
         str | None,
-        typer.Option(help="Weights of objectives relative to the reference point: position_error=2,torque=1."),
+        option("Weights of objectives relative to the reference point: position_error=2,torque=1."),
     ] = None,
     robust: Annotated[
-        bool, typer.Option("--robust", help="Only designs that stay good with the base or a link 1 mm off.")
+        bool, option("Only designs that stay good with the base or a link 1 mm off.", "--robust")
     ] = False,
-    n: Annotated[int, typer.Option("-n", help="Number of designs, the best first.")] = 1,
-    all_: Annotated[bool, typer.Option("--all", help="All designs that meet the conditions, in a table.")] = False,
+    n: Annotated[int, option("Number of designs, the best first.", "-n")] = 1,
+    all_: Annotated[bool, option("All designs that meet the conditions, in a table.", "--all")] = False,
     json_: Json = False,
     csv_: Csv = False,
 ) -> None:
@@ -66,18 +65,13 @@ def pick(
 
 def export(
     run: RunFolder,
-    design: Annotated[
-        int | None, typer.Option(help="Number of the design.", show_default="the knee of the front")
-    ] = None,
+    design: Annotated[int | None, option("Number of the design.", default="the knee of the front")] = None,
     format_: Annotated[
         str,
-        typer.Option(
-            "--format",
-            help="urdf, ros2_control or mjcf; optuna: the whole run as a study.",
-        ),
+        option("urdf, ros2_control or mjcf; optuna: the whole run as a study.", "--format"),
     ] = "urdf",
     out: Annotated[
-        Path | None, typer.Option(help="Output file.", show_default="stdout; for optuna, study.db in the run folder")
+        Path | None, option("Output file.", default="stdout; for optuna, study.db in the run folder")
     ] = None,
 ) -> None:
     """Write a design of RUN for a simulator or a workshop, or all of RUN for Optuna.
@@ -107,13 +101,11 @@ def export(
 
 def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
-    live: Annotated[
-        bool, typer.Option("--live", help="Serve the live page of RUN until Ctrl-C instead (extra live).")
-    ] = False,
+    live: Annotated[bool, option("Serve the live page of RUN until Ctrl-C instead (extra live).", "--live")] = False,
     host: Annotated[
-        str, typer.Option(help="Address to listen on; any other than the default opens the page to a network.")
+        str, option("Address to listen on; any other than the default opens the page to a network.")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port to listen on; 0: any free port.")] = 0,
+    port: Annotated[int, option("Port to listen on; 0: any free port.")] = 0,
     follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
 ) -> None:
     """Write report.html into each RUN: one file for any browser, without a network."""
@@ -137,7 +129,7 @@ def report(
 def doctor(
     model: ModelName = None,
     model_options: ModelOptionsFile = None,
-    call: Annotated[bool, typer.Option("--call", help="Make one small call to the configured model.")] = False,
+    call: Annotated[bool, option("Make one small call to the configured model.", "--call")] = False,
 ) -> None:
     """Show what is installed and which models are configured.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.arm_options import Tip
-from armwright.cli.options import Json
+from armwright.cli.options import Json, option
 from armwright.cli.streams import open_console, print_json
 from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.exceptions import SettingsError
@@ -39,56 +39,46 @@ def reach_map(
         str,
         typer.Argument(metavar="RUN|ARM", help="A run folder, a URDF file, or a name such as ur5e (extra arms)."),
     ],
-    design: Annotated[
-        int | None, typer.Option(help="Number of the design of RUN.", show_default="the knee of the front")
-    ] = None,
+    design: Annotated[int | None, option("Number of the design of RUN.", default="the knee of the front")] = None,
     tip: Tip = None,
     spacing: Annotated[
         float | None,
-        typer.Option(
-            help=r"Distance of neighbouring points \[m].", show_default="about 2,000 points", rich_help_panel=GRID
-        ),
+        option(r"Distance of neighbouring points \[m].", panel=GRID, default="about 2,000 points"),
     ] = None,
     box: Annotated[
         str | None,
-        typer.Option(
-            help=r"Smallest, then largest coordinates x,y,z,x,y,z of the points \[m].",
-            show_default="all that the tip reaches",
-            rich_help_panel=GRID,
+        option(
+            r"Smallest, then largest coordinates x,y,z,x,y,z of the points \[m].",
+            panel=GRID,
+            default="all that the tip reaches",
         ),
     ] = None,
-    axis: Annotated[
-        str, typer.Option(help="Middle x,y,z of the cone of tool directions.", rich_help_panel=GRID)
-    ] = "0,0,-1",
-    cone: Annotated[
-        float, typer.Option(help="Half the opening angle of the cone [°]; 180: all directions.", rich_help_panel=GRID)
-    ] = 180.0,
-    directions: Annotated[int, typer.Option(help="Number of directions.", rich_help_panel=GRID)] = 50,
+    axis: Annotated[str, option("Middle x,y,z of the cone of tool directions.", panel=GRID)] = "0,0,-1",
+    cone: Annotated[float, option("Half the opening angle of the cone [°]; 180: all directions.", panel=GRID)] = 180.0,
+    directions: Annotated[int, option("Number of directions.", panel=GRID)] = 50,
     share: Annotated[
         float,
-        typer.Option(help="Share of directions at a point of the dexterous volume, 0 to 1.", rich_help_panel=GRID),
+        option("Share of directions at a point of the dexterous volume, 0 to 1.", panel=GRID),
     ] = 1.0,
     payload: Annotated[
         float | None,
-        typer.Option(help=r"Payload at the tip that the motors have to hold \[kg].", rich_help_panel=CONDITIONS),
+        option(r"Payload at the tip that the motors have to hold \[kg].", panel=CONDITIONS),
     ] = None,
     clearance: Annotated[
         float | None,
-        typer.Option(help=r"Least distance from the arm itself and from obstacles \[m].", rich_help_panel=CONDITIONS),
+        option(r"Least distance from the arm itself and from obstacles \[m].", panel=CONDITIONS),
     ] = None,
     obstacles: Annotated[
         bool,
-        typer.Option("--obstacles", help="Keep clear of the obstacles of the task.", rich_help_panel=CONDITIONS),
+        option("Keep clear of the obstacles of the task.", "--obstacles", panel=CONDITIONS),
     ] = False,
     task: Annotated[
         str | None,
-        typer.Option(
-            help="The task with the obstacles and targets, for a URDF.", show_default="none", rich_help_panel=CONDITIONS
-        ),
+        option("The task with the obstacles and targets, for a URDF.", panel=CONDITIONS, default="none"),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="The npz file; the figure is beside it.", show_default="RUN/reach-maps/, or this folder"),
+        option("The npz file; the figure is beside it.", default="RUN/reach-maps/, or this folder"),
     ] = None,
     json_: Json = False,
 ) -> None:
@@ -166,9 +156,9 @@ def _subject(source: str, design: int | None, tip: str | None, task: str | None)
         arm = read_urdf(find_urdf(source), tip)
         name = Path(source).stem
         return _Subject(name, arm, None if task is None else load_task(task), Path(f"{name}-reach"))
-    for option, value in (("--tip", tip), ("--task", task)):
+    for name, value in (("--tip", tip), ("--task", task)):
         if value is not None:
-            raise SettingsError(f"{option} {value} is for a URDF; the run {source} has its own")
+            raise SettingsError(f"{name} {value} is for a URDF; the run {source} has its own")
     _, history = read_run(Path(source))
     if design is not None and not 0 <= design < len(history):
         raise SettingsError(f"--design {design}: {source} has the designs 0 to {len(history) - 1}")

@@ -31,6 +31,7 @@ from armwright.cli.options import (
     SummaryJson,
     TaskName,
     load_problem,
+    option,
     select_workers,
 )
 from armwright.cli.signals import interruptible
@@ -42,29 +43,27 @@ def design(
     task: TaskName,
     budget: Annotated[
         str | None,
-        typer.Option(
-            help="Wall-clock time of the command: 60s, 5min, 1h, or a number of seconds. Compiling kernels in a first "
+        option(
+            "Wall-clock time of the command: 60s, 5min, 1h, or a number of seconds. Compiling kernels in a first "
             "run does not count.",
-            show_default="30s; no limit with --evaluations",
+            default="30s; no limit with --evaluations",
         ),
     ] = None,
     evaluations: Annotated[
-        int | None, typer.Option(help="Evaluations of the search; with --budget, whichever ends first.")
+        int | None, option("Evaluations of the search; with --budget, whichever ends first.")
     ] = None,
     space: SpaceFile = None,
     objectives: Objectives = None,
-    from_: Annotated[
-        Path | None, typer.Option("--from", help="Use all designs of this run as initial designs.")
-    ] = None,
+    from_: Annotated[Path | None, option("Use all designs of this run as initial designs.", "--from")] = None,
     proposer: Annotated[
-        str | None, typer.Option(help="Proposer of the initial designs: rules, or a configured model (llm).")
+        str | None, option("Proposer of the initial designs: rules, or a configured model (llm).")
     ] = None,
     robust: Robust = False,
     device: DeviceName = "auto",
     figures: Figures = True,
-    stall: Annotated[bool, typer.Option("--stall/--no-stall", help="Stop early if the hypervolume stalls.")] = True,
+    stall: Annotated[bool, option("Stop early if the hypervolume stalls.", "--stall/--no-stall")] = True,
     seed: Seed = 0,
-    out: Annotated[Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-design-seedSEED")] = None,
+    out: Annotated[Path | None, option("Run folder.", default="runs/TASK-design-seedSEED")] = None,
     json_: SummaryJson = False,
 ) -> None:
     """Find the whole Pareto front of TASK by direct search in batches.
@@ -132,39 +131,30 @@ def optimize(
     robust: Robust = False,
     proposer: Annotated[
         str,
-        typer.Option(
-            help="Proposer of every n-step-th design: auto (a configured model, else rules), none, rules, llm, "
+        option(
+            "Proposer of every n-step-th design: auto (a configured model, else rules), none, rules, llm, "
             "replay:RUN (a recorded run), manual:DIR (a person, by files).",
-            rich_help_panel=SEARCH,
+            panel=SEARCH,
         ),
     ] = "auto",
     sampler: Annotated[
         str,
-        typer.Option(
-            help="Black-box sampler: auto (surrogate with an evaluator, else tpe), surrogate, tpe, tpe-multivariate, "
+        option(
+            "Black-box sampler: auto (surrogate with an evaluator, else tpe), surrogate, tpe, tpe-multivariate, "
             "nsga2, gp (needs the extra gp) or random.",
-            rich_help_panel=SEARCH,
+            panel=SEARCH,
         ),
     ] = "auto",
-    n_total: Annotated[int, typer.Option(help="Counted trials.", rich_help_panel=SEARCH)] = 200,
-    n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.", rich_help_panel=SEARCH)] = 10,
-    n_step: Annotated[
-        int, typer.Option(help="Trials in a block; the first is the proposer's.", rich_help_panel=SEARCH)
-    ] = 10,
+    n_total: Annotated[int, option("Counted trials.", panel=SEARCH)] = 200,
+    n_init: Annotated[int, option("Random trials before the counted ones.", panel=SEARCH)] = 10,
+    n_step: Annotated[int, option("Trials in a block; the first is the proposer's.", panel=SEARCH)] = 10,
     initial_design: Annotated[
         list[Path] | None,
-        typer.Option(
-            help="An initial design, such as designs/0042/design.json of a run (may be repeated).",
-            rich_help_panel=SEARCH,
-        ),
+        option("An initial design, such as designs/0042/design.json of a run (may be repeated).", panel=SEARCH),
     ] = None,
     screen: Annotated[
         bool,
-        typer.Option(
-            "--screen/--no-screen",
-            help="Skip proposals of which the sampler surrogate expects little.",
-            rich_help_panel=SEARCH,
-        ),
+        option("Skip proposals of which the sampler surrogate expects little.", "--screen/--no-screen", panel=SEARCH),
     ] = True,
     seed: Seed = 0,
     model: ModelName = None,
@@ -174,33 +164,26 @@ def optimize(
     model_options: ModelOptionsFile = None,
     print_prompt: Annotated[
         str | None,
-        typer.Option(
-            metavar="WHAT",
-            help="Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run folder), the "
+        option(
+            "Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run folder), the "
             "number of a trial of a run, schema (of the answer), template (of the prompt), variables (of templates).",
-            rich_help_panel=MODEL,
+            panel=MODEL,
+            metavar="WHAT",
         ),
     ] = None,
     device: DeviceName = "auto",
     workers: Annotated[
         int,
-        typer.Option(
-            help="Local processes that evaluate designs; 0: this process (extra distributed).",
-            rich_help_panel=EVALUATION,
-        ),
+        option("Local processes that evaluate designs; 0: this process (extra distributed).", panel=EVALUATION),
     ] = 0,
     scheduler: Scheduler = None,
     evaluation_timeout: EvaluationTimeout = None,
     allow_failures: AllowFailures = False,
-    out: Annotated[
-        Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-seedSEED", rich_help_panel=OUTPUT)
-    ] = None,
+    out: Annotated[Path | None, option("Run folder.", panel=OUTPUT, default="runs/TASK-seedSEED")] = None,
     figures: Figures = True,
     live: Annotated[
         bool,
-        typer.Option(
-            "--live", help="Serve the page of the run on 127.0.0.1 while it runs (extra live).", rich_help_panel=OUTPUT
-        ),
+        option("Serve the page of the run on 127.0.0.1 while it runs (extra live).", "--live", panel=OUTPUT),
     ] = False,
     json_: SummaryJson = False,
 ) -> None:
