@@ -23,6 +23,7 @@ from armwright.pictures.style import FRONT, JOINT, LINK, OBSTACLE, RC, TARGET
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.task import Task
 
 COLOURS = "viridis"
 POSITION_ONLY = "#E3E3E8"  # points reached in none of the directions
@@ -32,22 +33,23 @@ ASIDE = 0.6  # of half the plane's width: where the arm is drawn, if there are e
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """An arm and what is around it, for pictures of its reach.
-
-    Attributes:
-        title: The title of the figure.
-        arm: The arm.
-        conditions: What usable poses satisfy, in words.
-        obstacles: The obstacles that are drawn.
-        targets: (T, 3) targets that are drawn [m]; the horizontal slice is at their mean height.
-    """
+class MappedArm:
+    """An arm whose reach is mapped, and the task around it."""
 
     title: str
     arm: Arm | UrdfArm
-    conditions: str = ""
-    obstacles: Sequence[Obstacle] = ()
-    targets: Array | None = None
+    task: Task | None = None  # whose obstacles and targets are drawn
+    conditions: str = ""  # that usable poses satisfy, in words
+
+    @property
+    def targets(self) -> Array | None:
+        """(T, 3) targets [m]; the horizontal slice is at their mean height."""
+        return None if self.task is None else self.task.target_positions
+
+    @property
+    def obstacles(self) -> Sequence[Obstacle]:
+        """The obstacles of the task."""
+        return () if self.task is None else self.task.obstacles
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class _Slice:
         return float(found.coordinates(self.across)[self.index])
 
 
-def write_reach_figure(found: ReachMap, around: Surroundings, share: float, file: Path) -> None:
+def write_reach_figure(found: ReachMap, around: MappedArm, share: float, file: Path) -> None:
     """Write the slices of a reach map.
 
     Args:
@@ -82,7 +84,7 @@ def write_reach_figure(found: ReachMap, around: Surroundings, share: float, file
         save_figure(_draw(found, around, share), file)
 
 
-def _draw(found: ReachMap, around: Surroundings, share: float) -> Figure:
+def _draw(found: ReachMap, around: MappedArm, share: float) -> Figure:
     """Draw two slices, twice if there are conditions."""
     rows = [("within joint limits", found.bare)]
     if found.usable is not found.bare:
@@ -123,7 +125,7 @@ def _vertical(found: ReachMap, arm: Arm) -> _Slice:
     return max(planes, key=lambda plane: float(plane.of(found, found.usable.covered.astype(float)).sum()))
 
 
-def _horizontal(found: ReachMap, around: Surroundings) -> _Slice:
+def _horizontal(found: ReachMap, around: MappedArm) -> _Slice:
     """Return the horizontal plane at the mean height of the targets, else where the most directions are reached."""
     if around.targets is not None:
         return _Slice(0, 1, 2, _nearest(found, 2, float(around.targets[:, 2].mean())))
@@ -135,7 +137,7 @@ def _nearest(found: ReachMap, axis: int, value: float) -> int:
     return int(np.abs(found.coordinates(axis) - value).argmin())
 
 
-def _draw_slice(axes: Any, found: ReachMap, coverage: PoseCoverage, plane: _Slice, around: Surroundings) -> Any:
+def _draw_slice(axes: Any, found: ReachMap, coverage: PoseCoverage, plane: _Slice, around: MappedArm) -> Any:
     """Draw one plane of the map and return its image."""
     shares, covered = plane.of(found, coverage.share), plane.of(found, coverage.covered)
     half = found.spacing / 2
