@@ -3,7 +3,7 @@
 import time
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -38,6 +38,11 @@ from armwright.cli.signals import interruptible
 from armwright.cli.streams import exit_interrupted, open_console, print_command, print_json, repeat_command
 from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from armwright.problem.problem import Problem
+
 
 def design(
     task: TaskName,
@@ -71,9 +76,7 @@ def design(
     The same command with a larger --budget or --evaluations continues the search.
     """
     started = time.monotonic()
-    from armwright.cli.check import check_before_search, check_files
-    from armwright.cli.notes import space_note
-    from armwright.cli.progress import announce_compilation, search_progress
+    from armwright.cli.progress import search_progress
     from armwright.cli.show_results import show_search
     from armwright.proposers.factory import choose_proposer
     from armwright.study.front.front_run import find_front
@@ -83,18 +86,15 @@ def design(
     if from_ is not None and proposer is not None:
         raise SettingsError("--from and --proposer both set the initial designs; use one of them")
     console = open_console(json_)
-    announce_compilation(console)
     plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=figures, started=started)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
-    if space is None and (note := space_note(problem)):
-        console.print(note)
     choice = None if proposer is None else choose_proposer(proposer)
     if choice is not None:
         if choice.proposer is None:
             raise SettingsError(f"--proposer {proposer} proposes no initial designs; leave it out")
         console.print(choice.reason)
     folder = out or Path("runs") / f"{problem.task.name}-design-seed{seed}"
-    check_before_search(console, problem, check_files(task, space), folder)
+    _begin(console, problem, task, space, folder)
     try:
         with interruptible(), search_progress(console) as watch:
             run = find_front(
@@ -191,9 +191,8 @@ def optimize(
 
     The same command resumes or shows the run; a larger --n-total extends it.
     """
-    from armwright.cli.check import check_before_search, check_files
-    from armwright.cli.notes import design_note, space_note
-    from armwright.cli.progress import announce_compilation, study_progress
+    from armwright.cli.notes import design_note
+    from armwright.cli.progress import study_progress
     from armwright.cli.show_results import show_result
     from armwright.llm.configuration import load_model_options
     from armwright.proposers.factory import choose_proposer
@@ -201,7 +200,6 @@ def optimize(
     from armwright.study.study import optimize as run_study
 
     console = open_console(json_)
-    announce_compilation(console)
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
     load = partial(load_problem, task, space, robust, device, objectives=objectives, evaluator=evaluator)
     if print_prompt is not None:
@@ -210,8 +208,6 @@ def optimize(
         show_prompt(print_prompt, task, space, load, given, n_init, n_total, seed)
         return
     problem = load()
-    if space is None and (note := space_note(problem)):
-        console.print(note)
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     choice = choose_proposer(proposer, given)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
@@ -219,7 +215,7 @@ def optimize(
     is_method_chosen = proposer != "auto" or model is not None or sampler != "auto"
     if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
         console.print(note)
-    check_before_search(console, problem, check_files(task, space), folder)
+    _begin(console, problem, task, space, folder)
     if live:
         from armwright.page.live_server import start_server
 
@@ -269,6 +265,18 @@ def optimize(
         show_result(console, run, drawn)
     if all(trial.failure is not None for trial in run.trials):
         raise typer.Exit(1)
+
+
+def _begin(console: "Console", problem: "Problem", task: str, space: Path | None, folder: Path) -> None:
+    """Print the task's own space and warnings; stop if no design can serve the task."""
+    from armwright.cli.check import check_before_search, check_files
+    from armwright.cli.notes import space_note
+    from armwright.cli.progress import announce_compilation
+
+    announce_compilation(console)
+    if space is None and (note := space_note(problem)):
+        console.print(note)
+    check_before_search(console, problem, check_files(task, space), folder)
 
 
 def _draw(folder: Path) -> list[Path]:

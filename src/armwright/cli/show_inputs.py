@@ -125,7 +125,7 @@ def show_task(
         stored: Its baselines.
         has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
         has_bodies: Whether motors or a column are solid bodies, which may not collide.
-        is_brief: Leave out the targets and the steps of the cycle.
+        is_brief: Leave out the targets.
     """
     reference = task.reference_point
     print_named(console, task.name, f": {task.description}" if task.description else "")
@@ -143,8 +143,8 @@ def show_task(
         ("payload", _describe_payload(task)),
         ("evaluated by the worst case, also", task.cases_description),
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
-        ("cycle", "" if is_brief else task.cycle_description),
-        ("durations", task.cycle.describe_times() if task.cycle and not is_brief else ""),
+        ("cycle", task.cycle_description),
+        ("durations", task.cycle.describe_times() if task.cycle else ""),
         (
             "constraints of the cycle" if task.cycle else "constraints of the solid bodies",
             ", ".join(implied_constraints(task, has_drives, has_bodies)),
@@ -193,31 +193,6 @@ def _tool_direction(arrays: TargetArrays, index: int) -> str:
         parts.append(f"within {math.degrees(arrays.angle_tolerance[index]):.3g}°")
     parts += [f"weight {arrays.weight[index]:g}"] * bool(arrays.weight[index] != 1.0)
     return ", ".join(parts) or "any"
-
-
-def show_cycle(console: Console, task: DesignTask) -> None:
-    """Print the steps of a cycle, one a line; nothing without a cycle."""
-    if task.cycle is None:
-        return
-    cycle, plan = task.cycle, task.plan(task.target_positions)
-    names = [task.target_names[target] for target in plan.targets]
-    acts = {"pick": ", pick", "place": ", place", None: ""}
-    carried = cycle.carried() if task.payloads.any() else (False,) * len(names)
-    console.print(f"  cycle, {'closed' if cycle.closed else 'open'}, at rest at each target:")
-    console.print(f"    1. start at {names[0]}" + ("" if cycle.closed else acts[cycle.steps[0].do]))
-    for number in range(1, len(names) + cycle.closed):
-        step, time = cycle.steps[number % len(names)], plan.times[number % len(names)]
-        way = "a line" if step.by == "line" else "a joint motion"
-        back = "back " if number == len(names) else ""
-        load = " with the payload" if carried[number % len(names)] else ""
-        duration = "as fast as possible" if time is None else f"in {time:g} s"
-        console.print(
-            f"    {number + 1}. {back}to {names[number % len(names)]} by {way}{load}, {duration}{acts[step.do]}"
-        )
-    if cycle.approach is not None:
-        console.print(f"    lines of {1e3 * cycle.approach:g} mm along the tool before and after each pick and place")
-    if cycle.dwell:
-        console.print(f"    {cycle.dwell:g} s at rest after each pick and place")
 
 
 def _describe_payload(task: DesignTask) -> str:
