@@ -22,11 +22,11 @@ def visible(text: str) -> str:
     return "".join(" " if kind == "Cc" else letter for letter, kind in kinds if kind not in ("Cf", "Cs"))
 
 
-def rounded(value: float | None) -> str:
-    """Return a value with three significant digits; a large one with all its digits, not with an exponent."""
+def rounded(value: float | None, digits: int = 3) -> str:
+    """Return a value with so many significant digits; a large one with all its digits, not with an exponent."""
     if value is None:
         return "–"
-    return f"{value:.3g}" if abs(value) < 1e3 else f"{value:,.0f}"
+    return f"{value:.{digits}g}" if abs(value) < 10.0**digits else f"{value:,.0f}"
 
 
 def decimals(value: float | None, places: int = 2) -> str:

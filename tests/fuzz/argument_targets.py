@@ -42,7 +42,7 @@ def argument_seeds() -> list[bytes]:
     return [json.dumps(line).encode() for line in lines]
 
 
-NEVER = ("live", "--live", "--call", "--scheduler", "--workers")  # these wait for others or start processes
+NEVER = ("--live", "--call", "--scheduler", "--workers")  # these wait for others or start processes
 
 
 def run_arguments(data: bytes) -> None:

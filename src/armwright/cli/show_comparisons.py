@@ -22,6 +22,7 @@ from armwright.robot.mounting import Mounting
 from armwright.sheet.record import NOT_MODELLED
 from armwright.study.workers.cluster import Workers
 from armwright.tasks.moments import MAX_MASS
+from armwright.text import rounded
 
 
 def show_plan(
@@ -113,8 +114,9 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     for arm in shown:
         values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
         known = [*(arm.measures[name] for name in measures), *(values[objective.name] for objective in others)]
-        cells = ["-" if value is None else _format_measure(value) for value in known]
-        rows.append([arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", _format_payload(arm), *cells])
+        rows.append(
+            [arm.name, str(arm.joints), f"{arm.reach:.2f}", rounded(arm.mass), _payload(arm), *map(rounded, known)]
+        )
     print_table(console, Table(columns, rows, "--json and --csv print all", title=title, gap=1))
     console.print(
         f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; torque "
@@ -187,13 +189,9 @@ _ARM_COLUMNS = {
 }
 
 
-def _format_payload(arm: ComparedArm) -> str:
+def _payload(arm: ComparedArm) -> str:
     held = arm.payload_at_full_reach
-    return "-" if held is None else "any" if held >= MAX_MASS else _format_measure(held)
-
-
-def _format_measure(value: float) -> str:
-    return f"{value:,.0f}" if value >= 1e4 else f"{value:.3g}" if value >= 0.0095 or value == 0.0 else f"{value:.1e}"
+    return "any" if held is not None and held >= MAX_MASS else rounded(held)
 
 
 def _describe_dominance(arm: ComparedArm, front: int) -> str:

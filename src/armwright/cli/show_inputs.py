@@ -21,6 +21,7 @@ from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
+from armwright.text import percent, rounded
 
 MAX_ROWS = 40  # of a table of targets
 
@@ -31,7 +32,7 @@ def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     columns = (Column("task"), *numbers("targets", *methods), Column("", rank=1, least=24))
     rows: list[list[str]] = []
     for task in tasks:
-        shares = {baseline.method: f"{100 * baseline.share:.0f} %" for baseline in baselines_of(task.name)}
+        shares = {baseline.method: percent(baseline.share) for baseline in baselines_of(task.name)}
         shown = (shares.get(method, "") for method in methods)
         rows.append([task.name, str(len(task.targets)), *shown, task.description])
     print_table(console, Table(columns, rows, "--json and --csv print all"))
@@ -56,7 +57,7 @@ def actuator_rows(records: Sequence[ActuatorRecord]) -> Iterator[dict[str, Any]]
 
 
 def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
-    """Print the catalogue; torques and prices that a data sheet lacks are empty."""
+    """Print the catalogue."""
     columns = (
         Column("actuator"), Column("maker", rank=3, least=8), *numbers("V", "kg"),
         *numbers(f"stall N{NO_BREAK}m", rank=2), *numbers(f"rated N{NO_BREAK}m", rank=1),
@@ -68,8 +69,7 @@ def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
             record.voltage, record.mass, record.stall_torque, record.rated_torque, record.peak_torque,
             record.speed, record.price,
         )  # fmt: skip
-        shown = ("" if value is None else f"{value:.4g}" for value in values)
-        rows.append([record.name, record.maker, *shown, record.source])
+        rows.append([record.name, record.maker, *(rounded(value, 4) for value in values), record.source])
     print_table(console, Table(columns, rows, "--json and --csv print all"))
     n_values = sum(value_of(record.completed(), name) is not None for record in records for name in UNITS)
     n_assumed = sum(len(record.assumed) for record in records)
@@ -93,7 +93,7 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
         shown = "page, or as the note says" if found is None else f"{found.address} ({found.statement})"
         if name in record.assumed:
             shown = f"assumed: estimate from {shown}" if found else f"assumed: default of a {record.kind}"
-        rows.append([name, f"{value:.4g}", unit, shown])
+        rows.append([name, rounded(value, 4), unit, shown])
     columns = (Column(""), *numbers("value"), Column(""), Column("source", rank=1, least=24))
     print_table(console, Table(columns, rows, "--json and --csv print all"))
     if record.body_shape is not None:
@@ -171,7 +171,7 @@ def show_target_table(console: Console, problem: Problem) -> None:
     rows: list[list[str]] = []
     for i, point in enumerate(task.targets[:MAX_ROWS]):
         values = (*point, 1e3 * arrays.tolerance[i], task.payloads[i], distances[i])
-        rows.append([task.target_names[i], *(f"{value:.4g}" for value in values), _tool_direction(arrays, i)])
+        rows.append([task.target_names[i], *(rounded(value, 4) for value in values), _tool_direction(arrays, i)])
     console.print(f"  {len(task.targets)} targets:")
     columns = (
         Column("target", least=12), *numbers(*heads[:4]), *numbers(heads[4], rank=1), *numbers(heads[5]),
