@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from armwright.experiments.cells import plan_cells
-from armwright.experiments.outcome import collect, published
+from armwright.experiments.outcome import collect
 from armwright.experiments.plan import load_experiment, with_only, with_seeds
 from armwright.experiments.runner import run_cells
 from armwright.experiments.tables import markdown
@@ -41,7 +41,7 @@ def run(seeds: int, n_workers: int) -> tuple[float, str]:
         faults = [outcome.fault for outcome in run_cells(cells, Workers(n_workers), print) if outcome.fault]
         seconds = time.perf_counter() - started
         assert not faults, faults
-        return seconds, markdown(collect(plan, cells), "", published(plan))
+        return seconds, markdown(collect(plan, cells), "")
 
 
 if __name__ == "__main__":

@@ -57,14 +57,15 @@ def test_commands_read_and_write_utf8_in_the_c_locale(in_folder: Path) -> None:
         folder = f"é-{name}"
         for command in (
             ("init", f"{name}.yaml"), ("check", "pièce.yaml"), (*study, "--out", folder), ("report", folder),
-            ("pick", folder), ("export", folder), ("prompt", folder), ("tasks",), ("runs", "."),
+            ("pick", folder), ("export", folder), ("optimize", folder, "--print-prompt", "next"),
+            ("tasks",), ("compare", "--list", "."),
             ("check", "none…é.yaml"),
         ):  # fmt: skip
             done = armwright(*command, environment=locale)
             assert "Traceback" not in done.stderr
             assert done.returncode == (2 if "none…é.yaml" in command else 0), done.stderr
         assert "Pièce … ³ 腕" in (Path(folder) / "config.yaml").read_text(encoding="utf-8")
-    listed = json.loads(armwright("runs", ".", "--json", environment=ASCII).stdout)
+    listed = json.loads(armwright("compare", "--list", ".", "--json", environment=ASCII).stdout)
     assert len(listed) == 2
     assert Path("é-c/config.yaml").read_bytes() == Path("é-any/config.yaml").read_bytes()
     assert Path("c.yaml").read_text(encoding="utf-8")

@@ -23,9 +23,21 @@ def visible(text: str) -> str:
     return "".join(" " if kind == "Cc" else letter for letter, kind in kinds if kind not in ("Cf", "Cs"))
 
 
-def rounded(value: float) -> str:
-    """Return a value with three significant digits; a large one with all its digits, not with an exponent."""
-    return f"{value:.3g}" if abs(value) < 1e3 else f"{value:,.0f}"
+def rounded(value: float | None, digits: int = 3) -> str:
+    """Return a value with so many significant digits; a large one with all its digits, not with an exponent."""
+    if value is None:
+        return "–"
+    return f"{value:.{digits}g}" if abs(value) < 10.0**digits else f"{value:,.0f}"
+
+
+def decimals(value: float | None, places: int = 2) -> str:
+    """Return a value with this many decimal places."""
+    return "–" if value is None else f"{value:.{places}f}"
+
+
+def percent(share: float | None, places: int = 0) -> str:
+    """Return a share in percent."""
+    return "–" if share is None else f"{100.0 * share:.{places}f} %"
 
 
 def significant(value: float, digits: int = 3, signed: bool = False) -> str:

@@ -14,6 +14,10 @@ def chosen(*options: str) -> set[str]:
     return {record["name"] for record in json.loads(armwright("actuators", *options, "--json").stdout)}
 
 
+def where(*conditions: str) -> list[str]:
+    return [argument for condition in conditions for argument in ("--where", condition)]
+
+
 def test_actuators_are_chosen_by_bounds() -> None:
     records = [record.completed() for record in catalogue().values()]
     expected = {
@@ -22,22 +26,21 @@ def test_actuators_are_chosen_by_bounds() -> None:
         if (r.peak_torque or 0.0) >= 2.0 and r.price is not None and r.price <= 60.0 and r.voltage == 12.0
     }
     assert expected
-    assert chosen("--torque", ">=2", "--price", "<=60", "--voltage", "12") == expected
-    assert chosen("--torque", ">= 2 N m", "--where", "price<=60 USD", "--voltage", "==12") == expected
-    shown = armwright("actuators", "--torque", ">=2", "--price", "<=60", "--voltage", "12").stdout
+    assert chosen(*where("peak_torque>=2 N m", "price<=60 USD", "voltage==12")) == expected
+    shown = armwright("actuators", *where("peak_torque>=2", "price<=60", "voltage==12")).stdout
     assert {line.split()[0] for line in shown.splitlines()[1:] if "Feetech" in line} <= expected
     assert "left out, as their price is unknown" in shown
 
 
 def test_bounds_may_be_in_other_units() -> None:
-    assert chosen("--mass", "<=60 g") == chosen("--mass", "<=0.06") == chosen("--mass", "<=0.06 kg")
-    assert chosen("--speed", ">100 rpm") == {
+    assert chosen("--where", "mass<=60 g") == chosen("--where", "mass<=0.06")
+    assert chosen("--where", "speed>100 rpm") == {
         r.name for r in catalogue().values() if r.speed is not None and r.speed > 100 * 3.141592653589793 / 30
     }
 
 
 def test_named_actuators_can_be_filtered_too() -> None:
-    assert chosen("XM430-W350", "MG996R", "--torque", ">2") == {"XM430-W350"}
+    assert chosen("XM430-W350", "MG996R", "--where", "peak_torque>2") == {"XM430-W350"}
 
 
 def test_csv_and_json_hold_the_same_values() -> None:
@@ -53,9 +56,9 @@ def test_csv_and_json_hold_the_same_values() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--torque", ">=2 V"), "peak_torque: expected a bound in N m, got 2 V"),
-        (("--mass", "<80 lbs"), "mass: expected a bound in kg or g, got 80 lbs"),
-        (("--price", "cheap"), '--price "cheap": expected one of <= < == > >= and a number'),
+        (("--where", "peak_torque>=2 V"), "peak_torque: expected a bound in N m, got 2 V"),
+        (("--where", "mass<80 lbs"), "mass: expected a bound in kg or g, got 80 lbs"),
+        (("--where", "price=cheap"), '--where "price=cheap": expected a name, one of <= < == > >= and a number'),
         (("--where", "torqe>2"), 'unknown value "torqe".'),
         (("--where", "backlsh<2"), 'Did you mean "backlash"?'),
         (("--where", "gear_ratio<2 m"), "gear_ratio: expected a number without a unit, got 2 m"),
@@ -67,4 +70,4 @@ def test_mistakes_are_one_line(options: tuple[str, ...], words: str) -> None:
 
 
 def test_too_narrow_bounds_are_named() -> None:
-    assert "none of 42 actuators has price < 1 USD" in refused(1, "actuators", "--price", "<1")
+    assert "none of 42 actuators has price < 1 USD" in refused(1, "actuators", "--where", "price<1")

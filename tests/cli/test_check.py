@@ -45,19 +45,6 @@ def test_check_prints_json(in_folder: Path) -> None:
     assert "obstacles" in record["unused"][0]
 
 
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ("name: bad\ntargets: []\n", "targets is empty"),
-        ("name: bad\ntargets: [[0.1, 0, 0.1]]\nobjectives: [position_error, price]\n", "needs actuators"),
-        ("name: bad\ntargets: [[0.1, 0, 0.1]]\nconstraints: [mass < 3]\n", "mass < 3"),
-    ],
-)
-def test_check_reports_an_invalid_task_in_one_line(in_folder: Path, text: str, reason: str) -> None:
-    (in_folder / "bad.yaml").write_text(text, encoding="utf-8")
-    assert reason in refused(2, "check", "bad.yaml")
-
-
 def test_fixed_and_tied_parameters_are_not_free() -> None:
     space = DesignSpace.model_validate({"origin_z": [0.0, 0.0], "tie": {"link_2": "link_1"}})
     names = {parameter.name for parameter in free_parameters(space)}
@@ -83,9 +70,7 @@ def test_cycle_is_shown_with_its_durations_and_constraints(in_folder: Path) -> N
     checked = armwright("check", "task.yaml", "--space", "space.yaml", "--no-picture")
     assert checked.returncode == 0, checked.stderr
     assert not list(in_folder.glob("*.png"))
-    assert "1. start at bin" in checked.stdout
-    assert "2. to 2 by a line, in 2.5 s, place" in checked.stdout
-    assert "3. back to bin by a joint motion, in 1.5 s, pick" in checked.stdout
+    assert "cycle: bin (pick), by a line to 2 (place), by a joint motion back to bin" in checked.stdout
     assert f"constraints of the cycle: {', '.join([*bounds, *drives])}\n" in checked.stdout
     record = json.loads(armwright("check", "task.yaml", "--space", "space.yaml", "--json").stdout)
     assert record["constraints"] == ["clearance >= 0.01", *bounds, *drives]

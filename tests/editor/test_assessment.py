@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.editor.assessment import assess
-from armwright.editor.choices import choices
 from armwright.editor.edited_files import EditedFiles, Texts
-from armwright.problem.objectives import QUANTITIES
 from tests.support.command_line import armwright
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -79,9 +77,3 @@ def test_any_document_is_assessed(files: EditedFiles, text: str) -> None:
     good = texts_of(*PAIRS[0])
     for texts in (Texts(text, good.space), Texts(good.task, text), Texts(text, text)):
         assert assess(texts, files).errors
-
-
-def test_the_lists_hold_every_quantity_and_motor() -> None:
-    offered = choices()
-    assert {one["name"] for one in offered["quantities"]} == set(QUANTITIES)
-    assert all(one["torque"] > 0.0 and one["name"] for one in offered["actuators"])

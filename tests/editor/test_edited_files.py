@@ -144,21 +144,6 @@ def test_mixed_line_ends_are_announced_before_they_are_changed(tmp_path: Path) -
     assert files.notes == Texts("", "")
 
 
-def test_a_change_of_line_ends_on_disk_is_a_change(tmp_path: Path) -> None:
-    file = tmp_path / "task.yaml"
-    file.write_bytes(b"name: one\n")
-    files = EditedFiles(file)
-    file.write_bytes(b"name: one\r\n")
-    with pytest.raises(ChangedOnDiskError):
-        files.save(Texts("name: two\n", files.texts().space))
-
-
-@pytest.mark.parametrize("name", ["task.txt", "task", "nowhere/task.yaml"])
-def test_names_that_cannot_be_task_files_are_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(TaskError, match=r"expected a name|there is no folder"):
-        EditedFiles(tmp_path / name)
-
-
 @pytest.mark.parametrize("content", [b"\xff\xfe", b"#" * (MAX_BYTES + 1)])
 def test_what_is_no_text_or_too_long_is_refused(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "task.yaml").write_bytes(content)

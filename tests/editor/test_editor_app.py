@@ -1,8 +1,6 @@
 """The editor's server: its requests, and attacks by other pages, other users and hostile texts."""
 
-import http.client
 import json
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,6 @@ import pytest
 
 import armwright as aw
 from armwright.editor.app import MAX_BODY
-from armwright.page.request_guard import HEADERS
 from tests.support.editor import ServedEditor, served_editor
 from tests.support.live_server import ask
 
@@ -40,14 +37,6 @@ def right_body(editor: ServedEditor, path: str) -> dict[str, Any]:
     }[path]
 
 
-def said(port: int, *lines: str) -> tuple[int, dict[str, str]]:
-    with socket.create_connection(("127.0.0.1", port)) as connection:
-        connection.sendall("\r\n".join([*lines, "", ""]).encode())
-        answer = http.client.HTTPResponse(connection)
-        answer.begin()
-        return answer.status, {name.lower(): value for name, value in answer.getheaders()}
-
-
 def test_edits_are_applied_assessed_and_saved(editor: ServedEditor) -> None:
     edits = [{"path": ["targets", 0], "value": {"name": "left", "position": [0.3, 0, 0.1]}}]
     status, reply = editor.post(
@@ -60,30 +49,6 @@ def test_edits_are_applied_assessed_and_saved(editor: ServedEditor) -> None:
     assert editor.post("/save", found["texts"])[0] == 204
     assert aw.load_task(editor.task).target_names[0] == "left"
     assert aw.load_space(editor.task.with_name("my-space.yaml")).joints == 5
-
-
-def test_a_file_that_changed_on_disk_is_a_conflict(editor: ServedEditor) -> None:
-    mine = texts(editor)
-    editor.task.write_text("name: theirs\n", encoding="utf-8")
-    status, reason = editor.post("/save", mine)
-    assert (status, editor.task.read_text(encoding="utf-8")) == (409, "name: theirs\n")
-    assert b"has changed on disk" in reason
-    assert editor.post("/save", {**mine, "overwrite": True})[0] == 204
-    assert editor.task.read_text(encoding="utf-8") == mine["task"]
-
-
-def test_pasted_points_are_converted(editor: ServedEditor) -> None:
-    text = "id;y;x;z;name;ax;ay;az\n7;20;100;-3,5;left;0;0;-1\n8;20;100;0;;0;0;1\n"
-    assert json.loads(editor.post("/points", {"text": text, "unit": "mm"})[1]) == {
-        "targets": [
-            {"name": "left", "position": [0.1, 0.02, -0.0035], "axis": [0.0, 0.0, -1.0]},
-            {"position": [0.1, 0.02, 0.0], "axis": [0.0, 0.0, 1.0]},
-        ],
-        "notes": ["columns not used: 'id'", "numbers have decimal commas: -3,5 is read as -3.5"],
-    }
-    assert json.loads(editor.post("/points", {"text": "1 2 3"})[1]) == {"targets": [[1.0, 2.0, 3.0]], "notes": []}
-    status, reason = editor.post("/points", {"text": "1, 2\n"})
-    assert (status, b"line 1" in reason) == (400, True)
 
 
 def test_a_search_needs_a_valid_task_and_writes_nothing_without(editor: ServedEditor) -> None:
@@ -170,17 +135,3 @@ def test_hostile_texts_are_assessed(editor: ServedEditor, task: str) -> None:
     assert editor.post("/assess", {"task": task, "space": "", "task_edits": [{"path": ["payload"], "value": 1}]})[
         0
     ] in (200, 400, 422)
-
-
-def test_responses_have_security_headers(editor: ServedEditor) -> None:
-    host, key = f"Host: 127.0.0.1:{editor.port}", f"X-Armwright-Key: {editor.key}"
-    for status, lines in (
-        (200, ("GET / HTTP/1.1", host)),
-        (200, ("GET /opened HTTP/1.1", host, key)),
-        (403, ("GET /opened HTTP/1.1", host)),
-        (404, ("GET /run/run HTTP/1.1", host, key)),
-        (421, ("GET / HTTP/1.1", "Host: evil.example", key)),
-    ):
-        got, headers = said(editor.port, *lines)
-        assert got == status
-        assert {name: headers.get(name.lower()) for name in HEADERS} == dict(HEADERS)

@@ -90,16 +90,6 @@ def test_setting_a_value_again_changes_no_comment(path: Path) -> None:
             assert once.count("#") == text.count("#")
 
 
-def test_comments_and_styles_stay() -> None:
-    done = edited(
-        Edit(path=("targets", 1, "position", 2), value=0.25), Edit(path=("cycle", "steps", 0, "do"), value="pick")
-    )
-    assert changed_lines(TEXT, done) == (
-        ["  - {name: two, position: [4e-1, 0, 1]}", "    - {to: 1}"],
-        ["  - {name: two, position: [4e-1, 0, 0.25]}", "    - {to: 1, do: pick}"],
-    )
-
-
 def test_new_keys_are_written_like_task_files() -> None:
     done = edited(
         Edit(path=("tool", "mass"), value=0.3),

@@ -190,7 +190,7 @@ def test_run_folder_keeps_existing_arms_for_figures_and_page(run: Path, compared
     assert "near" in words
     assert "far\nbeyond, at 0.001, 1,000,000" in words
     assert not any("odd" in text for text in words)
-    assert "existing arm" in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "existing arm" in [text.get_text() for text in axes.figure.legends[0].get_texts()]
     tab.open(write_report(run))
     assert tab.faults == []
     trace = tab.ask('(({ x, y, text }) => ({ x, y, text }))(pareto.data.find((one) => one.name === "existing arm"))')
@@ -260,7 +260,7 @@ def test_front_figure_without_existing_arms_and_with_a_damaged_file(run: Path, h
         write_figures(run)
     (run / EXISTING_ARMS).unlink()
     (axes,) = draw_front(history).axes
-    assert "existing arm" not in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "existing arm" not in [text.get_text() for text in axes.figure.legends[0].get_texts()]
 
 
 @pytest.mark.slow

@@ -26,12 +26,11 @@ def argument_seeds() -> list[bytes]:
          "{wait: false, memory: chat}"],
         ["optimize", "target-1", "--model", "openai-chat:x", "--max-cost", "0.5", "--model-options",
          "{base_url: 'http://127.0.0.1:9', max_calls: 3, temperature: 0, seed: 1, answer: one-step, output: native}"],
-        ["prompt", "target-1", "--model-options", "{answer: one-step}", "--n-init", "3"],
-        ["prompt", "--after", run, "--number", "3"],
-        ["prompt", "target-1", "--schema"],
+        ["optimize", "target-1", "--print-prompt", "next", "--model-options", "{answer: one-step}", "--n-init", "3"],
+        ["optimize", run, "--print-prompt", "3"], ["optimize", "target-1", "--print-prompt", "schema"],
         ["design", "target-1", "--evaluations", "100", "--no-stall", "--seed", "1"],
         ["experiment", "paper", "--seeds", "1", "--task", "target-1", "--method", "bbo", "--print-commands"],
-        ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"], ["runs", run, "--json"],
+        ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"], ["compare", "--list", run, "--json"],
         ["compare-arms", "target-1", "arm.urdf", "--base", "0,0,0.5", "--tip", "tip", "--base-link", "base"],
         ["pick", run, "--where", "torque<=9", "--by", "mass", "-n", "2"], ["pick", run, "--weights", "torque=1"],
         ["export", run, "--design", "2", "--format", "mjcf", "--out", "x/y.xml"], ["report", run],
@@ -47,7 +46,7 @@ SHORT = {
     "design": ["--evaluations=50"],
     "experiment": ["--print-commands"],
 }
-NEVER = ("live", "--live", "--call", "--scheduler", "--workers")  # these wait for others or start processes
+NEVER = ("--live", "--call", "--scheduler", "--workers")  # these wait for others or start processes
 
 
 def run_arguments(data: bytes) -> None:

@@ -180,7 +180,7 @@ def test_keys_are_not_on_a_command_line(chat_server: ChatServer, in_folder: Path
     done = run_alone(chat_server, "optimize", "target-1", *SHORT, *how)
     assert done.returncode == 0, done.stderr
     own = [command for command in seen if str(in_folder) in command or "optimize target-1" in command]
-    assert any("armwright live" in command for command in own)
+    assert any("armwright report --live" in command for command in own)
     assert any("armwright optimize" in command for command in own)
     assert sent_key(chat_server) in KEYS
     no_key_in(" ".join(seen))

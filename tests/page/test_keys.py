@@ -22,7 +22,7 @@ from armwright.page.live_app import LivePage, OpenPages, live_app
 from tests.support.browser import Tab
 from tests.support.command_line import PATIENCE, start
 from tests.support.editor import served_editor
-from tests.support.live_server import ask, port_and_key, served, served_run
+from tests.support.live_server import Served, ask, port_and_key, served, served_run
 
 __all__ = ["served"]  # a fixture
 
@@ -31,28 +31,12 @@ MARK = "secret"  # in the names of the task and of the run folder
 
 
 @dataclass(frozen=True)
-class Server:
-    """A server of a page.
+class Server(Served):
+    """A server of a page and its routes."""
 
-    Attributes:
-        kind: Which: "live" or "editor".
-        address: What the terminal shows.
-        routes: The routes, with their whole paths.
-        shells: Those that need no key.
-    """
-
-    kind: str
-    address: str
-    routes: tuple[Route, ...]
-    shells: tuple[str, ...]
-
-    @property
-    def port(self) -> int:
-        return port_and_key(self.address)[0]
-
-    @property
-    def key(self) -> str:
-        return port_and_key(self.address)[1]
+    kind: str  # "live" or "editor"
+    routes: tuple[Route, ...]  # with their whole paths
+    shells: tuple[str, ...]  # those that need no key
 
 
 @contextmanager
@@ -61,7 +45,7 @@ def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Serv
     if kind == "live":
         with served_run(run, port) as address:
             routes = tuple(one for one in live_app(run, pages).routes if isinstance(one, Route))
-            yield Server(kind, address, routes, ("/",))
+            yield Server(address, kind, routes, ("/",))
     else:
         task = folder / "secret-cell.yaml"
         task.write_text(TASK, encoding="utf-8")
@@ -71,7 +55,7 @@ def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Serv
             live = [
                 Route(f"/run{one.path}", one.endpoint, methods=one.methods) for one in LivePage(run, pages).routes()
             ]
-            yield Server(kind, editor.address, (*(one for one in mine if isinstance(one, Route)), *live), SHELLS)
+            yield Server(editor.address, kind, (*(one for one in mine if isinstance(one, Route)), *live), SHELLS)
 
 
 @pytest.fixture(params=["live", "editor"])
@@ -298,10 +282,9 @@ def test_files_are_downloaded_with_the_key(served: tuple[Path, int, str], browse
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["live", "edit"])
+@pytest.mark.parametrize("command", ["report", "edit"])
 def test_no_log_holds_the_key(served: tuple[Path, int, str], in_folder: Path, command: str) -> None:
-    target = served[0] if command == "live" else "secret-cell.yaml"
-    with start(command, target) as process:
+    with start(*(["report", "--live", served[0]] if command == "report" else ["edit", "secret-cell.yaml"])) as process:
         assert process.stdout is not None
         port, key = port_and_key(process.stdout.readline().strip())
         for headers in ({}, {"X_Armwright_Key": key}, {"Upgrade": "websocket", "Connection": "Upgrade"}):

@@ -316,13 +316,13 @@ def test_server_listens_on_loopback_only(served: tuple[Path, int, str]) -> None:
 
 
 def test_live_refuses_a_folder_without_a_run(tmp_path: Path) -> None:
-    assert "is not a run folder" in refused(1, "live", tmp_path)
+    assert "is not a run folder" in refused(1, "report", "--live", tmp_path)
 
 
 @pytest.mark.slow
 def test_ctrl_c_ends_the_server_cleanly(tmp_path: Path) -> None:
     aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
-    with start("live", tmp_path / "run") as server:
+    with start("report", "--live", tmp_path / "run") as server:
         assert server.stdout is not None
         assert server.stdout.readline().startswith("http://127.0.0.1:")
         server.send_signal(signal.SIGINT)

@@ -13,22 +13,12 @@ from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task, random_task
+from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 
 
 def short(out: Path, problem: Problem, n_total: int = 12) -> StudyResult:
     return optimize(problem, proposer="rules", n_init=4, n_step=4, n_total=n_total, out=out)
-
-
-@pytest.mark.slow
-def test_figures_are_written_as_png_and_pdf(tmp_path: Path) -> None:
-    short(tmp_path, Problem(load_task("target-2")))
-    written = write_figures(tmp_path)
-    assert [path.name for path in written] == ["hypervolume.png", "front.png", "arms.png"]
-    for path in written:
-        assert path.read_bytes().startswith(b"\x89PNG")
-        assert path.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(
@@ -48,16 +38,6 @@ def test_unusual_tasks_are_drawn(tmp_path: Path, task: Task) -> None:
     assert draw_samples(history).axes
     for title, member in chosen_members(history):
         assert draw_arm(history, title, member).axes
-
-
-@pytest.mark.slow
-def test_redrawing_removes_other_figures(tmp_path: Path) -> None:
-    short(tmp_path, Problem(random_task(0)), n_total=2)
-    write_figures(tmp_path)
-    drawn = set((tmp_path / "figures").iterdir())
-    (tmp_path / "figures" / "old.png").touch()
-    write_figures(tmp_path)
-    assert set((tmp_path / "figures").iterdir()) == drawn
 
 
 @pytest.mark.slow

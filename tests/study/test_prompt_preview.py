@@ -1,4 +1,4 @@
-"""`armwright prompt` prints exactly the prompts that are sent."""
+"""`armwright optimize --print-prompt` prints exactly the prompts that are sent."""
 
 import json
 import threading
@@ -24,9 +24,9 @@ from tests.support.wire_formats import llm_proposer, model_options
 PROBLEM = Problem(load_task("target-1"))
 
 
-def shown(*args: str) -> tuple[str, str]:
+def shown(*args: str, what: str | int = "next") -> tuple[str, str]:
     """What the command prints for a program, and for a person."""
-    result = CliRunner().invoke(app, ["prompt", *args])
+    result = CliRunner().invoke(app, ["optimize", "--print-prompt", str(what), *args])
     if isinstance(result.exception, ArmwrightError):
         raise result.exception
     assert result.exit_code == 0, result.output
@@ -61,27 +61,27 @@ def asked(out: Path) -> list[Call]:
 def test_printed_prompt_is_the_prompt_sent(chat_server: ChatServer, in_folder: Path, how: dict[str, Any]) -> None:
     out = in_folder / "run"
     run(out, 3, llm_proposer(chat_server.url, **how))
-    before, words = shown("--after", "run")
+    before, words = shown("run")
     assert words.startswith("about ")
     assert words.endswith("tokens; for trial 7\n")
     run(out, 4, llm_proposer(chat_server.url, **how))
     first, second = asked(out)
     assert before == second.prompt
-    assert shown("--after", "run", "--number", "7")[0] == second.prompt
-    assert shown("--after", "run", "--number", "4")[0] == first.prompt
+    assert shown("run", what=7)[0] == second.prompt
+    assert shown("run", what=4)[0] == first.prompt
     sent = [request["messages"][-1]["content"] for request in chat_server.requests]
     assert before in sent
     schemas = [request["response_format"] for request in chat_server.requests if "response_format" in request]
-    printed = json.loads(shown("--after", "run", "--schema")[0])
+    printed = json.loads(shown("run", what="schema")[0])
     assert printed["properties"] == schemas[-1]["json_schema"]["schema"]["properties"]
 
 
 def test_options_override_those_of_the_run(chat_server: ChatServer, in_folder: Path) -> None:
     run(in_folder / "run", 3, llm_proposer(chat_server.url, prompt="minus"))
-    told = shown("--after", "run")[0]
+    told = shown("run")[0]
     assert "Step 1" not in told
     assert "`reasoning`" not in told
-    told = shown("--after", "run", "--prompt", "plus", *model_options(answer="one-step"))[0]
+    told = shown("run", "--prompt", "plus", *model_options(answer="one-step"))[0]
     assert "Step 1" in told
     assert "`reasoning`" in told
 
@@ -94,15 +94,15 @@ def test_prompt_of_a_new_run(chat_server: ChatServer, in_folder: Path) -> None:
 
 def test_prompt_after_a_run_without_a_model(in_folder: Path) -> None:
     run(in_folder / "run", 3, "none", Problem(load_task("target-2"), SIX_AXIS))
-    told = shown("--after", "run")[0]
+    told = shown("run")[0]
     assert "D = 6" in told
-    assert shown("--after", "run", "--number", "7")[0] == told
-    assert shown("--after", "run", "--number", "4")[0] != told
+    assert shown("run", what=7)[0] == told
+    assert shown("run", what=4)[0] != told
 
 
 def test_preview_is_of_the_next_request(chat_server: ChatServer, in_folder: Path) -> None:
     run(in_folder / "run", 2, llm_proposer(chat_server.url))
-    assert shown("--after", "run")[1].endswith("for trial 7\n")
+    assert shown("run")[1].endswith("for trial 7\n")
 
 
 def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: Path) -> None:
@@ -111,7 +111,7 @@ def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: P
     assert len(calls) == 3
     for call in calls:
         number = call.proposal.rpartition("-")[2]
-        assert shown("--after", "run", "--number", number)[0] == call.prompt
+        assert shown("run", what=number)[0] == call.prompt
 
 
 def interrupted(out: Path, stop: int, server: ChatServer, in_flight: int | None) -> None:
@@ -137,7 +137,7 @@ def test_prompt_after_an_interrupt_is_the_next_one_sent(chat_server: ChatServer,
     chat_server.answer = answer
     interrupted(in_folder / "run", 5, chat_server, 2)
     answered.set()
-    told, words = shown("--after", "run")
+    told, words = shown("run")
     assert words.endswith("tokens; for trial 4\n")
     run(in_folder / "run", 9, llm_proposer(chat_server.url), in_flight=2)
     assert told == next(call.prompt for call in asked(in_folder / "run") if call.proposal == "llm-0004")
@@ -151,12 +151,12 @@ def test_prompt_after_the_reasoning_requests_the_parameters(
     for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 2)):  # as a kill after the first answer leaves it
         file = in_folder / "run" / name
         file.write_text("".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:lines]), encoding="utf-8")
-    told, words = shown("--after", "run")
+    told, words = shown("run")
     assert words.endswith("tokens; for trial 4\n")
     run(in_folder / "run", 1, llm_proposer(chat_server.url), in_flight=in_flight)
     calls = Transcript(in_folder / "run" / "transcripts.jsonl").calls
     assert told == next(call.prompt for call in calls if (call.proposal, call.step) == ("llm-0004", "parameters"))
-    assert shown("--after", "run", "--number", "4")[0] == asked(in_folder / "run")[0].prompt
+    assert shown("run", what=4)[0] == asked(in_folder / "run")[0].prompt
 
 
 @pytest.fixture(scope="module")
@@ -171,19 +171,14 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        ([], "expected a TASK"),
         (["target-9"], 'unknown task "target-9"'),
-        (["target-1", "--number", "4"], "--number 4 needs --after RUN"),
+        (["target-1", "--print-prompt", "4"], "--print-prompt 4: expected a run folder, got target-1"),
+        (["target-1", "--print-prompt", "al"], '--print-prompt "al": expected next, schema, or'),
         (["target-1", "--prompt", "pluss"], 'unknown prompt "pluss". Did you mean "plus"?'),
         (["target-1", *model_options(answer="two")], 'unknown answer "two"'),
-        (["--after", "nowhere"], "nowhere is not a run folder"),
-        (["target-1", "--after", "run"], "TASK target-1 is for a new run; run has its own"),
-        (["--after", "run", "--space", "space.yaml"], "--space space.yaml is for a new run; run has its own"),
-        (["--after", "run", "--seed", "1"], "--seed 1 is for a new run; run has its own"),
-        (["--after", "run", "--n-init", "4"], "--n-init 4 is for a new run; run has its own"),
-        (["--after", "run", "--number", "5"], "--number 5: the proposals of run were requested for trials 4"),
-        (["--after", "run", "--number", "-1"], "--number -1: the proposals of run were requested for trials 4"),
-        (["--after", "run", *model_options(memory="all")], 'unknown memory "all"'),
+        (["run", "--space", "space.yaml"], "--space space.yaml is for a new run; run has its own"),
+        (["run", "--print-prompt", "5"], "trial 5: the proposals of run were requested for trials 4"),
+        (["run", *model_options(memory="all")], 'unknown memory "all"'),
     ],
 )
 def test_invalid_arguments_are_refused(

@@ -11,28 +11,14 @@ from typing import Any
 
 from armwright.editor.edited_files import EditedFiles
 from armwright.editor.server import serve_editor
-from tests.support.live_server import ask, port_and_key, running
+from tests.support.live_server import Served, ask, running
 
 
-@dataclass
-class ServedEditor:
-    """An editor's server.
+@dataclass(frozen=True)
+class ServedEditor(Served):
+    """An editor's server."""
 
-    Attributes:
-        address: What the terminal shows, with the key.
-        task: The task file; its space file is beside it.
-    """
-
-    address: str
-    task: Path
-
-    @property
-    def port(self) -> int:
-        return port_and_key(self.address)[0]
-
-    @property
-    def key(self) -> str:
-        return port_and_key(self.address)[1]
+    task: Path  # its space file is beside it
 
     def get(self, path: str) -> tuple[int, bytes]:
         return ask(self.port, "GET", path, X_Armwright_Key=self.key)

@@ -6,6 +6,7 @@ import queue
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,21 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, int
     aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=folder)
     with served_run(folder) as address:
         yield folder, *port_and_key(address)
+
+
+@dataclass(frozen=True)
+class Served:
+    """A server of a page, at the address that the terminal shows, with the key."""
+
+    address: str
+
+    @property
+    def port(self) -> int:
+        return port_and_key(self.address)[0]
+
+    @property
+    def key(self) -> str:
+        return port_and_key(self.address)[1]
 
 
 @contextmanager

@@ -130,7 +130,7 @@ def test_other_code_in_any_command_prints_to_stderr(tmp_path: Path) -> None:
     assert sorted(done.stderr.split()) == ["child", "print", "puts"]
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["runs", "--help"], ["--version"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["compare", "--help"], ["--version"]])
 def test_help_is_printed_to_stdout(arguments: list[str]) -> None:
     done = command_line.armwright(*arguments)
     assert (done.returncode, done.stderr) == (0, "")

@@ -1,66 +1,44 @@
 """Choose actuators by bounds of their values."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
-from armwright.problem.conditions import Condition, read_bound, read_condition
+from armwright.problem.conditions import Condition, read_condition
 from armwright.robot.actuators import UNITS, ActuatorRecord, value_of
 
-VALUES = {"torque": "peak_torque"}  # options whose name is shorter than that of the value
+
+def read_conditions(where: Sequence[str]) -> list[Condition]:
+    """Parse conditions on values of actuators, with their bounds in the units of the catalogue.
+
+    Raises:
+        SettingsError: One is no condition, names an unknown value, or has another unit.
+    """
+    conditions = [read_condition(text) for text in where]
+    for one in conditions:
+        if one.name not in UNITS:
+            hint = did_you_mean(one.name, UNITS)
+            raise SettingsError(f'unknown value "{one.name}".{hint} Available: {", ".join(UNITS)}')
+    return [one.in_unit(UNITS[one.name]) for one in conditions]
 
 
-@dataclass(frozen=True)
-class ActuatorFilter:
-    """Conditions on values of actuators, defaults of their kind included. An unknown value satisfies none."""
+def choose(records: Sequence[ActuatorRecord], conditions: Sequence[Condition]) -> list[ActuatorRecord]:
+    """Return the actuators that satisfy all conditions, defaults of their kind included; unknown values satisfy none.
 
-    conditions: Sequence[Condition]
-
-    @classmethod
-    def of(cls, bounds: Mapping[str, str | None], where: Sequence[str]) -> "ActuatorFilter":
-        """Parse bounds by the name of their option, and conditions.
-
-        Raises:
-            SettingsError: One is no bound, names an unknown value, or has another unit.
-        """
-        stated = [
-            read_bound(f"--{name}", VALUES.get(name, name), text) for name, text in bounds.items() if text is not None
-        ]
-        return cls([_in_unit(condition) for condition in (*stated, *map(read_condition, where))])
-
-    def apply(self, records: Sequence[ActuatorRecord]) -> list[ActuatorRecord]:
-        """Return the actuators that satisfy all conditions.
-
-        Raises:
-            FailureError: There is none.
-        """
-        left = [record for record in records if all(_holds(condition, record) for condition in self.conditions)]
-        if not left and records:
-            raise FailureError(f"none of {len(records)} actuators has {self._description}; try looser bounds")
-        return left
-
-    def unknown(self, records: Sequence[ActuatorRecord]) -> dict[str, int]:
-        """Return how many actuators lack a value that a condition bounds, by its name."""
-        missing = {
-            condition.name: sum(value_of(record.completed(), condition.name) is None for record in records)
-            for condition in self.conditions
-        }
-        return {name: count for name, count in missing.items() if count}
-
-    @property
-    def _description(self) -> str:
-        return " and ".join(
-            f"{condition.name} {condition.relation} {condition.bound:g} {UNITS[condition.name]}".rstrip()
-            for condition in self.conditions
+    Raises:
+        FailureError: There is none.
+    """
+    left = [record for record in records if all(_holds(condition, record) for condition in conditions)]
+    if not left and records:
+        bounds = " and ".join(
+            f"{one.name} {one.relation} {one.bound:g} {UNITS[one.name]}".rstrip() for one in conditions
         )
+        raise FailureError(f"none of {len(records)} actuators has {bounds}; try looser bounds")
+    return left
 
 
-def _in_unit(condition: Condition) -> Condition:
-    """Return a condition with its bound in the unit of the catalogue."""
-    if condition.name not in UNITS:
-        hint = did_you_mean(condition.name, UNITS)
-        raise SettingsError(f'unknown value "{condition.name}".{hint} Available: {", ".join(UNITS)}')
-    return condition.in_unit(UNITS[condition.name])
+def count_unknown(records: Sequence[ActuatorRecord], name: str) -> int:
+    """Return how many actuators lack a value."""
+    return sum(value_of(record.completed(), name) is None for record in records)
 
 
 def _holds(condition: Condition, record: ActuatorRecord) -> bool:

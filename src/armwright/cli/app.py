@@ -56,9 +56,8 @@ COMMANDS = {
         reach_map_command.reach_map,
         experiment_commands.compare,
         experiment_commands.compare_arms,
-        experiment_commands.runs,
     ),
-    "Show": (output_commands.report, output_commands.live, output_commands.prompt, output_commands.doctor),
+    "Show": (output_commands.report, output_commands.doctor),
 }
 
 

@@ -4,22 +4,21 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+from armwright.cli.options import option
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
     from armwright.robot.mounting import Mounting
 
-Tip = Annotated[str | None, typer.Option(help="Link of the URDF at the tip.", show_default="the last one")]
-BaseLink = Annotated[str | None, typer.Option(help="Link of the URDF at the base.", show_default="the root")]
+Tip = Annotated[str | None, option("Link of the URDF at the tip.", default="the last one")]
+BaseLink = Annotated[str | None, option("Link of the URDF at the base.", default="the root")]
 BasePose = Annotated[
     str | None,
-    typer.Option(
+    option(
+        r"Where base links stand \[m], and how far they are turned about the vertical [°].",
         "--base",
+        default="searched",
         metavar="X,Y,Z[,YAW]",
-        help=r"Where base links stand \[m], and how far they are turned about the vertical [°].",
-        show_default="searched",
     ),
 ]
 

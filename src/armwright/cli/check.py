@@ -9,7 +9,7 @@ from rich.console import Console
 
 from armwright.cli.activity import activity
 from armwright.cli.notes import unused_parts
-from armwright.cli.show_inputs import show_cycle, show_target_table, show_task
+from armwright.cli.show_inputs import show_target_table, show_task
 from armwright.cli.streams import print_json
 from armwright.exceptions import TaskError
 from armwright.files import read_text
@@ -46,37 +46,22 @@ def check_before_search(console: Console, problem: Problem, written: Sequence[Fi
 
     Constraints are sampled for a second, unless the run folder already holds a run.
 
-    Args:
-        console: The console.
-        problem: The problem.
-        written: Findings about the files, of `check_files`.
-        folder: The run folder of the search.
-
     Raises:
         TaskError: It is proven that no design can serve the task.
     """
     findings = [*written, *check_instantly(problem)]
-    show_warnings(console, findings)
+    _show_warnings(console, findings)
     stop_if_proven(findings)
     if not (folder / CONFIG).exists():
-        show_warnings(console, check_by_sampling(problem, FIRST_SECONDS)[0])
+        _show_warnings(console, check_by_sampling(problem, FIRST_SECONDS)[0])
 
 
-def show_warnings(console: Console, findings: Sequence[Finding]) -> int:
+def _show_warnings(console: Console, findings: Sequence[Finding]) -> int:
     """Print the findings that are not proven, and return their number."""
     warnings = [finding for finding in findings if not finding.is_proven]
     for finding in warnings:
         console.print(f"warning: {finding}")
     return len(warnings)
-
-
-def find_faults(problem: Problem, written: Sequence[Finding], deep: bool) -> tuple[list[Finding], int]:
-    """Return all findings, and the number of samples: of a deep check, if nothing is proven."""
-    findings = [*written, *check_instantly(problem)]
-    if not deep or any(finding.is_proven for finding in findings):
-        return findings, 0
-    sampled, n_samples = check_by_sampling(problem, DEEP_SECONDS, DEEP_SAMPLES)
-    return [*findings, *sampled], n_samples
 
 
 def record_check(problem: Problem, findings: Sequence[Finding], n_samples: int) -> dict[str, Any]:
@@ -109,7 +94,6 @@ def show_check(console: Console, problem: Problem) -> None:
     has_bodies = problem.space.has_bodies
     show_task(console, problem.task, has_drives=problem.has_drives, has_bodies=has_bodies, is_brief=True)
     show_target_table(console, problem)
-    show_cycle(console, problem.task)
     minimised = ", ".join(f"{objective.name}{objective.unit_in_brackets}" for objective in problem.objectives)
     console.print(f"  minimised: {minimised}")
     if ignored := describe_ignored_errors(problem):
@@ -131,15 +115,7 @@ def show_check(console: Console, problem: Problem) -> None:
 def run_check(
     console: Console, problem: Problem, written: Sequence[Finding], deep: bool, picture: Path | None, json_: bool
 ) -> None:
-    """Print what a task and a space mean and what is wrong with them, and draw them.
-
-    Args:
-        console: The console.
-        problem: The problem.
-        written: Findings about the files, of `check_files`.
-        deep: Whether random designs are evaluated.
-        picture: File of the picture; None for none.
-        json_: Whether to print JSON instead.
+    """Print what a task and a space mean and what is wrong with them, and draw them into the picture, if there is one.
 
     Raises:
         TaskError: It is proven that no design can serve the task.
@@ -147,7 +123,10 @@ def run_check(
     if not json_:
         show_check(console, problem)
     with activity("evaluating random designs" if deep else "checking"):
-        findings, n_samples = find_faults(problem, written, deep)
+        findings, n_samples = [*written, *check_instantly(problem)], 0
+        if deep and not any(finding.is_proven for finding in findings):
+            sampled, n_samples = check_by_sampling(problem, DEEP_SECONDS, DEEP_SAMPLES)
+            findings += sampled
     if picture is not None:
         with activity("drawing the picture"):
             from armwright.pictures.task_figure import write_task_figure
@@ -157,7 +136,7 @@ def run_check(
         print_json({**record_check(problem, findings, n_samples), "picture": picture})
         stop_if_proven(findings)
         return
-    n_warnings = show_warnings(console, findings)
+    n_warnings = _show_warnings(console, findings)
     if n_samples:
         console.print(f"random designs evaluated: {n_samples:,}")
     if picture is not None:
@@ -181,11 +160,12 @@ def _is_fixed(parameter: Parameter) -> bool:
 def _describe_range(parameter: Parameter) -> str:
     if isinstance(parameter, CategoricalParameter):
         return " | ".join(parameter.choices)
-    if _is_fixed(parameter):
-        return f"{parameter.low:g} {parameter.unit}".rstrip()
     unit = f" {parameter.unit}" if parameter.unit else ""
-    scale = ", on a logarithmic scale" if parameter.log else ""
-    if parameter.integer and parameter.step == 1.0:
-        return f"{parameter.low:g} to {parameter.high:g}{unit}, whole numbers{scale}"
+    if _is_fixed(parameter):
+        return f"{parameter.low:g}{unit}"
     step = f" in steps of {parameter.step:g}" if parameter.step else ""
-    return f"{parameter.low:g} to {parameter.high:g}{unit}{step}{scale}"
+    if parameter.integer and parameter.step == 1.0:
+        step = ", whole numbers"
+    return f"{parameter.low:g} to {parameter.high:g}{unit}{step}" + (
+        ", on a logarithmic scale" if parameter.log else ""
+    )

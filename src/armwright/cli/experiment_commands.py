@@ -1,4 +1,4 @@
-"""Commands over several runs: experiment, compare, compare-arms, runs."""
+"""Commands over several runs: experiment, compare, compare-arms."""
 
 import sys
 from pathlib import Path
@@ -16,9 +16,10 @@ from armwright.cli.options import (
     ModelOptionsFile,
     Scheduler,
     SpaceFile,
+    option,
     select_workers,
 )
-from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_csv, print_json, print_text
+from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError
 
 
@@ -27,29 +28,27 @@ def experiment(
         str,
         typer.Argument(help="A built-in experiment (paper, recorded, rules, n-step, samplers, ...), or a YAML file."),
     ],
-    seeds: Annotated[int | None, typer.Option(help="Number of seeds, from 0, instead of the file's.")] = None,
-    method: Annotated[list[str] | None, typer.Option(help="Only this method of the file (may be repeated).")] = None,
-    task: Annotated[list[str] | None, typer.Option(help="Only this task of the file (may be repeated).")] = None,
+    seeds: Annotated[int | None, option("Number of seeds, from 0, instead of the file's.")] = None,
+    method: Annotated[list[str] | None, option("Only this method of the file (may be repeated).")] = None,
+    task: Annotated[list[str] | None, option("Only this task of the file (may be repeated).")] = None,
     model: ModelName = None,
     model_options: ModelOptionsFile = None,
     replay: Annotated[
         Path | None,
-        typer.Option(help="Replay the recorded calls of this experiment folder."),
+        option("Replay the recorded calls of this experiment folder."),
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(
-            help="Local processes that run the cells; 0: this process.",
-            show_default="one per core with the extra distributed, else 0",
+        option(
+            "Local processes that run the cells; 0: this process.",
+            default="one per core with the extra distributed, else 0",
         ),
     ] = None,
     scheduler: Scheduler = None,
-    print_commands: Annotated[
-        bool, typer.Option("--print-commands", help="Print one command per cell to run, and exit.")
-    ] = False,
-    print_: Annotated[bool, typer.Option("--print", help="Print the file of a built-in experiment, and exit.")] = False,
+    print_commands: Annotated[bool, option("Print one command per cell to run, and exit.", "--print-commands")] = False,
+    print_: Annotated[bool, option("Print the file of a built-in experiment, and exit.", "--print")] = False,
     figures: Figures = True,
-    out: Annotated[Path | None, typer.Option(help="Folder.", show_default="experiments/NAME")] = None,
+    out: Annotated[Path | None, option("Folder.", default="experiments/NAME")] = None,
     json_: Json = False,
 ) -> None:
     """Run methods on tasks with several seeds, and compare them.
@@ -62,7 +61,7 @@ def experiment(
     from armwright.experiments.cells import plan_cells
     from armwright.experiments.tables import write_tables
     from armwright.llm.configuration import load_model_options
-    from armwright.pictures.comparison_figures import write_experiment_figures
+    from armwright.pictures.comparison_figures import write_comparison_figures
 
     if print_:
         print_text(plan.builtin_text(name), end="")
@@ -93,11 +92,11 @@ def experiment(
             failed += [done] if done.fault else []
         found = outcome.collect(chosen, cells)
         notes = notes_on_cells(skipped, failed)
-        title, published = f"Experiment {chosen.name}", outcome.published(chosen)
-        tables = write_tables(out, found, title, published, notes)
+        title = f"Experiment {chosen.name}"
+        tables = write_tables(out, found, title, notes)
         if figures:
             console.print("drawing the figures")
-        drawn = write_experiment_figures(out, chosen, found) if figures else []
+        drawn = write_comparison_figures(out, found, *chosen.drawn) if figures else []
     except KeyboardInterrupt:
         exit_interrupted(console, f"every finished trial is in {out}/")
     if json_:
@@ -105,7 +104,7 @@ def experiment(
         print_json({"folder": out, **counts, "tables": tables, "figures": drawn})
     else:
         console.print()
-        show_comparison(console, found, title, published, notes)
+        show_comparison(console, found, title, notes)
         console.print()
         show_files(console, tables, drawn)
     if failed:
@@ -113,45 +112,47 @@ def experiment(
 
 
 def compare(
-    folders: Annotated[list[Path], typer.Argument(help="Run folders, or folders that contain them.")],
+    folders: Annotated[
+        list[Path] | None, typer.Argument(help="Run folders, or folders that contain them.", show_default="runs")
+    ] = None,
+    list_: Annotated[bool, option("Only list the runs and their progress.", "--list")] = False,
     baseline: Annotated[
-        str | None, typer.Option(help="The method that the others are compared with.", show_default="of the first run")
+        str | None, option("The method that the others are compared with.", default="of the first run")
     ] = None,
     figures: Figures = True,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for tables and figures.", show_default="none are written")
-    ] = None,
+    out: Annotated[Path | None, option("Folder for tables and figures.", default="none are written")] = None,
     json_: Json = False,
     csv_: Csv = False,
 ) -> None:
     """Compare finished runs by method, task and seed: tables, intervals, tests."""
     from armwright.cli.show_comparisons import show_comparison, show_files
+    from armwright.cli.show_results import show_runs
     from armwright.experiments.compare_runs import compare_summaries
-    from armwright.experiments.run_list import read_finished_runs
-    from armwright.experiments.table_records import row_records
-    from armwright.experiments.tables import comparison_record, write_tables
+    from armwright.experiments.run_list import find_runs, list_runs, read_finished_runs
+    from armwright.experiments.tables import tables, write_tables
+    from armwright.pictures.comparison_figures import write_comparison_figures
 
     console = open_console(check_formats(json_, csv_))
+    places = folders or [Path("runs")]
+    if list_:
+        with activity("reading the runs"):
+            listed = list_runs(find_runs(places))
+        if not print_records(json_, csv_, listed):
+            show_runs(console, listed)
+        return
     with activity("comparing the runs"):
-        finished, unfinished = read_finished_runs(folders)
+        finished, unfinished = read_finished_runs(places)
         comparison = compare_summaries(finished, baseline)
     notes = [f"{folder} is not finished and is left out" for folder in unfinished]
     title = "Comparison of runs"
-    if json_:
-        print_json(comparison_record(comparison))
-    elif csv_:
-        print_csv(row_records(comparison))
-    else:
-        show_comparison(console, comparison, title, notes=notes)
+    found = {table.name: table.records for table in tables(comparison) if table.name}
+    if not print_records(json_, csv_, found, found["table"]):
+        show_comparison(console, comparison, title, notes)
     if out is not None:
-        tables = write_tables(out, comparison, title, notes=notes)
-        drawn: list[Path] = []
-        if figures:
-            from armwright.pictures.comparison_figures import write_comparison_figures
-
-            with activity("drawing the figures"):
-                drawn = write_comparison_figures(out, comparison)
-        show_files(console, tables, drawn)
+        written = write_tables(out, comparison, title, notes)
+        with activity("drawing the figures"):
+            drawn = write_comparison_figures(out, comparison) if figures else []
+        show_files(console, written, drawn)
 
 
 def compare_arms(
@@ -166,17 +167,17 @@ def compare_arms(
     ],
     run: Annotated[
         Path | None,
-        typer.Option(help="A run of the task to compare with; its figures then show the arms."),
+        option("A run of the task to compare with; its figures then show the arms."),
     ] = None,
     base: BasePose = None,
     tip: Tip = None,
     base_link: BaseLink = None,
     space: SpaceFile = None,
     figures: Figures = True,
-    seed: Annotated[int, typer.Option(help="Seed of the base search.")] = 0,
+    seed: Annotated[int, option("Seed of the base search.")] = 0,
     price: Annotated[
         list[str] | None,
-        typer.Option(metavar="ARM=USD", help="Price of an existing arm, such as ur5e=28000 (may be repeated)."),
+        option("Price of an existing arm, such as ur5e=28000 (may be repeated).", metavar="ARM=USD"),
     ] = None,
     json_: Json = False,
     csv_: Csv = False,
@@ -206,29 +207,5 @@ def compare_arms(
 
         with activity("drawing the page and the figures"):
             drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
-    if json_:
-        print_json(comparison_record(compared))
-    elif csv_:
-        print_csv(arm_rows(compared))
-    else:
+    if not print_records(json_, csv_, comparison_record(compared), arm_rows(compared)):
         show_arms(open_console(), compared, drawn)
-
-
-def runs(
-    folders: Annotated[list[Path] | None, typer.Argument(help="Folders to search.", show_default="runs")] = None,
-    json_: Json = False,
-    csv_: Csv = False,
-) -> None:
-    """List the runs in folders and their progress."""
-    from armwright.cli.show_results import show_runs
-    from armwright.experiments.run_list import find_runs, list_runs
-
-    check_formats(json_, csv_)
-    with activity("reading the runs"):
-        listed = list_runs(find_runs(folders or [Path("runs")]))
-    if json_:
-        print_json(listed)
-    elif csv_:
-        print_csv(listed)
-    else:
-        show_runs(open_console(), listed)

@@ -19,9 +19,10 @@ from armwright.cli.options import (
     SpaceFile,
     TaskName,
     load_problem,
+    option,
 )
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
+from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_records, print_text
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -29,12 +30,10 @@ def init(
     file: Annotated[Path, typer.Argument(help="The task file to write, such as my-task.yaml.")],
     points: Annotated[
         Path | None,
-        typer.Option("--from", help="CSV or text file of points, with columns named x, y, z in its header."),
+        option("CSV or text file of points, with columns named x, y, z in its header.", "--from"),
     ] = None,
-    unit: Annotated[
-        str | None, typer.Option(help="Unit of x, y, z: m or mm.", show_default="as in the header, else m")
-    ] = None,
-    offset: Annotated[tuple[float, float, float], typer.Option(help=r"Offset X Y Z added to every point \[m].")] = (
+    unit: Annotated[str | None, option("Unit of x, y, z: m or mm.", default="as in the header, else m")] = None,
+    offset: Annotated[tuple[float, float, float], option(r"Offset X Y Z added to every point \[m].")] = (
         0,
         0,
         0,
@@ -67,10 +66,10 @@ def edit(
     task: Annotated[Path, typer.Argument(metavar="TASK", help="The task file, such as my-task.yaml; it may be new.")],
     space: Annotated[
         Path | None,
-        typer.Option(help="The space file.", show_default="TASK's name with -space"),
+        option("The space file.", default="TASK's name with -space"),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port to listen on; 0: any free port.")] = 0,
-    open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    port: Annotated[int, option("Port to listen on; 0: any free port.")] = 0,
+    open_: Annotated[bool, option("Open the page in the browser.", "--open")] = False,
 ) -> None:
     """Draw TASK and its design space in the browser, check them, and design arms (extra live).
 
@@ -87,14 +86,12 @@ def check(
     space: SpaceFile = None,
     objectives: Objectives = None,
     deep: Annotated[
-        bool, typer.Option("--deep", help="Also look for constraints that none of 1,000 random designs satisfies.")
+        bool, option("Also look for constraints that none of 1,000 random designs satisfies.", "--deep")
     ] = False,
     picture: Annotated[
-        bool, typer.Option("--picture/--no-picture", help="Draw targets, bases, obstacles and the cycle's lines.")
+        bool, option("Draw targets, bases, obstacles and the cycle's lines.", "--picture/--no-picture")
     ] = True,
-    out: Annotated[
-        Path | None, typer.Option(help="The picture: a PNG, PDF or SVG file.", show_default="NAME-check.png")
-    ] = None,
+    out: Annotated[Path | None, option("The picture: a PNG, PDF or SVG file.", default="NAME-check.png")] = None,
     json_: Json = False,
 ) -> None:
     """Check TASK and a design space: what they mean, what cannot work, and what was hardly meant."""
@@ -116,69 +113,55 @@ def tasks(
     from armwright.proof.front_gap import best_known_hypervolume
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
-    check_formats(json_, csv_)
+    console = open_console(check_formats(json_, csv_))
     listed = [load_task(name) for name in names] if names else list(builtin_tasks().values())
-    if csv_:
-        print_csv(task_rows(listed))
-        return
-    known = {task.name: best_known_hypervolume(task) for task in listed} if names or json_ else {}
-    stored = {name: baselines_of(name) if known[name] is not None else [] for name in known}
-    if json_:
-        print_json(
-            [
-                task.model_dump(mode="json")
-                | {"best_known_hypervolume": known[task.name], "baselines": [asdict(b) for b in stored[task.name]]}
-                for task in listed
-            ]
-        )
-        return
-    console = open_console()
-    if not names:
+    if not (names or json_ or csv_):
         show_tasks(console, listed)
-    for task in listed if names else ():
-        show_task(console, task, known[task.name], stored[task.name])
+    elif csv_:
+        print_csv(task_rows(listed))
+    else:
+        known = [(task, best_known_hypervolume(task)) for task in listed]
+        stored = [(task, best, [] if best is None else baselines_of(task.name)) for task, best in known]
+        if json_:
+            print_json(
+                [
+                    task.model_dump(mode="json")
+                    | {"best_known_hypervolume": best, "baselines": [asdict(one) for one in baselines]}
+                    for task, best, baselines in stored
+                ]
+            )
+            return
+        for task, best, baselines in stored:
+            show_task(console, task, best, baselines)
 
 
 def actuators(
     names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Actuators to list in full.")] = None,
-    torque: Annotated[
-        str | None, typer.Option(help='Bound of the peak torque, else of the stall torque, such as ">=2" [N m].')
-    ] = None,
-    speed: Annotated[
-        str | None, typer.Option(help=r'Bound of the no-load speed, such as ">5" \[rad/s] or ">50 rpm".')
-    ] = None,
-    mass: Annotated[str | None, typer.Option(help=r'Bound of the mass, such as "<=0.08" \[kg] or "<=80 g".')] = None,
-    price: Annotated[str | None, typer.Option(help='Bound of the price, such as "<=60" [USD].')] = None,
-    voltage: Annotated[str | None, typer.Option(help="Voltage, such as 12, or a bound [V].")] = None,
     where: Annotated[
-        list[str] | None, typer.Option(help='A condition on any value, such as "backlash<0.005" (may be repeated).')
+        list[str] | None, option('A condition, such as "peak_torque>=2" or "mass<=80 g" (may be repeated).')
     ] = None,
     json_: Json = False,
     csv_: Csv = False,
 ) -> None:
     """List the catalogue of actuators that a space file may name, or the values of some and where they are from."""
-    from armwright.cli.actuator_filter import ActuatorFilter
+    from armwright.cli.actuator_filter import choose, count_unknown, read_conditions
     from armwright.cli.show_inputs import actuator_rows, show_actuator, show_actuators
     from armwright.robot.actuators import catalogue, named_actuator
 
-    check_formats(json_, csv_)
-    bounds = {"torque": torque, "speed": speed, "mass": mass, "price": price, "voltage": voltage}
-    chosen = ActuatorFilter.of(bounds, where or ())
+    console = open_console(check_formats(json_, csv_))
+    conditions = read_conditions(where or ())
     known = [named_actuator(name) for name in names] if names else list(catalogue().values())
-    records = chosen.apply(known)
-    if json_:
-        print_json([r.completed().model_dump(exclude_none=True) | {"assumed": r.assumed} for r in records])
+    records = choose(known, conditions)
+    content = [record.completed().model_dump(exclude_none=True) | {"assumed": record.assumed} for record in records]
+    if print_records(json_, csv_, content, actuator_rows(records)):
         return
-    if csv_:
-        print_csv(actuator_rows(records))
-        return
-    console = open_console()
-    if not names:
-        show_actuators(console, records)
-        for name, count in chosen.unknown(known).items():
-            console.print(f"left out, as their {name.replace('_', ' ')} is unknown: {count}")
     for record in records if names else ():
         show_actuator(console, record)
+    if not names:
+        show_actuators(console, records)
+        for name in dict.fromkeys(condition.name for condition in conditions):
+            if count := count_unknown(known, name):
+                console.print(f"left out, as their {name.replace('_', ' ')} is unknown: {count}")
 
 
 def draft(
@@ -188,10 +171,10 @@ def draft(
     model: ModelName = None,
     max_cost: MaxCost = None,
     model_options: ModelOptionsFile = None,
-    out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path("."),
-    force: Annotated[bool, typer.Option("--force", help="Replace files of the same name.")] = False,
+    out: Annotated[Path, option("Folder for the files.")] = Path("."),
+    force: Annotated[bool, option("Replace files of the same name.", "--force")] = False,
     print_prompt: Annotated[
-        bool, typer.Option("--print-prompt", help="Print the prompt and the schema that would be sent, and exit.")
+        bool, option("Print the prompt and the schema that would be sent, and exit.", "--print-prompt")
     ] = False,
     json_: Json = False,
 ) -> None:

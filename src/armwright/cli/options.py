@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +14,12 @@ if TYPE_CHECKING:
 TASK, SEARCH, MODEL = "Task", "Search", "Language model"
 EVALUATION, OUTPUT = "Evaluation", "Output"
 
+
+def option(help: str, *names: str, panel: str | None = None, default: str | None = None, **others: Any) -> Any:
+    """Return an option in a group of `--help`; default: in words, if the value itself says too little."""
+    return typer.Option(*names, help=help, rich_help_panel=panel, show_default=default or True, **others)
+
+
 # Options
 TaskName = Annotated[
     str, typer.Argument(metavar="TASK", help="A built-in task (see `armwright tasks`), a YAML file, or a run folder.")
@@ -21,95 +27,79 @@ TaskName = Annotated[
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 SpaceFile = Annotated[
     Path | None,
-    typer.Option(
-        help="Design space: the name of a built-in one, or a YAML file.",
-        show_default="the task's own, else the paper's",
-        rich_help_panel=TASK,
-    ),
+    option("Design space: a built-in one, or a YAML file.", panel=TASK, default="the task's own, else the paper's"),
 ]
 Objectives = Annotated[
     str | None,
-    typer.Option(
-        help="Objectives to minimise instead of the task's: names with commas, see docs/method.md, 3.",
-        rich_help_panel=TASK,
-    ),
+    option("Objectives to minimise instead of the task's: names with commas, see docs/method.md, 3.", panel=TASK),
 ]
 EvaluatorName = Annotated[
     str | None,
-    typer.Option(
-        help="A custom Python function that evaluates arms, FILE.py:FUNCTION or MODULE:FUNCTION; its code is run.",
-        rich_help_panel=TASK,
+    option(
+        "A custom Python function that evaluates arms, FILE.py:FUNCTION or MODULE:FUNCTION; its code is run.",
+        panel=TASK,
     ),
 ]
 EvaluationTimeout = Annotated[
     float | None,
-    typer.Option(
-        help="End an evaluation by --evaluator after so many seconds; its design is infeasible then.",
-        show_default="no limit",
-        rich_help_panel=EVALUATION,
+    option(
+        "End an evaluation by --evaluator after so many seconds; its design is infeasible then.",
+        panel=EVALUATION,
+        default="no limit",
     ),
 ]
 AllowFailures = Annotated[
     bool,
-    typer.Option(
+    option(
+        "Go on if the first five evaluations by --evaluator all fail with the same exception.",
         "--allow-failures",
-        help="Go on if the first five evaluations by --evaluator all fail with the same exception.",
-        rich_help_panel=EVALUATION,
+        panel=EVALUATION,
     ),
 ]
 Robust = Annotated[
-    bool,
-    typer.Option(
-        "--robust", help="Count a design by its worst case with the base or a link 1 mm off.", rich_help_panel=TASK
-    ),
+    bool, option("Count a design by its worst case with the base or a link 1 mm off.", "--robust", panel=TASK)
 ]
-Seed = Annotated[int, typer.Option(help="Seed of everything random.", rich_help_panel=SEARCH)]
-ModelName = Annotated[
-    str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.", rich_help_panel=MODEL)
-]
+Seed = Annotated[int, option("Seed of everything random.", panel=SEARCH)]
+ModelName = Annotated[str | None, option("Language model, such as openai-chat:gpt-4o.", panel=MODEL)]
 PromptName = Annotated[
     str | None,
-    typer.Option(
-        help="Prompt: plus (with analysis instructions), minus, or full (whole front, mechanics).",
-        show_default="plus",
-        rich_help_panel=MODEL,
+    option(
+        "Prompt: plus (with analysis instructions), minus, or full (whole front, mechanics).",
+        panel=MODEL,
+        default="plus",
     ),
 ]
 MemoryName = Annotated[
     str | None,
-    typer.Option(
-        help="What the model remembers of a run: none (every question is new) or chat (the whole conversation).",
-        show_default="none",
-        rich_help_panel=MODEL,
+    option(
+        "What the model remembers of a run: none (every question is new) or chat (the whole conversation).",
+        panel=MODEL,
+        default="none",
     ),
 ]
-MaxCost = Annotated[float | None, typer.Option(help="Stop asking the model after so many USD.", rich_help_panel=MODEL)]
+MaxCost = Annotated[float | None, option("Stop asking the model after so many USD.", panel=MODEL)]
 ModelOptionsFile = Annotated[
     str | None,
-    typer.Option(
-        metavar="FILE",
-        help="All other settings of the model (base_url, temperature, in_flight, ...): a YAML file, or a mapping in "
+    option(
+        "All other settings of the model (base_url, temperature, in_flight, ...): a YAML file, or a mapping in "
         "place such as '{temperature: 0}'; see docs/language-models.md.",
-        rich_help_panel=MODEL,
+        panel=MODEL,
+        metavar="FILE",
     ),
 ]
-DeviceName = Annotated[str, typer.Option(help="Evaluate arms on: auto, cpu or cuda.", rich_help_panel=EVALUATION)]
+DeviceName = Annotated[str, option("Evaluate arms on: auto, cpu or cuda.", panel=EVALUATION)]
 Figures = Annotated[
     bool,
-    typer.Option(
-        "--figures/--no-figures",
-        help="Make the page (report.html) and the figures of a finished run.",
-        rich_help_panel=OUTPUT,
-    ),
+    option("Make the page (report.html) and the figures of a finished run.", "--figures/--no-figures", panel=OUTPUT),
 ]
-SummaryJson = Annotated[bool, typer.Option("--json", help="Print only summary.json to stdout.", rich_help_panel=OUTPUT)]
-Json = Annotated[bool, typer.Option("--json", help="Print only JSON to stdout.", rich_help_panel=OUTPUT)]
-Csv = Annotated[bool, typer.Option("--csv", help="Print only CSV to stdout, in SI units.", rich_help_panel=OUTPUT)]
+SummaryJson = Annotated[bool, option("Print only summary.json to stdout.", "--json", panel=OUTPUT)]
+Json = Annotated[bool, option("Print only JSON to stdout.", "--json", panel=OUTPUT)]
+Csv = Annotated[bool, option("Print only CSV to stdout, in SI units.", "--csv", panel=OUTPUT)]
 Scheduler = Annotated[
     str | None,
-    typer.Option(
-        help="Use the Dask cluster at this address (tcp://HOST:PORT); --workers then limits tasks in flight.",
-        rich_help_panel=EVALUATION,
+    option(
+        "Use the Dask cluster at this address (tcp://HOST:PORT); --workers then limits tasks in flight.",
+        panel=EVALUATION,
     ),
 ]
 
@@ -123,18 +113,7 @@ def load_problem(
     objectives: str | None = None,
     evaluator: str | None = None,
 ) -> "Problem":
-    """Load the task, space and evaluator that the options name.
-
-    Args:
-        task: A built-in task, a task file, or a run folder, whose task it is.
-        space: A built-in space or a space file; None for that of the run folder, or of the task's name, else the
-            paper's.
-        robust: Whether a design counts by its worst case within the build tolerance.
-        device: "auto", "cpu" or "cuda".
-        many: Whether many designs are evaluated at once, which makes "auto" prefer a GPU.
-        objectives: Names with commas, in place of the task's.
-        evaluator: FILE.py:FUNCTION or MODULE:FUNCTION.
-    """
+    """Load the task, space and evaluator that options name; many: of many designs, for which "auto" prefers a GPU."""
     from armwright.kinematics.devices import resolve_device
     from armwright.problem.evaluators import load_evaluator
     from armwright.problem.objectives import PAPER_OBJECTIVES, named_objectives

@@ -1,4 +1,4 @@
-"""Commands that show and export what a run holds: pick, export, report, live, prompt, doctor."""
+"""Commands that show and export what a run holds: pick, export, report, doctor."""
 
 import shlex
 import sys
@@ -10,33 +10,29 @@ import typer
 from armwright.cli.activity import activity
 from armwright.cli.options import (
     Csv,
-    EvaluatorName,
     Json,
     ModelName,
     ModelOptionsFile,
     RunFolder,
-    SpaceFile,
-    load_problem,
+    option,
 )
-from armwright.cli.streams import check_formats, open_console, print_csv, print_error, print_json, print_text
+from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 
 def pick(
     run: RunFolder,
-    where: Annotated[
-        list[str] | None, typer.Option(help='A condition such as "position_error<=0.05" (may be repeated).')
-    ] = None,
-    by: Annotated[str | None, typer.Option(help="The quantity to minimise: torque, mass, link_1, …")] = None,
+    where: Annotated[list[str] | None, option('A condition such as "position_error<=0.05" (may be repeated).')] = None,
+    by: Annotated[str | None, option("The quantity to minimise: torque, mass, link_1, …")] = None,
     weights: Annotated[
         str | None,
-        typer.Option(help="Weights of objectives relative to the reference point: position_error=2,torque=1."),
+        option("Weights of objectives relative to the reference point: position_error=2,torque=1."),
     ] = None,
     robust: Annotated[
-        bool, typer.Option("--robust", help="Only designs that stay good with the base or a link 1 mm off.")
+        bool, option("Only designs that stay good with the base or a link 1 mm off.", "--robust")
     ] = False,
-    n: Annotated[int, typer.Option("-n", help="Number of designs, the best first.")] = 1,
-    all_: Annotated[bool, typer.Option("--all", help="All designs that meet the conditions, in a table.")] = False,
+    n: Annotated[int, option("Number of designs, the best first.", "-n")] = 1,
+    all_: Annotated[bool, option("All designs that meet the conditions, in a table.", "--all")] = False,
     json_: Json = False,
     csv_: Csv = False,
 ) -> None:
@@ -70,18 +66,13 @@ def pick(
 
 def export(
     run: RunFolder,
-    design: Annotated[
-        int | None, typer.Option(help="Number of the design.", show_default="the knee of the front")
-    ] = None,
+    design: Annotated[int | None, option("Number of the design.", default="the knee of the front")] = None,
     format_: Annotated[
         str,
-        typer.Option(
-            "--format",
-            help="urdf, ros2_control or mjcf; optuna: the whole run as a study.",
-        ),
+        option("urdf, ros2_control or mjcf; optuna: the whole run as a study.", "--format"),
     ] = "urdf",
     out: Annotated[
-        Path | None, typer.Option(help="Output file.", show_default="stdout; for optuna, study.db in the run folder")
+        Path | None, option("Output file.", default="stdout; for optuna, study.db in the run folder")
     ] = None,
 ) -> None:
     """Write a design of RUN for a simulator or a workshop, or all of RUN for Optuna.
@@ -111,92 +102,35 @@ def export(
 
 def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
+    live: Annotated[bool, option("Serve the live page of RUN until Ctrl-C instead (extra live).", "--live")] = False,
+    host: Annotated[
+        str, option("Address to listen on; any other than the default opens the page to a network.")
+    ] = "127.0.0.1",
+    port: Annotated[int, option("Port to listen on; 0: any free port.")] = 0,
+    follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
 ) -> None:
     """Write report.html into each RUN: one file for any browser, without a network."""
+    from armwright.page.live_server import serve
     from armwright.page.page import write_report
+    from armwright.runs.folder import read_config
 
+    if live:
+        if len(runs) > 1:
+            raise SettingsError(f"--live: expected one run folder, got {len(runs)}")
+        if not follow:
+            read_config(runs[0])  # report a folder without a run at once
+        serve(runs[0], print_text, host, port, sys.stdin.buffer if follow else None)
+        return
     for run in runs:
         with activity(f"writing the page of {run}"):
             written = write_report(run)
         print_text(str(written))
 
 
-def live(
-    run: RunFolder,
-    host: Annotated[
-        str, typer.Option(help="Address to listen on; any other than the default opens the page to a network.")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port to listen on; 0: any free port.")] = 0,
-    follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
-) -> None:
-    """Serve the live page of RUN to browsers on this machine until Ctrl-C."""
-    from armwright.page.live_server import serve
-    from armwright.runs.folder import read_config
-
-    if not follow:
-        read_config(run)  # report a folder without a run at once
-    serve(run, print_text, host, port, sys.stdin.buffer if follow else None)
-
-
-def prompt(
-    task: Annotated[str | None, typer.Argument(metavar="TASK", help="A built-in task, or a YAML file.")] = None,
-    after: Annotated[
-        Path | None,
-        typer.Option(help="Print the prompt for the next proposal of this run.", show_default="of a new run"),
-    ] = None,
-    number: Annotated[
-        int | None, typer.Option(help="With --after: print the prompt of this trial as it was sent.")
-    ] = None,
-    space: SpaceFile = None,
-    evaluator: EvaluatorName = None,
-    prompt: Annotated[
-        str | None,
-        typer.Option(help="Prompt: plus, minus or full.", show_default="the run's, else plus"),
-    ] = None,
-    memory: Annotated[
-        str | None, typer.Option(help="Memory: none or chat.", show_default="the run's, else none")
-    ] = None,
-    model_options: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE",
-            help="Options in a YAML file or in place, such as '{answer: one-step}'.",
-            show_default="the run's",
-        ),
-    ] = None,
-    n_init: Annotated[int | None, typer.Option(help="Random trials of the new run.", show_default="10")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the new run.", show_default="0")] = None,
-    schema: Annotated[bool, typer.Option("--schema", help="Print the answer's JSON schema instead.")] = False,
-) -> None:
-    """Print exactly what would be sent to a model for TASK."""
-    from armwright.llm.configuration import load_model_options
-    from armwright.study.prompt_preview import preview, preview_after
-
-    options = load_model_options(model_options, prompt=prompt, memory=memory)
-    if after is None:
-        if task is None:
-            raise SettingsError("expected a TASK, or --after RUN")
-        if number is not None:
-            raise SettingsError(f"--number {number} needs --after RUN")
-        n_init = 10 if n_init is None else n_init
-        shown = preview(load_problem(task, space, evaluator=evaluator), options, n_init=n_init, seed=seed or 0)
-    else:
-        new = {"TASK": task, "--space": space, "--evaluator": evaluator, "--n-init": n_init, "--seed": seed}
-        for option, value in new.items():
-            if value is not None:
-                raise SettingsError(f"{option} {value} is for a new run; {after} has its own")
-        shown = preview_after(after, options, number=number)
-    if schema:
-        print_json(shown.schema)
-        return
-    print_text(shown.prompt, end="")
-    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}")
-
-
 def doctor(
     model: ModelName = None,
     model_options: ModelOptionsFile = None,
-    call: Annotated[bool, typer.Option("--call", help="Make one small call to the configured model.")] = False,
+    call: Annotated[bool, option("Make one small call to the configured model.", "--call")] = False,
 ) -> None:
     """Show what is installed and which models are configured.
 

@@ -14,6 +14,7 @@ from armwright.kinematics.devices import compilation
 from armwright.runs.history import source_label
 from armwright.study.front.search_budget import SearchProgress
 from armwright.study.progress import Progress as StudyProgress
+from armwright.text import decimals
 
 LINE_INTERVAL = 10  # counted trials between two plain lines of a study
 VERIFYING = "verifying"  # after the hypervolume, in place of the rest of the state, which a narrow terminal would cut
@@ -36,7 +37,7 @@ def study_progress(console: Console) -> Generator[Callable[[StudyProgress], None
             if progress.reason and progress.source != "rules":  # the rules are explained in the report
                 console.print(f"trial {progress.number}, {source_label(progress.source)}: {progress.reason}")
             source, done = source_label(progress.source), progress.iteration
-            volume = _volume(progress.hypervolume)
+            volume = decimals(progress.hypervolume, 3)
             new = {kind: text for kind, text in progress.latest_failures.items() if shown.get(kind) != text}
             if new.keys() - shown.keys() or (new and progress.iteration >= due):
                 for kind, text in new.items():
@@ -73,11 +74,9 @@ def search_progress(console: Console) -> Generator[Callable[[SearchProgress], No
                 _print_at_once(console, describe_rate(progress))
             spent = 1.0 if progress.is_ended else progress.share
             count = f"{progress.evaluations:9,} evaluations"
-            state = (
-                f"{progress.seconds:6.1f} s  hypervolume {_volume(progress.hypervolume)}  front {progress.front_size}"
-            )
-            if progress.is_ended:
-                state = f"hypervolume {_volume(progress.hypervolume)}  {VERIFYING}"
+            volume = f"hypervolume {decimals(progress.hypervolume, 3)}"
+            rest = f"{progress.seconds:6.1f} s  {volume}  front {progress.front_size}"
+            state = f"{volume}  {VERIFYING}" if progress.is_ended else rest
             if update is not None:
                 update(total=1.0, completed=spent, count=count, state=state)
             elif spent >= due and not progress.is_ended:
@@ -85,10 +84,6 @@ def search_progress(console: Console) -> Generator[Callable[[SearchProgress], No
                 due = spent + SHARE_INTERVAL
 
         yield watch
-
-
-def _volume(hypervolume: float | None) -> str:
-    return "-" if hypervolume is None else f"{hypervolume:.3f}"
 
 
 def announce_compilation(console: Console) -> None:

@@ -1,14 +1,16 @@
 """Commands that search designs: design, optimize."""
 
 import time
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from armwright.cli.activity import activity
 from armwright.cli.options import (
     EVALUATION,
+    MODEL,
     OUTPUT,
     SEARCH,
     AllowFailures,
@@ -29,37 +31,41 @@ from armwright.cli.options import (
     SummaryJson,
     TaskName,
     load_problem,
+    option,
     select_workers,
 )
 from armwright.cli.signals import interruptible
 from armwright.cli.streams import exit_interrupted, open_console, print_command, print_json, repeat_command
 from armwright.exceptions import AnswerPendingError, StoppedError
 
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from armwright.problem.problem import Problem
+
 
 def design(
     task: TaskName,
     budget: Annotated[
         str | None,
-        typer.Option(
-            help="Wall-clock time of the command: 60s, 5min, 1h, or a number of seconds. Compiling kernels in a first "
+        option(
+            "Wall-clock time of the command: 60s, 5min, 1h, or a number of seconds. Compiling kernels in a first "
             "run does not count.",
-            show_default="30s; no limit with --evaluations",
+            default="30s; no limit with --evaluations",
         ),
     ] = None,
     evaluations: Annotated[
-        int | None, typer.Option(help="Evaluations of the search; with --budget, whichever ends first.")
+        int | None, option("Evaluations of the search; with --budget, whichever ends first.")
     ] = None,
     space: SpaceFile = None,
     objectives: Objectives = None,
-    from_: Annotated[
-        Path | None, typer.Option("--from", help="Use all designs of this run as initial designs.")
-    ] = None,
+    from_: Annotated[Path | None, option("Use all designs of this run as initial designs.", "--from")] = None,
     robust: Robust = False,
     device: DeviceName = "auto",
     figures: Figures = True,
-    stall: Annotated[bool, typer.Option("--stall/--no-stall", help="Stop early if the hypervolume stalls.")] = True,
+    stall: Annotated[bool, option("Stop early if the hypervolume stalls.", "--stall/--no-stall")] = True,
     seed: Seed = 0,
-    out: Annotated[Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-design-seedSEED")] = None,
+    out: Annotated[Path | None, option("Run folder.", default="runs/TASK-design-seedSEED")] = None,
     json_: SummaryJson = False,
 ) -> None:
     """Find the whole Pareto front of TASK by direct search in batches.
@@ -67,22 +73,17 @@ def design(
     The same command with a larger --budget or --evaluations continues the search.
     """
     started = time.monotonic()
-    from armwright.cli.check import check_before_search, check_files
-    from armwright.cli.notes import space_note
-    from armwright.cli.progress import announce_compilation, search_progress
+    from armwright.cli.progress import search_progress
     from armwright.cli.show_results import show_search
     from armwright.study.front.front_run import find_front
     from armwright.study.front.search_budget import SearchBudget
     from armwright.study.front.time_plan import TimePlan
 
     console = open_console(json_)
-    announce_compilation(console)
     plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=figures, started=started)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
-    if space is None and (note := space_note(problem)):
-        console.print(note)
     folder = out or Path("runs") / f"{problem.task.name}-design-seed{seed}"
-    check_before_search(console, problem, check_files(task, space), folder)
+    _begin(console, problem, task, space, folder)
     try:
         with interruptible(), search_progress(console) as watch:
             run = find_front(
@@ -119,39 +120,30 @@ def optimize(
     robust: Robust = False,
     proposer: Annotated[
         str,
-        typer.Option(
-            help="Proposer of every n-step-th design: auto (a configured model, else rules), none, rules, llm, "
+        option(
+            "Proposer of every n-step-th design: auto (a configured model, else rules), none, rules, llm, "
             "replay:RUN (a recorded run), manual:DIR (a person, by files).",
-            rich_help_panel=SEARCH,
+            panel=SEARCH,
         ),
     ] = "auto",
     sampler: Annotated[
         str,
-        typer.Option(
-            help="Black-box sampler: auto (surrogate with an evaluator, else tpe), surrogate, tpe, tpe-multivariate, "
+        option(
+            "Black-box sampler: auto (surrogate with an evaluator, else tpe), surrogate, tpe, tpe-multivariate, "
             "nsga2, gp (needs the extra gp) or random.",
-            rich_help_panel=SEARCH,
+            panel=SEARCH,
         ),
     ] = "auto",
-    n_total: Annotated[int, typer.Option(help="Counted trials.", rich_help_panel=SEARCH)] = 200,
-    n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.", rich_help_panel=SEARCH)] = 10,
-    n_step: Annotated[
-        int, typer.Option(help="Trials in a block; the first is the proposer's.", rich_help_panel=SEARCH)
-    ] = 10,
+    n_total: Annotated[int, option("Counted trials.", panel=SEARCH)] = 200,
+    n_init: Annotated[int, option("Random trials before the counted ones.", panel=SEARCH)] = 10,
+    n_step: Annotated[int, option("Trials in a block; the first is the proposer's.", panel=SEARCH)] = 10,
     initial_design: Annotated[
         list[Path] | None,
-        typer.Option(
-            help="An initial design, such as designs/0042/design.json of a run (may be repeated).",
-            rich_help_panel=SEARCH,
-        ),
+        option("An initial design, such as designs/0042/design.json of a run (may be repeated).", panel=SEARCH),
     ] = None,
     screen: Annotated[
         bool,
-        typer.Option(
-            "--screen/--no-screen",
-            help="Skip proposals of which the sampler surrogate expects little.",
-            rich_help_panel=SEARCH,
-        ),
+        option("Skip proposals of which the sampler surrogate expects little.", "--screen/--no-screen", panel=SEARCH),
     ] = True,
     seed: Seed = 0,
     model: ModelName = None,
@@ -159,26 +151,28 @@ def optimize(
     memory: MemoryName = None,
     max_cost: MaxCost = None,
     model_options: ModelOptionsFile = None,
+    print_prompt: Annotated[
+        str | None,
+        option(
+            "Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run folder), the "
+            "number of a trial of a run, or schema (of the answer).",
+            panel=MODEL,
+            metavar="WHAT",
+        ),
+    ] = None,
     device: DeviceName = "auto",
     workers: Annotated[
         int,
-        typer.Option(
-            help="Local processes that evaluate designs; 0: this process (extra distributed).",
-            rich_help_panel=EVALUATION,
-        ),
+        option("Local processes that evaluate designs; 0: this process (extra distributed).", panel=EVALUATION),
     ] = 0,
     scheduler: Scheduler = None,
     evaluation_timeout: EvaluationTimeout = None,
     allow_failures: AllowFailures = False,
-    out: Annotated[
-        Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-seedSEED", rich_help_panel=OUTPUT)
-    ] = None,
+    out: Annotated[Path | None, option("Run folder.", panel=OUTPUT, default="runs/TASK-seedSEED")] = None,
     figures: Figures = True,
     live: Annotated[
         bool,
-        typer.Option(
-            "--live", help="Serve the page of the run on 127.0.0.1 while it runs (extra live).", rich_help_panel=OUTPUT
-        ),
+        option("Serve the page of the run on 127.0.0.1 while it runs (extra live).", "--live", panel=OUTPUT),
     ] = False,
     json_: SummaryJson = False,
 ) -> None:
@@ -186,9 +180,8 @@ def optimize(
 
     The same command resumes or shows the run; a larger --n-total extends it.
     """
-    from armwright.cli.check import check_before_search, check_files
-    from armwright.cli.notes import design_note, space_note
-    from armwright.cli.progress import announce_compilation, study_progress
+    from armwright.cli.notes import design_note
+    from armwright.cli.progress import study_progress
     from armwright.cli.show_results import show_result
     from armwright.llm.configuration import load_model_options
     from armwright.proposers.factory import choose_proposer
@@ -196,19 +189,22 @@ def optimize(
     from armwright.study.study import optimize as run_study
 
     console = open_console(json_)
-    announce_compilation(console)
-    problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
-    if space is None and (note := space_note(problem)):
-        console.print(note)
-    initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
+    load = partial(load_problem, task, space, robust, device, objectives=objectives, evaluator=evaluator)
+    if print_prompt is not None:
+        from armwright.cli.show_prompt import show_prompt
+
+        show_prompt(print_prompt, task, space, load, given, n_init, n_total, seed)
+        return
+    problem = load()
+    initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     choice = choose_proposer(proposer, given)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
     is_method_chosen = proposer != "auto" or model is not None or sampler != "auto"
     if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
         console.print(note)
-    check_before_search(console, problem, check_files(task, space), folder)
+    _begin(console, problem, task, space, folder)
     if live:
         from armwright.page.live_server import start_server
 
@@ -258,6 +254,18 @@ def optimize(
         show_result(console, run, drawn)
     if all(trial.failure is not None for trial in run.trials):
         raise typer.Exit(1)
+
+
+def _begin(console: "Console", problem: "Problem", task: str, space: Path | None, folder: Path) -> None:
+    """Print the task's own space and warnings; stop if no design can serve the task."""
+    from armwright.cli.check import check_before_search, check_files
+    from armwright.cli.notes import space_note
+    from armwright.cli.progress import announce_compilation
+
+    announce_compilation(console)
+    if space is None and (note := space_note(problem)):
+        console.print(note)
+    check_before_search(console, problem, check_files(task, space), folder)
 
 
 def _draw(folder: Path) -> list[Path]:

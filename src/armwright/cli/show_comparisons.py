@@ -13,10 +13,8 @@ from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.existing.compare_arms import ArmComparison, ComparedArm
 from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_runs import Comparison
-from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
 from armwright.experiments.runner import CellOutcome
-from armwright.experiments.table_cells import remarks_on
-from armwright.experiments.tables import markdown, sections
+from armwright.experiments.tables import markdown, remarks_on, sections
 from armwright.extras import install_command, missing_packages
 from armwright.llm.servers import describe_server
 from armwright.problem.objectives import TORQUE_SCALE
@@ -24,6 +22,7 @@ from armwright.robot.mounting import Mounting
 from armwright.sheet.record import NOT_MODELLED
 from armwright.study.workers.cluster import Workers
 from armwright.tasks.moments import MAX_MASS
+from armwright.text import rounded
 
 
 def show_plan(
@@ -74,26 +73,15 @@ def show_comparison(
     console: Console,
     comparison: Comparison,
     title: str,
-    published: Published = NOTHING_PUBLISHED,
     notes: Sequence[str] = (),
 ) -> None:
-    """Print a comparison: in a terminal its tables as wide as that, elsewhere Markdown.
-
-    Args:
-        console: The console.
-        comparison: The comparison.
-        title: Its title.
-        published: Published values to show beside it.
-        notes: Further remarks.
-    """
+    """Print a comparison: in a terminal its tables as wide as that, elsewhere Markdown."""
     if not console.is_terminal:
-        console.print(markdown(comparison, title, published, notes), end="")
+        console.print(markdown(comparison, title, notes), end="")
         return
     console.print(title)
-    for section in sections(comparison, published):
-        columns = [
-            Column(head, is_number=i in section.right, rank=max(0, i - 1)) for i, head in enumerate(section.head)
-        ]
+    for section in sections(comparison):
+        columns = [Column(head, rank=max(0, i - 1)) for i, head in enumerate(section.head)]
         console.print(f"\n{section.title}: {section.caption}")
         print_table(console, Table(columns, section.rows, "--json and table.md have all"))
     for note in (*remarks_on(comparison), *notes):
@@ -126,9 +114,8 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     for arm in shown:
         values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
         known = [*(arm.value(name) for name in measures), *(values[objective.name] for objective in others)]
-        cells = ["-" if value is None else _format_measure(value) for value in known]
-        reach, mass = arm.value("reach") or 0.0, arm.value("mass") or 0.0
-        rows.append([arm.name, str(arm.joints), f"{reach:.2f}", f"{mass:.3g}", _format_payload(arm), *cells])
+        reach = f"{arm.value('reach'):.2f}"
+        rows.append([arm.name, str(arm.joints), reach, rounded(arm.value("mass")), _payload(arm), *map(rounded, known)])
     print_table(console, Table(columns, rows, "--json and --csv print all", title=title, gap=1))
     console.print(
         f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; torque "
@@ -198,13 +185,9 @@ _ARM_COLUMNS = {
 }
 
 
-def _format_payload(arm: ComparedArm) -> str:
+def _payload(arm: ComparedArm) -> str:
     held = arm.value("payload_at_full_reach")
-    return "-" if held is None else "any" if held >= MAX_MASS else _format_measure(held)
-
-
-def _format_measure(value: float) -> str:
-    return f"{value:,.0f}" if value >= 1e4 else f"{value:.3g}" if value >= 0.0095 or value == 0.0 else f"{value:.1e}"
+    return "any" if held is not None and held >= MAX_MASS else rounded(held)
 
 
 def _describe_dominance(arm: ComparedArm, front: int) -> str:

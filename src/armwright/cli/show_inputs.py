@@ -20,6 +20,7 @@ from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
+from armwright.text import percent, rounded
 
 if TYPE_CHECKING:
     from armwright.llm.draft import Draft
@@ -33,7 +34,7 @@ def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     columns = (Column("task"), *numbers("targets", *methods), Column("", rank=1, least=24))
     rows: list[list[str]] = []
     for task in tasks:
-        shares = {baseline.method: f"{100 * baseline.share:.0f} %" for baseline in baselines_of(task.name)}
+        shares = {baseline.method: percent(baseline.share) for baseline in baselines_of(task.name)}
         shown = (shares.get(method, "") for method in methods)
         rows.append([task.name, str(len(task.targets)), *shown, task.description])
     print_table(console, Table(columns, rows, "--json and --csv print all"))
@@ -58,7 +59,7 @@ def actuator_rows(records: Sequence[ActuatorRecord]) -> Iterator[dict[str, Any]]
 
 
 def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
-    """Print the catalogue; torques and prices that a data sheet lacks are empty."""
+    """Print the catalogue."""
     columns = (
         Column("actuator"), Column("maker", rank=3, least=8), *numbers("V", "kg"),
         *numbers(f"stall N{NO_BREAK}m", rank=2), *numbers(f"rated N{NO_BREAK}m", rank=1),
@@ -70,8 +71,7 @@ def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
             record.voltage, record.mass, record.stall_torque, record.rated_torque, record.peak_torque,
             record.speed, record.price,
         )  # fmt: skip
-        shown = ("" if value is None else f"{value:.4g}" for value in values)
-        rows.append([record.name, record.maker, *shown, record.source])
+        rows.append([record.name, record.maker, *(rounded(value, 4) for value in values), record.source])
     print_table(console, Table(columns, rows, "--json and --csv print all"))
     n_values = sum(value_of(record.completed(), name) is not None for record in records for name in UNITS)
     n_assumed = sum(len(record.assumed) for record in records)
@@ -95,7 +95,7 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
         shown = "page, or as the note says" if found is None else f"{found.address} ({found.statement})"
         if name in record.assumed:
             shown = f"assumed: estimate from {shown}" if found else f"assumed: default of a {record.kind}"
-        rows.append([name, f"{value:.4g}", unit, shown])
+        rows.append([name, rounded(value, 4), unit, shown])
     columns = (Column(""), *numbers("value"), Column(""), Column("source", rank=1, least=24))
     print_table(console, Table(columns, rows, "--json and --csv print all"))
     if record.body_shape is not None:
@@ -127,7 +127,7 @@ def show_task(
         stored: Its baselines.
         has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
         has_bodies: Whether motors or a column are solid bodies, which may not collide.
-        is_brief: Leave out the targets and the steps of the cycle.
+        is_brief: Leave out the targets.
     """
     reference = task.reference_point
     print_named(console, task.name, f": {task.description}" if task.description else "")
@@ -145,8 +145,8 @@ def show_task(
         ("payload", _describe_payload(task)),
         ("evaluated by the worst case, also", task.cases_description),
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
-        ("cycle", "" if is_brief else task.cycle_description),
-        ("durations", task.cycle.describe_times() if task.cycle and not is_brief else ""),
+        ("cycle", task.cycle_description),
+        ("durations", task.cycle.describe_times() if task.cycle else ""),
         (
             "constraints of the cycle" if task.cycle else "constraints of the solid bodies",
             ", ".join(implied_constraints(task, has_drives, has_bodies)),
@@ -173,7 +173,7 @@ def show_target_table(console: Console, problem: Problem) -> None:
     rows: list[list[str]] = []
     for i, point in enumerate(task.target_positions[:MAX_ROWS].tolist()):
         values = (*point, 1e3 * arrays.tolerance[i], task.payloads[i], distances[i])
-        rows.append([task.target_names[i], *(f"{value:.4g}" for value in values), _tool_direction(arrays, i)])
+        rows.append([task.target_names[i], *(rounded(value, 4) for value in values), _tool_direction(arrays, i)])
     console.print(f"  {len(task.targets)} targets:")
     columns = (
         Column("target", least=12), *numbers(*heads[:4]), *numbers(heads[4], rank=1), *numbers(heads[5]),
@@ -195,31 +195,6 @@ def _tool_direction(arrays: TargetArrays, index: int) -> str:
         parts.append(f"within {math.degrees(arrays.angle_tolerance[index]):.3g}°")
     parts += [f"weight {arrays.weight[index]:g}"] * bool(arrays.weight[index] != 1.0)
     return ", ".join(parts) or "any"
-
-
-def show_cycle(console: Console, task: DesignTask) -> None:
-    """Print the steps of a cycle, one a line; nothing without a cycle."""
-    if task.cycle is None:
-        return
-    cycle, plan = task.cycle, task.plan(task.target_positions)
-    names = [task.target_names[target] for target in plan.targets]
-    acts = {"pick": ", pick", "place": ", place", None: ""}
-    carried = cycle.carried() if task.payloads.any() else (False,) * len(names)
-    console.print(f"  cycle, {'closed' if cycle.closed else 'open'}, at rest at each target:")
-    console.print(f"    1. start at {names[0]}" + ("" if cycle.closed else acts[cycle.steps[0].do]))
-    for number in range(1, len(names) + cycle.closed):
-        step, time = cycle.steps[number % len(names)], plan.times[number % len(names)]
-        way = "a line" if step.by == "line" else "a joint motion"
-        back = "back " if number == len(names) else ""
-        load = " with the payload" if carried[number % len(names)] else ""
-        duration = "as fast as possible" if time is None else f"in {time:g} s"
-        console.print(
-            f"    {number + 1}. {back}to {names[number % len(names)]} by {way}{load}, {duration}{acts[step.do]}"
-        )
-    if cycle.approach is not None:
-        console.print(f"    lines of {1e3 * cycle.approach:g} mm along the tool before and after each pick and place")
-    if cycle.dwell:
-        console.print(f"    {cycle.dwell:g} s at rest after each pick and place")
 
 
 def _describe_payload(task: DesignTask) -> str:

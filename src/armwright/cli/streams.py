@@ -98,6 +98,15 @@ def print_csv(rows: Iterable[Mapping[str, Any]]) -> None:
     print_text(to_csv({key: record.get(key) for key in keys} for record in records), end="")
 
 
+def print_records(is_json: bool, is_csv: bool, content: Any, rows: Iterable[Mapping[str, Any]] | None = None) -> bool:
+    """Print content as JSON or rows, by default the content, as CSV; return whether either was asked for."""
+    if is_json:
+        print_json(content)
+    elif is_csv:
+        print_csv(content if rows is None else rows)
+    return is_json or is_csv
+
+
 def check_formats(is_json: bool, is_csv: bool) -> bool:
     """Return whether a program reads stdout; SettingsError if both formats are asked for."""
     if is_json and is_csv:

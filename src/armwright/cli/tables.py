@@ -13,42 +13,25 @@ NO_BREAK = "\N{NO-BREAK SPACE}"  # in heads, between words that stay on one line
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
-
-    Attributes:
-        head: Its head.
-        is_number: Whether it is aligned to the right.
-        rank: If the table is too wide, columns of the highest rank are dropped first; those of rank 0 never.
-        least: Characters to which its texts may be shortened; None if they are shown whole.
-    """
+    """A column of a table."""
 
     head: str
-    is_number: bool = False
-    rank: int = 0
-    least: int | None = None
+    is_number: bool = False  # aligned to the right
+    rank: int = 0  # of a table that is too wide, the highest rank is dropped first, rank 0 never
+    least: int | None = None  # characters to which its texts may be shortened; None if they are shown whole
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts without lines.
-
-    Attributes:
-        columns: The columns.
-        rows: A text for each column in each row.
-        complete: Where dropped columns are found, such as an option.
-        title: The line above the table.
-        caption: The line below the table.
-        gap: Spaces between two columns.
-        indent: Spaces before each line.
-    """
+    """A table of texts without lines."""
 
     columns: Sequence[Column]
     rows: Sequence[Sequence[str]]
-    complete: str
-    title: str = ""
-    caption: str = ""
-    gap: int = 2
-    indent: int = 0
+    complete: str  # where dropped columns are found, such as an option
+    title: str = ""  # the line above the table
+    caption: str = ""  # the line below the table
+    gap: int = 2  # spaces between two columns
+    indent: int = 0  # spaces before each line
 
 
 def numbers(*heads: str, rank: int = 0) -> tuple[Column, ...]:

@@ -87,23 +87,13 @@ class StopBody(BaseModel, frozen=True, extra="forbid"):
 
 
 def editor_app(files: EditedFiles, pages: OpenPages) -> Starlette:
-    """Return the editor's application, to be guarded.
-
-    Args:
-        files: The edited files.
-        pages: Counts the open live pages.
-    """
+    """Return the editor's application, to be guarded; pages: counts the open live pages."""
     editor = Editor(files, pages)
     return Starlette(routes=editor.routes(), lifespan=editor.lifespan)
 
 
 class Editor:
-    """The editor's requests.
-
-    Args:
-        files: The edited files.
-        pages: Counts the open live pages.
-    """
+    """The editor's requests."""
 
     def __init__(self, files: EditedFiles, pages: OpenPages) -> None:
         self._files = files
@@ -139,12 +129,10 @@ class Editor:
         return Response(editor_shell(), media_type="text/html; charset=utf-8")
 
     async def opened(self, request: Request) -> Response:
-        names = {"task": self._files.task.name, "space": self._files.space.name}
-        texts = asdict(self._files.texts())
         files = self._files
-        return _json(
-            {"files": names, **texts, "exist": files.exist, "notes": asdict(files.notes), "choices": choices()}
-        )
+        names = {"task": files.task.name, "space": files.space.name}
+        state = {"exist": files.exist, "notes": asdict(files.notes), "choices": choices()}
+        return _json({"files": names, **asdict(files.texts()), **state})
 
     async def job(self, request: Request) -> Response:
         return _json(None if self._job is None else self._job.status())

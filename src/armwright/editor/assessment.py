@@ -1,7 +1,7 @@
 """What the texts of a task and a space mean, and what is wrong with them, for the page."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from armwright.editor.edited_files import EditedFiles, Texts
@@ -18,23 +18,14 @@ from armwright.yaml_documents import load_document, parse_document
 
 @dataclass(frozen=True)
 class Assessment:
-    """What two texts mean.
+    """What two texts mean."""
 
-    Attributes:
-        task: The content of the task text as read, valid or not; None if it is not YAML.
-        space: Likewise of the space text.
-        errors: Why no search can start, one message a line.
-        findings: What is suspicious.
-        scene: What to draw; None for a task that is not valid.
-        meaning: The task and the space in words; empty unless both are valid.
-    """
-
-    task: Any
-    space: Any
-    errors: list[str] = field(default_factory=list[str])
-    findings: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
-    scene: dict[str, Any] | None = None
-    meaning: dict[str, str] = field(default_factory=dict[str, str])
+    task: Any  # the content of the task text as read, valid or not; None if it is not YAML
+    space: Any  # likewise of the space text
+    errors: list[str]  # why no search can start
+    findings: list[dict[str, str]]  # what is suspicious
+    scene: dict[str, Any] | None  # what to draw; None for a task that is not valid
+    meaning: dict[str, str]  # the task and the space in words; empty unless both are valid
 
 
 def assess(texts: Texts, files: EditedFiles) -> Assessment:

@@ -22,17 +22,12 @@ _TEXT_TAG = "tag:yaml.org,2002:str"
 
 
 class Edit(BaseModel, frozen=True, extra="forbid"):
-    """A new value of a key, or its removal.
+    """A new value of a key, or its removal."""
 
-    Attributes:
-        path: Keys and indices from the root, such as ("targets", 0, "position"). An index one past the end appends.
-        value: The new value, in JSON types.
-        remove: Whether the key or item is removed instead.
-    """
-
+    # Keys and indices from the root, such as ("targets", 0, "position"); an index one past the end appends
     path: tuple[str | int, ...] = Field(min_length=1, max_length=MAX_DEPTH)
-    value: Any = None
-    remove: bool = False
+    value: Any = None  # in JSON types
+    remove: bool = False  # remove the key or item instead
 
 
 def edit_text(text: str, edits: Sequence[Edit], where: str) -> str:

@@ -20,64 +20,51 @@ LEVELS = (0.5, 0.75, 0.9, 0.95)  # shares of the best known hypervolume, for tim
 
 @dataclass(frozen=True)
 class MethodResult:
-    """Results of a method on a task.
+    """Results of a method on a task."""
 
-    seeds: of the runs that count. e_hv, sigma_hv: as in the paper's table; None for a front search, and σ_hv for a
-        single run. share: of the best known hypervolume; None if none is known.
-    """
-
-    method: str
     task: str
-    seeds: tuple[int, ...]
-    e_hv: Interval | None
-    sigma_hv: float | None
+    method: str
+    seeds: tuple[int, ...]  # of the runs that count
+    e_hv: Interval | None  # as in the paper's table; None for a front search
+    sigma_hv: float | None  # likewise; None also for a single run
     final: Interval
-    share: Interval | None
+    share_of_best_known: Interval | None  # None if no front is known
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """E_hv of a method against another one, its baseline, on a task, paired by seed.
+    """E_hv of a method against another one, its baseline: on a task, or over all tasks that both ran."""
 
-    p_holm: corrected for all contrasts that have enough pairs for a test; None with fewer pairs.
-    """
-
+    task: str  # empty for all tasks
     method: str
     baseline: str
-    task: str
-    test: PairedTest
-    p_holm: float | None
-
-
-@dataclass(frozen=True)
-class OverallContrast:
-    """A method against another one, its baseline, over all tasks that both ran; every task counts once.
-
-    ratio: its mean E_hv divided by the baseline's, averaged over the tasks. test: of the logarithms of these ratios,
-        paired by task (Demsar, JMLR 7:1, 2006). p_holm: corrected for the number of contrasts.
-    """
-
-    method: str
-    baseline: str
-    ratio: Interval
-    test: PairedTest
-    p_holm: float
+    test: PairedTest  # paired by seed; over all tasks, of the logarithms by task (Demsar, JMLR 7:1, 2006)
+    p_holm: float | None  # corrected for the number of contrasts; None with too few pairs for a test
+    ratio: Interval | None = None  # over all tasks: mean E_hv divided by the baseline's
 
 
 @dataclass(frozen=True)
 class TimeToTarget:
-    """Counted trials needed to reach a share of the best known hypervolume.
-
-    reached: number of runs that did. median_trials: over the runs; None if fewer than half of them did.
-    """
+    """Counted trials needed to reach a share of the best known hypervolume."""
 
     task: str
     method: str
     level: float
     hypervolume: float
-    reached: int
+    reached: int  # runs that did
     runs: int
-    median_trials: float | None
+    median_trials: float | None  # over the runs; None if fewer than half of them did
+
+
+@dataclass(frozen=True)
+class Published:
+    """Published results."""
+
+    values: Mapping[tuple[str, str], tuple[float, float]]  # E_hv and σ_hv by the method's label and the task
+    source: str  # the publication
+
+
+NOTHING_PUBLISHED = Published({}, "")
 
 
 class Comparison:
@@ -87,6 +74,7 @@ class Comparison:
         methods that they are compared with.
     excluded: flagged runs, which do not count.
     widened: tasks whose runs had different reference points; their componentwise maximum is used for all.
+    published: published results, shown next to these.
     """
 
     def __init__(
@@ -96,6 +84,7 @@ class Comparison:
         tasks: Sequence[str],
         baseline: str,
         against: Mapping[str, Sequence[str]] | None = None,
+        published: Published = NOTHING_PUBLISHED,
     ) -> None:
         runs = list(runs)
         points: dict[str, tuple[float, ...]] = {}
@@ -114,6 +103,7 @@ class Comparison:
         self.tasks = [task for task in tasks if any(run.task == task for run in self.runs)]
         self.baseline = baseline
         self.against = against or {}
+        self.published = published
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
@@ -161,22 +151,21 @@ class Comparison:
     @cached_property
     def contrasts(self) -> list[Contrast]:
         """The pairs of methods on each task with common seeds."""
-        tests: list[tuple[str, str, str, PairedTest]] = []
+        tests: list[Contrast] = []
         for task in self.tasks:
             for method, other in self.pairs:
                 e_hv, baseline = self._e_hv_by_seed(method, task), self._e_hv_by_seed(other, task)
                 seeds = sorted(e_hv.keys() & baseline.keys())
                 if seeds:
                     test = paired_test([e_hv[seed] for seed in seeds], [baseline[seed] for seed in seeds])
-                    tests.append((method, other, task, test))
-        corrected = iter(holm([test.p for *_, test in tests if can_reject(test.n)]).tolist())
-        return [Contrast(*found, next(corrected) if can_reject(found[-1].n) else None) for found in tests]
+                    tests.append(Contrast(task, method, other, test, None))
+        return _corrected(tests)
 
     @cached_property
-    def overall(self) -> list[OverallContrast]:
+    def overall(self) -> list[Contrast]:
         """The pairs of methods over the tasks; empty with too few tasks for a test."""
         e_hv = {(row.method, row.task): row.e_hv.mean for row in self.rows if row.e_hv is not None}
-        tests: list[tuple[str, str, Interval, PairedTest]] = []
+        tests: list[Contrast] = []
         for method, other in self.pairs:
             pairs = [
                 (e_hv[method, task], e_hv[other, task])
@@ -185,9 +174,9 @@ class Comparison:
             ]
             own, baseline = np.array([pair for pair in pairs if min(pair) > 0.0]).reshape(-1, 2).T
             if can_reject(len(own)):
-                tests.append((method, other, interval(own / baseline), paired_test(np.log(own), np.log(baseline))))
-        corrected = holm([test.p for *_, test in tests])
-        return [OverallContrast(*test, float(p)) for test, p in zip(tests, corrected, strict=True)]
+                test = paired_test(np.log(own), np.log(baseline))
+                tests.append(Contrast("", method, other, test, None, interval(own / baseline)))
+        return _corrected(tests)
 
     @property
     def is_undecidable(self) -> bool:
@@ -229,13 +218,13 @@ class Comparison:
         best = self.best_known(task)
         finals = np.array([run.final for run in runs])
         return MethodResult(
-            method=method,
             task=task,
+            method=method,
             seeds=tuple(run.seed for run in runs),
             e_hv=interval(curves.mean(axis=1)) if len(curves) else None,
             sigma_hv=float(curves.std(axis=0).mean()) if len(curves) > 1 else None,
             final=interval(finals),
-            share=interval(finals / best) if best else None,
+            share_of_best_known=interval(finals / best) if best else None,
         )
 
 
@@ -265,6 +254,12 @@ def compare_summaries(runs: Sequence[RunSummary], baseline: str | None = None) -
             )
     tasks = list(dict.fromkeys(run.task for run in runs))
     return Comparison(runs, methods, tasks, baseline or methods[0])
+
+
+def _corrected(contrasts: Sequence[Contrast]) -> list[Contrast]:
+    """Return the contrasts with p corrected for those that have enough pairs for a test."""
+    corrected = iter(holm([found.test.p for found in contrasts if can_reject(found.test.n)]).tolist())
+    return [replace(found, p_holm=next(corrected)) if can_reject(found.test.n) else found for found in contrasts]
 
 
 def _check_same_problem(task: str, runs: Sequence[RunSummary]) -> None:

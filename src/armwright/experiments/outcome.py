@@ -1,34 +1,19 @@
 """Collect the finished cells of an experiment, and store its plan."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
 
 from armwright.exceptions import FailureError
 from armwright.experiments.cells import Cell
-from armwright.experiments.compare_runs import Comparison
+from armwright.experiments.compare_runs import Comparison, Published
 from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.run_record import read_run_summary
 from armwright.files import check_no_links, naming_write_errors, replace_file
 from armwright.proof.results import read_summary
 
 PLAN = "experiment.yaml"  # in the experiment's folder
-
-
-@dataclass(frozen=True)
-class Published:
-    """Published results.
-
-    values: E_hv and σ_hv by the method's label and the task. source: the publication.
-    """
-
-    values: Mapping[tuple[str, str], tuple[float, float]]
-    source: str
-
-
-NOTHING_PUBLISHED = Published({}, "")
 
 
 def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
@@ -41,17 +26,13 @@ def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
     labels = [method.label for method in plan.methods.values()]
     tasks = list(dict.fromkeys(cell.task_name for cell in cells))
     against = {m.label: [plan.methods[key].label for key in m.against] for m in plan.methods.values() if m.against}
-    return Comparison(records, labels, tasks, plan.methods[plan.baseline_key].label, against)
-
-
-def published(plan: ExperimentPlan) -> Published:
-    """Return the published results of the plan's methods."""
-    values = {
+    published = {
         (plan.methods[key].label, task): numbers
         for key, by_task in plan.published.items()
         for task, numbers in by_task.items()
     }
-    return Published(values, plan.published_in)
+    baseline = plan.methods[plan.baseline_key].label
+    return Comparison(records, labels, tasks, baseline, against, Published(published, plan.published_in))
 
 
 def write_plan(plan: ExperimentPlan, out: Path) -> None:

@@ -152,6 +152,15 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         """Key of the method that the others are compared with; by default the first one."""
         return self.baseline or next(iter(self.methods))
 
+    @property
+    def drawn(self) -> tuple[dict[str, tuple[str, list[str]]], list[str]]:
+        """Title and methods of each figure, and the samples; all methods by their labels."""
+        labels = {key: method.label for key, method in self.methods.items()}
+        curves = {
+            name: (figure.title, [labels[key] for key in figure.methods]) for name, figure in self.figures.items()
+        }
+        return curves, [labels[key] for key in self.samples]
+
 
 def _listed(seeds: int | tuple[int, ...]) -> tuple[int, ...]:
     return tuple(range(seeds)) if isinstance(seeds, int) else seeds

@@ -99,32 +99,24 @@ class RunSummary:
         return replace(history, problem=replace(history.problem, task=task))
 
 
-@dataclass(frozen=True)
-class SourceShare:
-    """What the designs of one source contributed, averaged over runs.
+def shares_by_source(runs: Sequence[RunSummary]) -> dict[str, dict[str, float]]:
+    """Return what the designs of each source contributed, averaged over the runs; random trials and black box first.
 
-    trials: their number. front: share of the final front. gained: as in `RunSummary.gained`.
-    """
-
-    source: str
-    trials: float
-    front: float
-    gained: float
-
-
-def shares_by_source(runs: Sequence[RunSummary]) -> list[SourceShare]:
-    """Return the mean shares of all sources of these runs, random trials and the black box first.
-
-    Front searches have no such shares and do not count.
+    trials: their number. front: share of the final front. gained: as in `RunSummary.gained`. Front searches do not
+    count: all their designs have one source.
     """
     runs = [run for run in runs if "attribution" in run.summary]
     sources = dict.fromkeys(source for run in runs for source in run.summary["attribution"])
-    shares: list[SourceShare] = []
+    shares: dict[str, dict[str, float]] = {}
     for source in sorted(sources, key=lambda source: (source != RANDOM, source != BBO)):
         of_runs = [run.summary["attribution"].get(source, {"trials": 0, "front": 0}) for run in runs]
-        front = [own["front"] / max(1, run.summary["front_size"]) for own, run in zip(of_runs, runs, strict=True)]
-        trials, gained = [own["trials"] for own in of_runs], [run.gained.get(source, 0.0) for run in runs]
-        shares.append(SourceShare(source, *(float(np.mean(values)) for values in (trials, front, gained))))
+        shares[source] = {
+            "trials": float(np.mean([own["trials"] for own in of_runs])),
+            "front": float(
+                np.mean([o["front"] / max(1, run.summary["front_size"]) for o, run in zip(of_runs, runs, strict=True)])
+            ),
+            "gained": float(np.mean([run.gained.get(source, 0.0) for run in runs])),
+        }
     return shares
 
 

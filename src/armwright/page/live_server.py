@@ -157,7 +157,7 @@ def start_server(folder: Path) -> str:
     check_extra("live", "the live page")
     # In a session of its own: after Ctrl-C the page still shows the results.
     server = start_module(
-        "armwright", "live", folder.absolute(), "--follow", stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        "armwright", "report", "--live", "--follow", folder.absolute(), stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert server.stdout is not None
     address = server.stdout.readline().decode().strip()

@@ -3,7 +3,6 @@
 import math
 import textwrap
 from collections.abc import Sequence
-from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from armwright.arrays import Array
 from armwright.kinematics.arms.forward import (
     column_solid,
     forward_kinematics,
@@ -21,12 +21,12 @@ from armwright.kinematics.arms.forward import (
     rails,
 )
 from armwright.pictures.drawing import legend_mark
-from armwright.pictures.solids import draw_obstacles, draw_solid
+from armwright.pictures.solids import Extent, draw_edges, draw_obstacles, draw_solid, extent_of
 from armwright.pictures.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import TORQUE
 from armwright.runs.history import FrontMember, History, source_label
-from armwright.tasks.obstacles import Ground
+from armwright.tasks.motions import Motion
 from armwright.tasks.targets import AXIS
 
 ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's reach
@@ -34,6 +34,7 @@ MAX_PANELS = 12
 COLUMNS = 42  # characters of a caption above one of several panels
 LINE_HEIGHT = 0.2  # [inches]
 NARROW = 3  # columns of the legend of a narrow figure
+WIDE = 7.0  # [inch] of a figure with its legend on one line
 INNER = 0.88  # part of an axis that has tick labels
 
 # Lines
@@ -42,24 +43,16 @@ MOVE: Any = {"color": TARGET, "linewidth": 1.2}  # between two targets
 TIP: Any = {"color": FRONT, "linewidth": 1.4, "linestyle": (0, (3, 1))}  # path of the tip on a motion
 EDGE: Any = {"color": "#8A8A8A", "linewidth": 0.8}  # of boxes to cover
 
+Panel = tuple[str, str, int, Sequence[int]]  # title and its colour, row of the arm in the evaluation, targets
+
 
 def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
     """Draw the chosen designs side by side, each with its postures at all targets."""
-    captions = [f"{title}\n{_caption(history, member, COLUMNS)}" for title, member in chosen]
     evaluation = history.evaluation([member.number for _, member in chosen])
-    handles, columns = _legend(evaluation, is_narrow=len(chosen) == 1)
-    foot = 0.24 + LINE_HEIGHT * math.ceil(len(handles) / columns)  # [inches]
-    height = foot + 3.36 + LINE_HEIGHT * max(caption.count("\n") + 1 for caption in captions)
-    figure = Figure(figsize=(3.8 * len(chosen), height))
-    # The layout engines do not know how far the labels of a 3D plot reach.
-    figure.subplots_adjust(left=0.01, right=0.97, bottom=foot / height, top=(foot + 3.52) / height, wspace=0.08)
-    extent = _extent(evaluation, [member for _, member in chosen])
-    for column, (_, member) in enumerate(chosen):
-        axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
-        _draw_panel(axes, member, evaluation, column, range(len(evaluation.targets)), extent)
-        axes.set_title(captions[column], y=1.0)
-    figure.legend(handles=handles, loc="lower center", ncols=columns)
-    return figure
+    captions = [f"{title}\n{_caption(history, member, COLUMNS)}" for title, member in chosen]
+    panels = [(caption, FRONT, row, range(len(evaluation.targets))) for row, caption in enumerate(captions)]
+    head = LINE_HEIGHT * max(caption.count("\n") + 1 for caption in captions) - 0.1
+    return _draw(evaluation, [member for _, member in chosen], panels, len(chosen), 3.6, head)
 
 
 def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
@@ -67,22 +60,39 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     evaluation = history.evaluation([member.number])
     n = len(evaluation.targets)
     shown = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MAX_PANELS))})
-    columns = min(4, max(2, math.ceil(math.sqrt(len(shown)))))
-    rows = -(-len(shown) // columns)
-    handles, legend_columns = _legend(evaluation, is_narrow=columns <= 2)
-    foot = 0.35 + LINE_HEIGHT * math.ceil(len(handles) / legend_columns)  # [inches]
-    height = 3.1 * rows + foot + 0.65
-    figure = Figure(figsize=(3.1 * columns, height))
-    figure.subplots_adjust(left=0.01, right=0.96, bottom=foot / height, top=1 - 0.75 / height, wspace=0.08, hspace=0.12)
-    extent = _extent(evaluation, [member])
-    for place, target in enumerate(shown):
-        axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
-        _draw_panel(axes, member, evaluation, 0, [target], extent)
+    panels: list[Panel] = []
+    for target in shown:
         missed = evaluation.unreached[0, target]
         verdict = f"missed by {_describe_miss(evaluation, target)}" if missed else "reached"
-        axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=MISSED if missed else FRONT)
+        panels.append((f"Target {target + 1}: {verdict}", MISSED if missed else FRONT, 0, [target]))
+    figure = _draw(evaluation, [member], panels, min(4, max(2, math.ceil(math.sqrt(len(shown))))), 3.1, 0.75)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
     figure.suptitle(f"{title}{part}\n{_caption(history, member)}", fontsize=10)
+    return figure
+
+
+def _draw(
+    evaluation: Evaluation,
+    members: Sequence[FrontMember],
+    panels: Sequence[Panel],
+    columns: int,
+    side: float,
+    head: float,
+) -> Figure:
+    """Draw panels in rows above a legend; side, head: of a panel, and the height above the first row [inch]."""
+    rows = -(-len(panels) // columns)
+    handles = _legend(evaluation)
+    legend_columns = NARROW if side * columns < WIDE else len(handles)
+    foot = 0.35 + LINE_HEIGHT * math.ceil(len(handles) / legend_columns)  # [inch]
+    height = side * rows + foot + head - 0.1
+    figure = Figure(figsize=(side * columns, height))
+    # The layout engines do not know how far the labels of a 3D plot reach.
+    figure.subplots_adjust(left=0.01, right=0.96, bottom=foot / height, top=1 - head / height, wspace=0.08, hspace=0.12)
+    extent = _extent(evaluation, members)
+    for place, (title, colour, row, targets) in enumerate(panels, start=1):
+        axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
+        _draw_panel(axes, members[row], evaluation, row, targets, extent)
+        axes.set_title(title, y=1.0, color=colour)
     figure.legend(handles=handles, loc="lower center", ncols=legend_columns)
     return figure
 
@@ -93,16 +103,17 @@ def _draw_panel(
     evaluation: Evaluation,
     row: int,
     targets: Sequence[int],
-    extent: tuple[np.ndarray, float],
+    extent: Extent,
 ) -> None:
     """Draw one arm at some of its targets; row: that of the arm in the evaluation."""
     draw_obstacles(axes, evaluation.obstacles, extent)
     for region in evaluation.workspace:
-        corners = np.array(list(product(*zip(region.low, region.high, strict=True))))
-        for one, other in combinations(corners, 2):
-            if (one != other).sum() == 1:
-                axes.plot(*np.array([one, other]).T, **EDGE)
-    _draw_motions(axes, evaluation, row, targets)
+        draw_edges(axes, region.low, region.high, EDGE)
+    for motion, points in _tip_paths(evaluation, row):
+        if evaluation.plan is not None and evaluation.plan.targets[motion.step] in targets:
+            if motion.by == "line":
+                axes.plot(*evaluation.plan.poses.position[[motion.start, motion.end]].T, **MOVE)
+            axes.plot(*points.T, **TIP)
     arm = member.arm
     column = column_solid(arm)
     if column is not None:
@@ -128,24 +139,12 @@ def _draw_panel(
     frame(axes, extent)
 
 
-def _draw_motions(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
-    """Draw the motions to these targets: lines of the cycle, and the path of the tip."""
-    if evaluation.plan is None:
-        return
-    arms, paths = evaluation.paths.of_arm(row)
-    for path in paths:
-        if evaluation.plan.targets[path.motion.step] in targets:
-            if path.motion.by == "line":
-                axes.plot(*evaluation.plan.poses.position[[path.motion.start, path.motion.end]].T, **MOVE)
-            axes.plot(*forward_kinematics(arms, path.q).tip[0].T, **TIP)
-
-
-def _drawn_motions(evaluation: Evaluation, row: int) -> list[np.ndarray]:
-    """Return the ends (P, 3) of all lines of the cycle, and the path (N, 3) of the tip on each motion of an arm [m]."""
+def _tip_paths(evaluation: Evaluation, row: int) -> list[tuple[Motion, Array]]:
+    """Return each motion of a cycle with the path (N, 3) of an arm's tip [m]."""
     if evaluation.plan is None:
         return []
     arms, paths = evaluation.paths.of_arm(row)
-    return [evaluation.plan.poses.position, *(forward_kinematics(arms, path.q).tip[0] for path in paths)]
+    return [(path.motion, forward_kinematics(arms, path.q).tip[0]) for path in paths]
 
 
 def _draw_orientation(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
@@ -166,7 +165,7 @@ def _describe_miss(evaluation: Evaluation, target: int) -> str:
     return f"{distance}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
 
 
-def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
+def frame(axes: Any, extent: Extent) -> None:
     """Set equal scales on all axes, so that angles and lengths are not distorted."""
     centre, half = extent
     for name, middle in zip("xyz", centre, strict=True):
@@ -181,31 +180,26 @@ def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
     axes.view_init(elev=22, azim=-58)
 
 
-def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.ndarray, float]:
-    """Return centre (3,) and half side of the cube that contains all targets, columns, postures and motions [m]."""
+def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> Extent:
+    """Return the cube that contains all targets, columns, postures and motions."""
     places = [
         joint_positions(member.arm, q[: len(member.arm.joints)])
         for row, member in enumerate(members)
         for q in evaluation.q[row]
     ]
-    motions = [points for row in range(len(members)) for points in _drawn_motions(evaluation, row)]
+    motions = [points for row in range(len(members)) for _, points in _tip_paths(evaluation, row)]
+    lines = [] if evaluation.plan is None else [evaluation.plan.poses.position]
     corners = [corner for region in evaluation.workspace for corner in region.corners]
-    columns = [member.arm.column for member in members]
     feet = [
-        np.array(member.arm.base) - (0.0, 0.0, column.length)
-        for member, column in zip(members, columns, strict=True)
-        if column is not None
+        np.array(member.arm.base) - (0.0, 0.0, member.arm.column.length)
+        for member in members
+        if member.arm.column is not None
     ]
-    points = np.vstack([evaluation.targets, *corners, *feet, *places, *motions])
-    low, high = points.min(axis=0), points.max(axis=0)
-    for obstacle in evaluation.obstacles:
-        if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor close below
-            low[2] = min(low[2], obstacle.z)
-    return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))
+    return extent_of([evaluation.targets, *corners, *feet, *places, *lines, *motions], evaluation.obstacles)
 
 
-def _legend(evaluation: Evaluation, is_narrow: bool) -> tuple[list[Line2D | Patch], int]:
-    """Return the entries of the legend below the panels, and its number of columns: one line unless it is narrow."""
+def _legend(evaluation: Evaluation) -> list[Line2D | Patch]:
+    """Return the entries of the legend below the panels."""
     handles: list[Line2D | Patch] = [
         legend_mark("base", "s", FRONT),
         *(legend_mark(JOINT_LABEL[axis], "o", JOINT[axis]) for axis in "xyz"),
@@ -221,7 +215,7 @@ def _legend(evaluation: Evaluation, is_narrow: bool) -> tuple[list[Line2D | Patc
         handles.append(Line2D([], [], **TIP, label="path of the tip"))
     if evaluation.workspace:
         handles.append(Line2D([], [], **EDGE, label="workspace"))
-    return handles, NARROW if is_narrow else len(handles)
+    return handles
 
 
 def _caption(history: History, member: FrontMember, columns: int = 200) -> str:

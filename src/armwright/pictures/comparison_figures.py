@@ -1,53 +1,41 @@
-"""Figures of a comparison: those of the paper, times to target and attainment surfaces."""
+"""Figures of a comparison, which are those of the paper."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import MaxNLocator
 
 from armwright.experiments.compare_runs import Comparison
-from armwright.experiments.plan import ExperimentPlan
-from armwright.experiments.run_record import shares_by_source
 from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.pictures.arm_figures import draw_arm, frame
-from armwright.pictures.attainment import draw_attainment
 from armwright.pictures.drawing import (
     draw_dominated,
     frame_plane,
     legend_below,
-    method_handle,
     one_panel,
     several_panels,
     write_drawn,
 )
 from armwright.pictures.figures import draw_samples
 from armwright.pictures.reason_figures import draw_reasons
-from armwright.pictures.style import BEST_KNOWN, FRONT, MISSED, TARGET, line, look
+from armwright.pictures.solids import extent_of
+from armwright.pictures.style import BEST_KNOWN, FRONT, MISSED, TARGET, line
 from armwright.proof.results import FIGURES
 
 MAX_SHOWN = 12  # most tasks in the figure of targets
 COLUMNS = 3  # panels side by side
 MARKERS = 5  # markers on a curve
 
-
-@dataclass(frozen=True)
-class Curves:
-    """A figure of hypervolume curves."""
-
-    name: str
-    title: str
-    methods: Sequence[str]
+Curves = Mapping[str, tuple[str, Sequence[str]]]  # title and methods of each figure
 
 
 def write_comparison_figures(
-    place: Path, comparison: Comparison, curves: Sequence[Curves] = (), samples: Sequence[str] = ()
+    place: Path, comparison: Comparison, curves: Curves | None = None, samples: Sequence[str] = ()
 ) -> list[Path]:
     """Draw a comparison into `place`/figures and return the PNG files.
 
@@ -57,34 +45,20 @@ def write_comparison_figures(
         curves: Figures of hypervolume curves; by default one with all methods.
         samples: Methods to show in detail: the first one with runs is drawn; by default the last of all methods.
     """
-    return write_drawn(place / FIGURES, _drawn(comparison, curves, samples))
+    return write_drawn(place / FIGURES, _drawn(comparison, curves or {}, samples))
 
 
-def write_experiment_figures(out: Path, plan: ExperimentPlan, found: Comparison) -> list[Path]:
-    """Draw the standard figures and those named in the plan; return the PNG files."""
-    labels = {key: method.label for key, method in plan.methods.items()}
-    curves = [Curves(key, f.title, [labels[method] for method in f.methods]) for key, f in plan.figures.items()]
-    return write_comparison_figures(out, found, curves, [labels[key] for key in plan.samples])
-
-
-def _drawn(comparison: Comparison, curves: Sequence[Curves], samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
+def _drawn(comparison: Comparison, curves: Curves, samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
     yield "targets", draw_targets(comparison)
-    plane = all(len(run.config.objectives) > 1 for run in comparison.runs)  # figures of the first two objectives
     with_curves = [
         method for method in comparison.methods if any(len(comparison.curves(method, t)) for t in comparison.tasks)
     ]
     if with_curves:
-        if plane:
+        if all(len(run.config.objectives) > 1 for run in comparison.runs):
             yield "area", draw_area(comparison)
-        for figure in curves or (Curves("methods", "", with_curves),):
-            methods = [method for method in figure.methods if method in with_curves]
-            if methods:
-                yield f"hypervolume-{figure.name}", draw_curves(comparison, methods, figure.title)
-        yield "time-to", draw_times(comparison, with_curves)
-    for task in comparison.tasks[: MAX_SHOWN if plane else 0]:
-        yield f"attainment-{task}", draw_attainment(comparison, task)
-    if any(run.proposer for run in comparison.runs):
-        yield "attribution", draw_attribution_shares(comparison)
+        for name, (title, methods) in (curves or {"methods": ("", with_curves)}).items():
+            if drawn := [method for method in methods if method in with_curves]:
+                yield f"hypervolume-{name}", draw_curves(comparison, drawn, title)
     yield from _details(comparison, samples)
 
 
@@ -118,12 +92,10 @@ def draw_targets(comparison: Comparison) -> Figure:
         points = comparison.first_run(task).config.task.target_positions
         axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
         axes.scatter(*points.T, marker="*", s=90, color=TARGET, edgecolors=FRONT, linewidths=0.5, depthshade=False)
-        low, high = points.min(axis=0), points.max(axis=0)
-        half = float(max(0.1, 0.55 * (high - low).max()))
-        floor = (low + high)[2] / 2 - half
+        centre, half = extent_of([points])
         for x, y, z in points.tolist():
-            axes.plot([x, x], [y, y], [floor, z], color="#BBBBBB", linewidth=0.6)
-        frame(axes, ((low + high) / 2, half))
+            axes.plot([x, x], [y, y], [centre[2] - half, z], color="#BBBBBB", linewidth=0.6)
+        frame(axes, (centre, half))
         axes.set_title(f"{task}: {len(points)} targets", y=1.0)
     if len(shown) < len(comparison.tasks):
         figure.suptitle(f"{len(shown)} of {len(comparison.tasks)} tasks", fontsize=10)
@@ -181,7 +153,8 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
         axes.set_xlim(left=0)
     for axes in panels[:: _columns(comparison.tasks)]:
         axes.set_ylabel("Hypervolume")
-    handles = [method_handle(comparison, method) for method in methods]
+    styles = {method: line(comparison.methods.index(method)) for method in methods}
+    handles = [Line2D([], [], **s.curve, marker=s.marker, label=comparison.label(m)) for m, s in styles.items()]
     if any(comparison.best_known(task) is not None for task in comparison.tasks):
         handles.append(Line2D([], [], **BEST_KNOWN, label="best known"))
     legend_below(figure, handles)
@@ -189,51 +162,6 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
     runs = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else f"{seeds.pop()}"
     caption = f"mean and standard deviation of {runs} runs"
     figure.suptitle(f"{title}: {caption}" if title else caption.capitalize(), fontsize=10)
-    return figure
-
-
-def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
-    """Draw the share of runs that reached a level of the best known hypervolume, over the counted trials."""
-    levels = sorted({time.level for time in comparison.times})
-    figure = several_panels(10.4, 3.2)
-    panels: Any = np.atleast_1d(figure.subplots(1, len(levels), sharey=True))
-    for axes, level in zip(panels, levels, strict=True):
-        for method in methods:
-            reached = sorted(n for task in comparison.tasks for n in comparison.trials_to(method, task, level))
-            longest: int = max(comparison.curves(method, task).shape[1] for task in comparison.tasks)
-            trials = np.arange(longest + 1)
-            share = np.searchsorted(reached, trials, side="right") / len(reached)
-            axes.step(trials, share, where="post", **line(comparison.methods.index(method)).curve)
-        axes.set(title=f"{level:.0%} of the best known", xlabel="Iteration", ylim=(-0.02, 1.02))
-        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-    panels[0].set_ylabel("Runs that reached it")
-    legend_below(figure, [method_handle(comparison, method, with_marker=False) for method in methods])
-    return figure
-
-
-def draw_attribution_shares(comparison: Comparison) -> Figure:
-    """Draw each source's share of the final hypervolume per method, averaged over the runs."""
-    pairs = [
-        (task, method)
-        for task in comparison.tasks
-        for method in comparison.methods
-        if any(run.proposer for run in comparison.runs_of(method, task))
-    ]
-    figure, axes = one_panel(6.4, 1.3 + 0.32 * len(pairs))
-    sources: dict[str, None] = {}
-    for row, (task, method) in enumerate(pairs):
-        left = 0.0
-        for share in shares_by_source(comparison.runs_of(method, task)):
-            axes.barh(row, share.gained, left=left, height=0.7, linewidth=0, **look(share.source).fill)
-            left += share.gained
-            sources[share.source] = None
-    axes.set_yticks(range(len(pairs)), [f"{task}, {comparison.label(method)}" for task, method in pairs])
-    axes.set_ylim(len(pairs) - 0.4, -0.6)
-    axes.set_xlim(0, 1)
-    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
-    axes.set_xlabel("Share of the final hypervolume by source")
-    axes.grid(axis="y", visible=False)
-    legend_below(figure, [Patch(label=look(source).label, **look(source).fill) for source in sources])
     return figure
 
 

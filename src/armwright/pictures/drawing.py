@@ -12,10 +12,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 
 from armwright.arrays import Array
-from armwright.experiments.compare_runs import Comparison
 from armwright.files import naming_write_errors, new_part, replace_file, replace_folder
 from armwright.pareto import front_mask
-from armwright.pictures.style import FRONT, RC, line
+from armwright.pictures.style import FRONT, RC
 from armwright.problem.objectives import TORQUE
 from armwright.problem.problem import Problem
 
@@ -110,12 +109,6 @@ def front_steps(front: Array, reference: Sequence[float]) -> tuple[Array, Array]
 def legend_mark(label: str, marker: str, colour: str, **style: Any) -> Line2D:
     """Return the legend entry of a marker."""
     return Line2D([], [], linestyle="", marker=marker, color=colour, label=label, **style)
-
-
-def method_handle(comparison: Comparison, method: str, with_marker: bool = True) -> Line2D:
-    """Return the legend entry of a method's line."""
-    style = line(comparison.methods.index(method))
-    return Line2D([], [], **style.curve, marker=style.marker if with_marker else None, label=comparison.label(method))
 
 
 def legend_below(figure: Figure, handles: Sequence[Any]) -> None:

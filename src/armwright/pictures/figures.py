@@ -18,19 +18,21 @@ from armwright.pictures.arm_figures import draw_arms
 from armwright.pictures.drawing import (
     draw_dominated,
     frame_plane,
+    legend_below,
     legend_mark,
     one_panel,
     plane_limits,
     several_panels,
     write_drawn,
 )
-from armwright.pictures.point_labels import PointLabel, place_labels, place_legend
+from armwright.pictures.point_labels import PointLabel, place_labels
 from armwright.pictures.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
 from armwright.proof.front_gap import front_gap
 from armwright.proof.results import FIGURES, read_summary
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
+from armwright.text import rounded
 
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials; 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # drawn part of the plane, as a multiple of the reference point
@@ -151,13 +153,13 @@ def draw_samples(history: History) -> Figure:
         axes.label_outer()
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
-    figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_legend(history)))
+    legend_below(figure, _legend(history))
     return figure
 
 
 def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure:
     """Draw the final front by source, with the chosen designs labelled and existing arms for comparison."""
-    figure, axes = one_panel(5.2, 4.2, MARK_PAD if existing else None)
+    figure, axes = one_panel(5.2, 4.5, MARK_PAD if existing else None)
     reference, limits = _reference(history), _limits(history)
     _scatter(axes, history, reference, limits, alpha=0.25)
     for member in history.front:
@@ -179,7 +181,7 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
     marks = [(reference[0], reference[1]), *((m.values[0], m.values[1]) for m in history.front)]
     marks = [mark for mark in marks if np.all(np.array(mark) <= limits[:, 1])]
     handles = [*_legend(history), *([_mark(EXISTING)] if arms else [])]
-    place_legend(axes, handles, [*marks, *(label.at for label in labels + arms)])
+    legend_below(figure, handles)
     place_labels(axes, labels + arms, marks)
     return figure
 
@@ -196,7 +198,7 @@ def _draw_existing(axes: Any, edge: Array, existing: Sequence[ComparedArm]) -> l
             continue
         place = np.array(arm.values[:2], dtype=float)
         x, y = np.minimum(place, edge).tolist()
-        beyond = "" if np.all(place <= edge) else f"\nbeyond, at {_short(place[0])}, {_short(place[1])}"
+        beyond = "" if np.all(place <= edge) else f"\nbeyond, at {rounded(place[0])}, {rounded(place[1])}"
         axes.scatter(x, y, **EXISTING.points | {"edgecolors": FRONT}, zorder=6, clip_on=False)
         label = PointLabel(f"{arm.name}{beyond}", (x, y), EXISTING.colour)
         near = [i for i, one in enumerate(labels) if np.all(np.abs(np.subtract(one.at, label.at)) < OVERLAP * edge)]
@@ -205,10 +207,6 @@ def _draw_existing(axes: Any, edge: Array, existing: Sequence[ComparedArm]) -> l
         else:
             labels.append(label)
     return labels
-
-
-def _short(value: float) -> str:
-    return f"{value:,.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def _limits(history: History) -> Array:

@@ -1,4 +1,4 @@
-"""Slices of a reach map through the base and at one height, with the arm and what is around it."""
+"""Slices of a reach map through the base and at one height, with what is around the arm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,45 +9,49 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.files import naming_write_errors
-from armwright.kinematics.arms.forward import link_lines
 from armwright.kinematics.reach.reach_map import PoseCoverage, ReachMap
 from armwright.pictures.drawing import legend_below, legend_mark, save_figure, several_panels
-from armwright.pictures.style import FRONT, JOINT, LINK, OBSTACLE, RC, TARGET
+from armwright.pictures.style import FRONT, OBSTACLE, RC, TARGET
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.task import Task
 
 COLOURS = "viridis"
 POSITION_ONLY = "#E3E3E8"  # points reached in none of the directions
 FINE = 300  # cells along the longer side, for obstacles
 PANEL = 4.2  # [inch]
-ASIDE = 0.6  # of half the plane's width: where the arm is drawn, if there are equal points
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """An arm and what is around it, for pictures of its reach.
-
-    Attributes:
-        title: The title of the figure.
-        arm: The arm.
-        conditions: What usable poses satisfy, in words.
-        obstacles: The obstacles that are drawn.
-        targets: (T, 3) targets that are drawn [m]; the horizontal slice is at their mean height.
-    """
+class MappedArm:
+    """An arm whose reach is mapped, and the task around it."""
 
     title: str
     arm: Arm | UrdfArm
-    conditions: str = ""
-    obstacles: Sequence[Obstacle] = ()
-    targets: Array | None = None
+    task: Task | None = None  # whose obstacles and targets are drawn
+    conditions: str = ""  # that usable poses satisfy, in words
+
+    @property
+    def body(self) -> Arm:
+        """The arm itself."""
+        return self.arm.arm if isinstance(self.arm, UrdfArm) else self.arm
+
+    @property
+    def targets(self) -> Array | None:
+        """(T, 3) targets [m]; the horizontal slice is at their mean height."""
+        return None if self.task is None else self.task.target_positions
+
+    @property
+    def obstacles(self) -> Sequence[Obstacle]:
+        """The obstacles of the task."""
+        return () if self.task is None else self.task.obstacles
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ class _Slice:
         return float(found.coordinates(self.across)[self.index])
 
 
-def write_reach_figure(found: ReachMap, around: Surroundings, share: float, file: Path) -> None:
+def write_reach_figure(found: ReachMap, around: MappedArm, share: float, file: Path) -> None:
     """Write the slices of a reach map.
 
     Args:
@@ -82,14 +86,14 @@ def write_reach_figure(found: ReachMap, around: Surroundings, share: float, file
         save_figure(_draw(found, around, share), file)
 
 
-def _draw(found: ReachMap, around: Surroundings, share: float) -> Figure:
+def _draw(found: ReachMap, around: MappedArm, share: float) -> Figure:
     """Draw two slices, twice if there are conditions."""
     rows = [("within joint limits", found.bare)]
     if found.usable is not found.bare:
         rows.append((around.conditions, found.usable))
     figure = several_panels(2 * PANEL + 0.8, PANEL * len(rows) + 0.9)
     axes: Any = figure.subplots(len(rows), 2, squeeze=False)
-    slices = (_vertical(found, _body(around.arm)), _horizontal(found, around))
+    slices = (_vertical(found, around.body), _horizontal(found, around))
     image: Any = None
     for row, (name, coverage) in enumerate(rows):
         for column, plane in enumerate(slices):
@@ -101,7 +105,7 @@ def _draw(found: ReachMap, around: Surroundings, share: float) -> Figure:
     lines = [f"{around.title}", *(f"{name}: {describe_volumes(coverage, share)}" for name, coverage in rows)]
     figure.suptitle("\n".join(lines), fontsize=10)
     handles: list[Any] = [Patch(facecolor=POSITION_ONLY, label="reached, in none of the directions")]
-    handles.append(Line2D([], [], color=LINK, linewidth=2.4, label="arm at a reached pose"))
+    handles.append(legend_mark("base", "s", FRONT))
     if around.targets is not None:
         handles.append(legend_mark("target near the plane", "*", TARGET, markersize=9, markeredgecolor=FRONT))
     if around.obstacles:
@@ -123,7 +127,7 @@ def _vertical(found: ReachMap, arm: Arm) -> _Slice:
     return max(planes, key=lambda plane: float(plane.of(found, found.usable.covered.astype(float)).sum()))
 
 
-def _horizontal(found: ReachMap, around: Surroundings) -> _Slice:
+def _horizontal(found: ReachMap, around: MappedArm) -> _Slice:
     """Return the horizontal plane at the mean height of the targets, else where the most directions are reached."""
     if around.targets is not None:
         return _Slice(0, 1, 2, _nearest(found, 2, float(around.targets[:, 2].mean())))
@@ -135,7 +139,7 @@ def _nearest(found: ReachMap, axis: int, value: float) -> int:
     return int(np.abs(found.coordinates(axis) - value).argmin())
 
 
-def _draw_slice(axes: Any, found: ReachMap, coverage: PoseCoverage, plane: _Slice, around: Surroundings) -> Any:
+def _draw_slice(axes: Any, found: ReachMap, coverage: PoseCoverage, plane: _Slice, around: MappedArm) -> Any:
     """Draw one plane of the map and return its image."""
     shares, covered = plane.of(found, coverage.share), plane.of(found, coverage.covered)
     half = found.spacing / 2
@@ -149,7 +153,8 @@ def _draw_slice(axes: Any, found: ReachMap, coverage: PoseCoverage, plane: _Slic
     )
     image = axes.imshow(np.where(shares > 0.0, 100.0 * shares, np.nan), cmap=COLOURS, vmin=0.0, vmax=100.0, **options)
     _draw_obstacles(axes, found, plane, around.obstacles, extent)
-    _draw_arm(axes, found, plane, coverage, around.arm)
+    base = around.body.base
+    axes.plot(base[plane.right], base[plane.up], marker="s", markersize=6, color=FRONT)
     if around.targets is not None:
         beside = np.abs(around.targets[:, plane.across] - plane.place(found)) <= found.spacing
         axes.plot(
@@ -176,35 +181,3 @@ def _draw_obstacles(
             drawn = axes.contourf(right, up, inside, levels=[-np.inf, 0.0], colors="none", hatches=["////"])
             drawn.set_edgecolor(OBSTACLE)
             axes.contour(right, up, inside, levels=[0.0], colors=OBSTACLE, linewidths=0.8)
-
-
-def _body(arm: Arm | UrdfArm) -> Arm:
-    return arm.arm if isinstance(arm, UrdfArm) else arm
-
-
-def _draw_arm(axes: Any, found: ReachMap, plane: _Slice, coverage: PoseCoverage, given: Arm | UrdfArm) -> None:
-    """Draw the arm at the pose of the plane with the most directions around it, in its first direction reached."""
-    pose = _shown_pose(found, plane, coverage)
-    if pose is None:
-        return
-    arm, q = _body(given), coverage.q[pose]
-    if isinstance(given, UrdfArm):
-        q = given.values_in_arm(q)
-    for line in link_lines(arm, q):
-        axes.plot(*line[:, [plane.right, plane.up]].T, color="white", linewidth=4.2, solid_capstyle="round")
-        axes.plot(*line[:, [plane.right, plane.up]].T, color=LINK, linewidth=2.4, solid_capstyle="round")
-    for joint, line in zip(arm.joints, link_lines(arm, q), strict=False):
-        axes.plot(*line[0, [plane.right, plane.up]], marker="o", markersize=4, color=JOINT[joint.axis])
-    axes.plot(arm.base[plane.right], arm.base[plane.up], marker="s", markersize=6, color=FRONT)
-
-
-def _shown_pose(found: ReachMap, plane: _Slice, coverage: PoseCoverage) -> tuple[int, int] | None:
-    """Return point and direction of the pose in which the arm is drawn; None if nothing is reached in the plane."""
-    in_plane = plane.of(found, np.arange(len(found.points))).ravel()
-    places = found.points[in_plane]
-    right, half = np.eye(3)[plane.right], np.ptp(places, axis=0) / 2
-    aside = np.linalg.norm(places - (places.mean(axis=0) + ASIDE * half * right), axis=1)
-    best = int(in_plane[np.lexsort([aside, -coverage.share[in_plane]])[0]])
-    if not coverage.reached[best].any():
-        return None
-    return best, int(coverage.reached[best].argmax())

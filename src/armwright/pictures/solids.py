@@ -1,6 +1,7 @@
 """Obstacles, motor bodies and columns in figures: translucent faces, clipped to the drawing."""
 
 from collections.abc import Iterable, Sequence
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -8,21 +9,42 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from armwright.arrays import Array
 from armwright.pictures.style import OBSTACLE
-from armwright.tasks.obstacles import Obstacle, Solid
+from armwright.tasks.obstacles import Ground, Obstacle, Solid
 
 EDGE = 0.5  # [pt]
 OPACITY = 0.18
 AROUND, UPWARDS = 32, 12  # faces of round shapes
 
 
-def draw_obstacles(axes: Any, obstacles: Sequence[Obstacle], extent: tuple[Array, float]) -> None:
-    """Draw the parts of obstacles within a cube, given by its centre and half its side [m]."""
+Extent = tuple[Array, float]  # centre (3,) and half the side of the cube that is drawn [m]
+
+
+def extent_of(points: Sequence[Any], obstacles: Sequence[Obstacle] = ()) -> Extent:
+    """Return the cube around points (3,) or (N, 3), with a floor that is close below them."""
+    places = np.vstack(points)
+    low, high = places.min(axis=0), places.max(axis=0)
+    for obstacle in obstacles:
+        if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:
+            low[2] = min(low[2], obstacle.z)
+    return (low + high) / 2, float(max(0.1, 0.55 * (high - low).max()))
+
+
+def draw_edges(axes: Any, low: Sequence[float] | Array, high: Sequence[float] | Array, style: Any) -> None:
+    """Draw the edges of a box, which may be flat, a line or a point."""
+    corners = np.unique(np.array(list(product(*zip(low, high, strict=True)))), axis=0)
+    for one, other in combinations(corners, 2):
+        if (one != other).sum() == 1:
+            axes.plot(*np.array([one, other]).T, **style)
+
+
+def draw_obstacles(axes: Any, obstacles: Sequence[Obstacle], extent: Extent) -> None:
+    """Draw the parts of obstacles within a cube."""
     for obstacle in obstacles:
         draw_solid(axes, obstacle.solid, extent, OBSTACLE)
 
 
-def draw_solid(axes: Any, solid: Solid, extent: tuple[Array, float], colour: str) -> None:
-    """Draw the part of a solid within a cube, given by its centre and half its side [m]."""
+def draw_solid(axes: Any, solid: Solid, extent: Extent, colour: str) -> None:
+    """Draw the part of a solid within a cube."""
     middle, half = extent
     faces = [(clipped(face, middle, half), line) for face, line in _faces(solid, middle, half)]
     shown = [(face, line) for face, line in faces if len(face) > 2]

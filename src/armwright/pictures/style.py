@@ -12,7 +12,6 @@ class Look(NamedTuple):
     colour: str
     marker: str
     size: float  # [pt²]
-    hatch: str = ""  # hatch of filled areas
 
     @property
     def points(self) -> dict[str, Any]:
@@ -20,21 +19,16 @@ class Look(NamedTuple):
         edge = {"linewidths": 1.0} if self.marker == "x" else {"edgecolors": "white", "linewidths": 0.4}
         return {"s": self.size, "marker": self.marker, "color": self.colour, **edge}
 
-    @property
-    def fill(self) -> dict[str, Any]:
-        """Colour arguments of a filled area."""
-        return {"facecolor": self.colour, "hatch": self.hatch, "edgecolor": "white"}
-
 
 _LOOKS: dict[str, tuple[Any, ...]] = {
     RANDOM: ("#9A9A9A", "x", 22),
     INITIAL_DESIGN: ("#111111", "P", 36),
     BBO: ("#0072B2", "o", 20),
     FRONT_SEARCH: ("#0072B2", "o", 14),
-    "rules": ("#D55E00", "^", 44, "////"),
-    "llm": ("#CC79A7", "^", 44, "\\\\\\\\"),
-    "scripted": ("#CC79A7", "v", 44, "\\\\\\\\"),
-    "manual": ("#E69F00", "s", 36, "xxxx"),
+    "rules": ("#D55E00", "^", 44),
+    "llm": ("#CC79A7", "^", 44),
+    "scripted": ("#CC79A7", "v", 44),
+    "manual": ("#E69F00", "s", 36),
 }
 EXISTING = Look("existing arm", "#56B4E9", "P", 70)
 FRONT = "#111111"
@@ -70,7 +64,7 @@ RC: Any = {  # never modified
 
 def look(source: str) -> Look:
     """Return the style of a source; custom proposers are drawn like the built-in rules."""
-    return Look(source_label(source), *_LOOKS.get(source, ("#D55E00", "^", 44, "////")))
+    return Look(source_label(source), *_LOOKS.get(source, ("#D55E00", "^", 44)))
 
 
 class Line(NamedTuple):

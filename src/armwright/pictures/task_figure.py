@@ -1,25 +1,21 @@
 """A picture of a task before any search: targets, tool directions, bases, obstacles and lines of the cycle."""
 
-from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
 import matplotlib
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from armwright.arrays import Array
 from armwright.exceptions import TaskError
 from armwright.files import naming_write_errors
 from armwright.pictures.arm_figures import EDGE, MOVE, frame
 from armwright.pictures.drawing import legend_mark, save_figure
-from armwright.pictures.solids import draw_obstacles
+from armwright.pictures.solids import draw_edges, draw_obstacles, extent_of
 from armwright.pictures.style import FRONT, OBSTACLE, RC, TARGET
 from armwright.problem.checks.reach import base_box
 from armwright.problem.problem import Problem
-from armwright.tasks.obstacles import Ground
 
 ARROW = 0.12  # length of a tool direction, as a share of the picture's side
 MAX_NAMED = 40  # targets
@@ -50,15 +46,17 @@ def draw_task(problem: Problem) -> Figure:
     figure = Figure(figsize=(6.4, 6.0))
     figure.subplots_adjust(left=0.02, right=0.95, bottom=0.12, top=0.95)
     axes: Any = figure.add_subplot(projection="3d")
-    extent = _extent(problem)
+    low, high = base_box(problem.space)
+    plan = problem.scenes[0].plan
+    corners = [corner for region in task.workspace for corner in region.corners]
+    poses = [] if plan is None else [plan.poses.position]
+    extent = extent_of([task.target_positions, low, high, *corners, *poses], task.obstacles)
     draw_obstacles(axes, task.obstacles, extent)
     for region in task.workspace:
-        _draw_box(axes, np.array(region.low), np.array(region.high), EDGE)
-    low, high = base_box(problem.space)
-    _draw_box(axes, low, high, BASES)
+        draw_edges(axes, region.low, region.high, EDGE)
+    draw_edges(axes, low, high, BASES)
     axes.plot(*((low + high) / 2)[:, None], marker="s", markersize=6, color=FRONT)
-    plan = problem.scenes[0].plan
-    for motion in () if plan is None else plan.motions:
+    for motion in plan.motions if plan else ():
         assert plan is not None
         axes.plot(*plan.poses.position[[motion.start, motion.end]].T, **(MOVE if motion.by == "line" else PATH))
     arrays = task.target_arrays
@@ -72,27 +70,6 @@ def draw_task(problem: Problem) -> Figure:
     axes.set_title(f"{task.name} in space {problem.space.name}")
     figure.legend(handles=_handles(problem), loc="lower center", ncols=3)
     return figure
-
-
-def _draw_box(axes: Any, low: Array, high: Array, style: Any) -> None:
-    """Draw the edges of a box, which may be flat, a line or a point."""
-    corners = np.unique(np.array(list(product(*zip(low, high, strict=True)))), axis=0)
-    for one, other in combinations(corners, 2):
-        if (one != other).sum() == 1:
-            axes.plot(*np.array([one, other]).T, **style)
-
-
-def _extent(problem: Problem) -> tuple[Array, float]:
-    """Return the centre (3,) and half the side of the cube that contains targets, bases and workspaces [m]."""
-    task, plan = problem.task, problem.scenes[0].plan
-    corners = [corner for region in task.workspace for corner in region.corners]
-    poses = [] if plan is None else [plan.poses.position]
-    points = np.vstack([task.target_positions, *base_box(problem.space), *corners, *poses])
-    low, high = points.min(axis=0), points.max(axis=0)
-    for obstacle in task.obstacles:
-        if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor close below
-            low[2] = min(low[2], obstacle.z)
-    return (low + high) / 2, float(max(0.1, 0.55 * (high - low).max()))
 
 
 def _handles(problem: Problem) -> list[Line2D | Patch]:

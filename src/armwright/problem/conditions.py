@@ -56,22 +56,6 @@ def read_condition(text: str) -> Condition:
     return Condition(name[1], found[1], float(found[2]), (found[3] or "").strip())
 
 
-def read_bound(option: str, name: str, text: str) -> Condition:
-    """Parse the value of an option that bounds a quantity, such as `<=60`, or `12` for equality.
-
-    Args:
-        option: The option, for messages.
-        name: The quantity.
-        text: Its value.
-    """
-    found = _BOUND.fullmatch(text)
-    if found is None:
-        raise SettingsError(
-            f'{option} "{text}": expected one of <= < == > >= and a number, such as "<=60", or a number'
-        )
-    return Condition(name, found[1] or "==", float(found[2]), (found[3] or "").strip())
-
-
 def read_weights(text: str) -> dict[str, float]:
     """Parse weights such as `position_error=2,torque=1`."""
     weights: dict[str, float] = {}

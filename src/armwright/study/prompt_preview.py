@@ -83,5 +83,5 @@ def _history_at(run: Path, config: RunConfig, history: History, requests: Mappin
     known = requests or {n: n for n in range(len(history) + 1) if config.study.is_first_trial(n)}
     if number not in known:
         numbers = ", ".join(map(str, sorted(known)))
-        raise SettingsError(f"--number {number}: the proposals of {run} were requested for trials {numbers}")
+        raise SettingsError(f"trial {number}: the proposals of {run} were requested for trials {numbers}")
     return history.before(known[number])

@@ -1,9 +1,13 @@
 // Draws a task and its design space beside their files, and starts searches.
 
+import { drawLoad, drawObstacles, openObstacles } from "./editor-bodies.js";
+import { drawCycle, openCycle } from "./editor-cycle.js";
 import { change, complain, idle, isSaved, openDocument, opened, save, show, undo } from "./editor-document.js";
-import { drawForms, openForms } from "./editor-forms.js";
 import { openJob } from "./editor-job.js";
 import { drawScene, openScene, targetPlaces } from "./editor-scene.js";
+import { drawMotors, drawSpace, openMotors } from "./editor-space.js";
+import { drawTargets, openTargets } from "./editor-targets.js";
+import { drawWants, openWants } from "./editor-wants.js";
 import { $, element, plural } from "./format.js";
 import { openKey, request } from "./key.js";
 
@@ -23,6 +27,12 @@ function draw() {
   drawCheck(assessed);
   drawForms();
   drawScene();
+}
+
+// Forms whose file cannot be read stay as they are.
+function drawForms() {
+  const forms = { task: [drawTargets, drawCycle, drawLoad, drawObstacles, drawWants], space: [drawSpace, drawMotors] };
+  for (const [file, drawing] of Object.entries(forms)) if (opened.assessed[file] !== null) for (const form of drawing) form();
 }
 
 function drawCheck({ errors, findings, meaning }) {
@@ -56,7 +66,8 @@ async function start() {
     const reply = await (await request("opened")).json();
     document.title = `${reply.files.task}: armwright`;
     $("title").textContent = reply.files.task;
-    openForms(reply.choices);
+    for (const open of [openTargets, openCycle, openObstacles, openWants, openMotors]) open(reply.choices);
+    $("unit").addEventListener("change", drawForms);
     openScene();
     openJob();
     listenToKeys();
