@@ -20,21 +20,13 @@ _EXPORT = re.compile(r"^export ((?:async )?function|class|const|let) ([\w$]+)", 
 
 @dataclass(frozen=True)
 class PageSource:
-    """The files of a page.
+    """The files of a page."""
 
-    Attributes:
-        template: The HTML, with placeholders such as {{ title }}.
-        main: The JavaScript module that imports the others.
-        styles: The style sheets, in order.
-        libraries: The scripts in vendor/ that run before the modules.
-        folders: Where files are looked for, in this order.
-    """
-
-    template: str
-    main: str
-    styles: tuple[str, ...]
-    libraries: tuple[str, ...]
-    folders: tuple[Traversable, ...] = (SHARED,)
+    template: str  # the HTML, with placeholders such as {{ title }}
+    main: str  # the JavaScript module that imports the others
+    styles: tuple[str, ...]  # the style sheets, in order
+    libraries: tuple[str, ...]  # the scripts in vendor/ that run before the modules
+    folders: tuple[Traversable, ...] = (SHARED,)  # where files are looked for, in this order
 
     def read(self, name: str) -> str:
         """Return the text of a file."""

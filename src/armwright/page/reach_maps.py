@@ -36,17 +36,11 @@ NOT_REACHED, IN_NO_DIRECTION, IN_ALL = 0, 1, 255  # levels of points; between th
 
 @dataclass(frozen=True)
 class PageReachMap:
-    """A reach map for the page.
+    """A reach map for the page."""
 
-    Attributes:
-        arm: The fingerprint of the arm; the numbers of designs may have changed since.
-        head: Its grid and conditions.
-        levels: (2, N) levels: within the joint limits, and also under the conditions.
-    """
-
-    arm: str
-    head: dict[str, Any]
-    levels: NDArray[np.uint8]
+    arm: str  # the fingerprint of the arm; the numbers of designs may have changed since
+    head: dict[str, Any]  # its grid and conditions
+    levels: NDArray[np.uint8]  # (2, N) levels: within the joint limits, and also under the conditions
 
 
 class ReachMapFiles:

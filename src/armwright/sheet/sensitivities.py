@@ -30,21 +30,13 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Variation:
-    """A change of a design.
+    """A change of a design."""
 
-    Attributes:
-        part: What is changed.
-        change: How.
-        params: The changed parameters.
-        impossible: Why it cannot be changed so; empty if it can.
-        is_priced: Whether the price of what is changed is known.
-    """
-
-    part: str
-    change: str
-    params: Mapping[str, float | str] = field(default_factory=dict[str, float | str])
-    impossible: str = ""
-    is_priced: bool = True
+    part: str  # what is changed
+    change: str  # how
+    params: Mapping[str, float | str] = field(default_factory=dict[str, float | str])  # the changed parameters
+    impossible: str = ""  # why it cannot be changed so; empty if it can
+    is_priced: bool = True  # whether the price of what is changed is known
 
 
 def _price(evaluation: Evaluation) -> Array:

@@ -15,21 +15,13 @@ SHOWN_UNITS = {"m": (1e3, " mm"), "rad": (math.degrees(1.0), "°")}  # of object
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a data sheet.
+    """A table of a data sheet."""
 
-    Attributes:
-        title: Its title.
-        header: Names of the columns, with units; empty for pairs of a name and a value.
-        rows: The cells.
-        left: Indices of the columns that are aligned at the left; the others have numbers.
-        note: A line below; why there are no rows, if there are none.
-    """
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    left: tuple[int, ...] = (0,)
-    note: str = ""
+    title: str  # its title
+    header: tuple[str, ...]  # names of the columns, with units; empty for pairs of a name and a value
+    rows: tuple[tuple[str, ...], ...]  # the cells
+    left: tuple[int, ...] = (0,)  # indices of the columns that are aligned at the left; the others have numbers
+    note: str = ""  # A line below; why there are no rows, if there are none
 
 
 def number(value: float | None, factor: float = 1.0, signed: bool = False, missing: str = NOT_STATED) -> str:

@@ -60,17 +60,11 @@ def read_actuators(text: str, joints: Sequence[str]) -> dict[str, ActuatorRecord
 
 @dataclass(frozen=True)
 class Job:
-    """The task of an existing arm.
+    """The task of an existing arm."""
 
-    Attributes:
-        problem: The task, its objectives and constraints.
-        mounting: Where the base link stands.
-        place: The same in words, and why there.
-    """
-
-    problem: Problem
-    mounting: Mounting
-    place: str
+    problem: Problem  # the task, its objectives and constraints
+    mounting: Mounting  # where the base link stands
+    place: str  # the same in words, and why there
 
 
 def urdf_sheet(

@@ -31,18 +31,12 @@ BLOCKED = 1e3  # cost in seconds or radians of a chain that is off by its tolera
 
 @dataclass(frozen=True)
 class ChosenPostures:
-    """What N arms take at the first pose of each of B blocks.
+    """What N arms take at the first pose of each of B blocks."""
 
-    Attributes:
-        entry: (N, B, D) the postures.
-        step_ratios: (N, 2) the largest step of coarse samples relative to the allowed one, along lines and along joint
-            motions.
-        hopeless: (N,) True if the path is so far off that more samples cannot mend it.
-    """
-
-    entry: Array
+    entry: Array  # (N, B, D) the postures
     step_ratios: Array
-    hopeless: NDArray[np.bool_]
+    """(N, 2) the largest step of coarse samples relative to the allowed one, along lines and along joint motions."""
+    hopeless: NDArray[np.bool_]  # (N,) True if the path is so far off that more samples cannot mend it
 
 
 def choose_postures(

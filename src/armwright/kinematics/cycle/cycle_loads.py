@@ -30,20 +30,13 @@ class CycleLoads:
     """N arms along the M motions of a cycle, at F instants of each, equally spaced in time.
 
     Of sharp paths (`CycleGroup`), the largest values around each instant are kept.
-
-    Attributes:
-        durations: (N, M) [s].
-        dwells: (M,) time at rest after each motion [s].
-        torques: (N, M, F, D) torques of the drives at the joints [N m], or forces [N].
-        speeds: (N, M, F, D) joint speeds [rad/s] or [m/s].
-        holding: (N, M, D) torques at rest after each motion [N m], or forces [N].
     """
 
-    durations: Array
-    dwells: Array
-    torques: Array
-    speeds: Array
-    holding: Array
+    durations: Array  # (N, M) [s]
+    dwells: Array  # (M,) time at rest after each motion [s]
+    torques: Array  # (N, M, F, D) torques of the drives at the joints [N m], or forces [N]
+    speeds: Array  # (N, M, F, D) joint speeds [rad/s] or [m/s]
+    holding: Array  # (N, M, D) torques at rest after each motion [N m], or forces [N]
 
     @property
     def cycle_time(self) -> Array:

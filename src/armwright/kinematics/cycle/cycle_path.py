@@ -34,51 +34,32 @@ ROUGH, ROUGH_INSTANTS = 0.25, 5  # refinement and instants of a rough path
 
 @dataclass(frozen=True)
 class CycleGroup:
-    """Arms whose paths have equally many samples, and are all sharp or not.
+    """Arms whose paths have equally many samples, and are all sharp or not."""
 
-    Attributes:
-        index: (n,) which of the N arms they are.
-        arms: The arms.
-        paths: Their path along each of the M motions.
-        is_sharp: Whether joints move several times as fast in a short part of a line as on average.
-    """
-
-    index: IndexArray
-    arms: ArmArrays
-    paths: tuple[MotionPath, ...]
-    is_sharp: bool
+    index: IndexArray  # (n,) which of the N arms they are
+    arms: ArmArrays  # the arms
+    paths: tuple[MotionPath, ...]  # their path along each of the M motions
+    is_sharp: bool  # whether joints move several times as fast in a short part of a line as on average
 
 
 @dataclass(frozen=True)
 class CyclePaths:
-    """N arms along the M motions of a cycle.
+    """N arms along the M motions of a cycle."""
 
-    Attributes:
-        plan: The cycle.
-        entry: (N, B, D) posture at the first pose of each block.
-        groups: The joint paths.
-        path_error: (N, M) largest distance of the tip from the line [m]; 0 for joint motions.
-        path_angle: (N, M) largest angle of the tool from its direction along the line [rad].
-        self_clearance: (N, M) smallest distance of two links or motor bodies that are not neighbours [m].
-        obstacle_clearance: (N, M) smallest distance of a link or motor body from an obstacle [m].
-        limit_distance: (N, M) smallest distance of a joint from its limits [rad] or [m].
-        jumps: (N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that
-            speeds are not.
-        worst: (N, M, 3) share of the motion at which path error, angle and clearance are worst.
-        instants: F, the number of instants of a motion, equally spaced in time, at which its loads are evaluated.
-    """
-
-    plan: CyclePlan
-    entry: Array
-    groups: tuple[CycleGroup, ...]
-    path_error: Array
-    path_angle: Array
-    self_clearance: Array
-    obstacle_clearance: Array
-    limit_distance: Array
+    plan: CyclePlan  # the cycle
+    entry: Array  # (N, B, D) posture at the first pose of each block
+    groups: tuple[CycleGroup, ...]  # the joint paths
+    path_error: Array  # (N, M) largest distance of the tip from the line [m]; 0 for joint motions
+    path_angle: Array  # (N, M) largest angle of the tool from its direction along the line [rad]
+    self_clearance: Array  # (N, M) smallest distance of two links or motor bodies that are not neighbours [m]
+    obstacle_clearance: Array  # (N, M) smallest distance of a link or motor body from an obstacle [m]
+    limit_distance: Array  # (N, M) smallest distance of a joint from its limits [rad] or [m]
     jumps: NDArray[np.bool_]
-    worst: Array
+    """(N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that speeds are
+    not."""
+    worst: Array  # (N, M, 3) share of the motion at which path error, angle and clearance are worst
     instants: int = INSTANTS
+    """F, the number of instants of a motion, equally spaced in time, at which its loads are evaluated."""
 
     def of_arm(self, row: int) -> tuple[ArmArrays, tuple[MotionPath, ...]]:
         """Return an arm, as one of one, and its path along each motion."""

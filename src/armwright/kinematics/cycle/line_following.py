@@ -17,17 +17,11 @@ IndexArray = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class BlockPaths:
-    """N arms along the S samples of all blocks, from K candidates.
+    """N arms along the S samples of all blocks, from K candidates."""
 
-    Attributes:
-        q: (N, K, S, D) joint values [rad] or [m].
-        position_error: (N, K, S) distance of the tip from its sample [m].
-        angle_error: (N, K, S) angle of the tool from its sample [rad].
-    """
-
-    q: Array
-    position_error: Array
-    angle_error: Array
+    q: Array  # (N, K, S, D) joint values [rad] or [m]
+    position_error: Array  # (N, K, S) distance of the tip from its sample [m]
+    angle_error: Array  # (N, K, S) angle of the tool from its sample [rad]
 
     def choose(self, samples: LineSamples, choice: IndexArray, arms: IndexArray) -> Array:
         """Return the (n, S, D) joint values of some arms (n,) from one candidate per block; choice: (N, B)."""

@@ -17,15 +17,10 @@ MANY_SAMPLES = 256  # beyond which the weights of all samples take more time and
 
 @dataclass(frozen=True)
 class MotionPath:
-    """N arms along a motion.
+    """N arms along a motion."""
 
-    Attributes:
-        motion: The motion.
-        q: (N, R + 1, D) joint values at equal shares s of the motion from 0 to 1 [rad] or [m].
-    """
-
-    motion: Motion
-    q: Array
+    motion: Motion  # the motion
+    q: Array  # (N, R + 1, D) joint values at equal shares s of the motion from 0 to 1 [rad] or [m]
 
     @property
     def share(self) -> Array:

@@ -19,15 +19,10 @@ from armwright.kinematics.cycle.cycle_loads import CycleLoads
 
 @dataclass(frozen=True)
 class SupplyCurrents:
-    """Currents of all drives of N arms together; NaN if a rating is unknown.
+    """Currents of all drives of N arms together; NaN if a rating is unknown."""
 
-    Attributes:
-        peak: (N,) largest along the cycle [A].
-        mean: (N,) mean over the cycle, dwells included [A].
-    """
-
-    peak: Array
-    mean: Array
+    peak: Array  # (N,) largest along the cycle [A]
+    mean: Array  # (N,) mean over the cycle, dwells included [A]
 
 
 def supply_currents(loads: CycleLoads, drives: Actuation) -> SupplyCurrents:

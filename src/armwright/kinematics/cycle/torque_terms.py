@@ -19,20 +19,13 @@ class TorqueTerms:
     """Terms of N arms at the R samples of a motion, with s the share of the motion.
 
     The torque is gravity + drag s'² + push s'' [N m], or a force [N].
-
-    Attributes:
-        gravity: (N, R, D).
-        drag: (N, R, D).
-        push: (N, R, D).
-        q_s: (N, R, D) derivative of the joint values by s [rad] or [m].
-        q_ss: (N, R, D) second derivative.
     """
 
-    gravity: Array
-    drag: Array
-    push: Array
-    q_s: Array
-    q_ss: Array
+    gravity: Array  # (N, R, D)
+    drag: Array  # (N, R, D)
+    push: Array  # (N, R, D)
+    q_s: Array  # (N, R, D) derivative of the joint values by s [rad] or [m]
+    q_ss: Array  # (N, R, D) second derivative
 
 
 def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[TorqueTerms, ...]]:

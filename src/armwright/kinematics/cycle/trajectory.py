@@ -20,27 +20,16 @@ IndexArray = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Trajectory:
-    """R rows of the D moving joints of an arm, every 4 ms from rest to rest.
+    """R rows of the D moving joints of an arm, every 4 ms from rest to rest."""
 
-    Attributes:
-        time: (R,) [s].
-        step: (R,) number of the step, counted from 1.
-        target: (R,) index of the target on the last row of each dwell or arrival, else -1.
-        payload: (R,) mass carried from the row on [kg].
-        q: (R, D) joint values [rad] or [m].
-        qd: (R, D) speeds [rad/s] or [m/s].
-        qdd: (R, D) accelerations [rad/s²] or [m/s²].
-        tau: (R, D) torques of the drives at the joints [N m], or forces [N].
-    """
-
-    time: Array
-    step: IndexArray
-    target: IndexArray
-    payload: Array
-    q: Array
-    qd: Array
-    qdd: Array
-    tau: Array
+    time: Array  # (R,) [s]
+    step: IndexArray  # (R,) number of the step, counted from 1
+    target: IndexArray  # (R,) index of the target on the last row of each dwell or arrival, else -1
+    payload: Array  # (R,) mass carried from the row on [kg]
+    q: Array  # (R, D) joint values [rad] or [m]
+    qd: Array  # (R, D) speeds [rad/s] or [m/s]
+    qdd: Array  # (R, D) accelerations [rad/s²] or [m/s²]
+    tau: Array  # (R, D) torques of the drives at the joints [N m], or forces [N]
 
 
 def sample_trajectory(

@@ -23,21 +23,18 @@ SHORTEST = 1e-6  # length of an axis
 
 @dataclass(frozen=True)
 class Solutions:
-    """Joint values of m arms at n poses, the best of all starts.
-
-    Attributes:
-        q: (m, n, D) joint angles [rad] or displacements [m], within the limits. D is the number of joints of the
-            longest arm, fixed ones included; joints that an arm does not have, and fixed joints, are 0. Values of an
-            arm read from a URDF are those of its file, for the joints `UrdfArm.joints`.
-        position_error: (m, n) distance of the tip from the position [m].
-        angle_error: (m, n) angle of the tool from the axis or orientation [rad]; 0 without one.
-        reached: (m, n) True where both errors are below their tolerances.
-    """
+    """Joint values of m arms at n poses, the best of all starts."""
 
     q: Array
+    """(m, n, D) joint angles [rad] or displacements [m], within the limits. D is the number of joints of the longest
+    arm, fixed ones included; joints that an arm does not have, and fixed joints, are 0. Values of an arm read from
+    a URDF are those of its file, for the joints `UrdfArm.joints`."""
     position_error: Array
+    """(m, n) distance of the tip from the position [m]."""
     angle_error: Array
+    """(m, n) angle of the tool from the axis or orientation [rad]; 0 without one."""
     reached: NDArray[np.bool_]
+    """(m, n) True where both errors are below their tolerances."""
 
 
 def solve(

@@ -30,34 +30,21 @@ DOWN = np.array([0.0, 0.0, -GRAVITY])  # [m/s²]
 
 @dataclass(frozen=True)
 class Loads:
-    """Masses that N arms in K postures hold; moments of mass are about the origin of the world.
+    """Masses that N arms in K postures hold; moments of mass are about the origin of the world."""
 
-    Attributes:
-        link_mass: (N, 1, D) of the links themselves, uniform along their length [kg].
-        link_moment: (N, K, D, 3) their mass times their centre [kg m].
-        mass: (N, K, D) of everything at and after the end of each link [kg].
-        moment: (N, K, D, 3) its mass times its centre [kg m].
-    """
-
-    link_mass: Array
-    link_moment: Array
-    mass: Array
-    moment: Array
+    link_mass: Array  # (N, 1, D) of the links themselves, uniform along their length [kg]
+    link_moment: Array  # (N, K, D, 3) their mass times their centre [kg m]
+    mass: Array  # (N, K, D) of everything at and after the end of each link [kg]
+    moment: Array  # (N, K, D, 3) its mass times its centre [kg m]
 
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Stiffness of the parts of N arms of up to D joints; infinite for rigid ones.
+    """Stiffness of the parts of N arms of up to D joints; infinite for rigid ones."""
 
-    Attributes:
-        bending: (N, D) E I of the link after each joint [N m²].
-        torsional: (N, D) G J of that link [N m²].
-        joints: (N, D) of each joint [N m/rad], or slide [N/m].
-    """
-
-    bending: Array
-    torsional: Array
-    joints: Array
+    bending: Array  # (N, D) E I of the link after each joint [N m²]
+    torsional: Array  # (N, D) G J of that link [N m²]
+    joints: Array  # (N, D) of each joint [N m/rad], or slide [N/m]
 
 
 def own_loads(arms: ArmArrays, frames: Frames) -> Loads:

@@ -15,15 +15,11 @@ from armwright.tasks.moments import MAX_MASS
 
 @dataclass(frozen=True)
 class ReachPayloads:
-    """Payloads of an arm at fractions of its horizontal reach.
+    """Payloads of an arm at fractions of its horizontal reach."""
 
-    Attributes:
-        reach: The largest horizontal distance of the tip from the first joint [m].
-        payloads: The payload held in all postures found at each fraction [kg]; NaN where none was found.
-    """
-
-    reach: float
+    reach: float  # the largest horizontal distance of the tip from the first joint [m]
     payloads: tuple[float, ...]
+    """The payload held in all postures found at each fraction [kg]; NaN where none was found."""
 
 
 def payload_limits(arms: ArmArrays, frames: Frames, torques: Array, peak: Array) -> Array:

@@ -45,20 +45,17 @@ DOWN = (0.0, 0.0, -1.0)
 
 @dataclass(frozen=True)
 class PoseCoverage:
-    """Which poses of a grid an arm reaches.
-
-    Attributes:
-        reached: (N, M) True for the points and directions that are reached.
-        covered: (N,) True for the points that are reached, with the tool in any direction.
-        q: (N, M, J) a posture for each pose that is reached [rad] or [m], else NaN. Values of an arm read from a URDF
-            are those of its file.
-        cell: Volume of the cube around each point [m³].
-    """
+    """Which poses of a grid an arm reaches."""
 
     reached: NDArray[np.bool_]
+    """(N, M) True for the points and directions that are reached."""
     covered: NDArray[np.bool_]
+    """(N,) True for the points that are reached, with the tool in any direction."""
     q: Array
+    """(N, M, J) a posture for each pose that is reached [rad] or [m], else NaN. Values of an arm read from a URDF are
+    those of its file."""
     cell: float
+    """Volume of the cube around each point [m³]."""
 
     @property
     def share(self) -> Array:
@@ -77,23 +74,20 @@ class PoseCoverage:
 
 @dataclass(frozen=True)
 class ReachMap:
-    """Reachable poses of an arm on a grid.
-
-    Attributes:
-        points: (N, 3) centres of the cubes of the grid, z fastest, then y, then x [m].
-        shape: Number of points along x, y and z.
-        spacing: Distance of neighbouring points [m].
-        directions: (M, 3) unit vectors along the tool's z axis.
-        bare: The poses within the joint limits.
-        usable: Those of them that also satisfy the conditions on payload and clearance; `bare` without conditions.
-    """
+    """Reachable poses of an arm on a grid."""
 
     points: Array
+    """(N, 3) centres of the cubes of the grid, z fastest, then y, then x [m]."""
     shape: tuple[int, int, int]
+    """Number of points along x, y and z."""
     spacing: float
+    """Distance of neighbouring points [m]."""
     directions: Array
+    """(M, 3) unit vectors along the tool's z axis."""
     bare: PoseCoverage
+    """The poses within the joint limits."""
     usable: PoseCoverage
+    """Those of them that also satisfy the conditions on payload and clearance; `bare` without conditions."""
 
     def coordinates(self, axis: int) -> Array:
         """Return the (n,) coordinates of the points along x, y or z (0, 1 or 2) [m]."""

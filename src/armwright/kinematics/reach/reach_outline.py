@@ -23,13 +23,10 @@ FIRST_STEP, SHRINKING = 0.2, 0.8  # of a joint's range; from round to round
 
 @dataclass(frozen=True)
 class Outline:
-    """The farthest points of the tip in the sectors around the base, in a plane of the world.
-
-    Attributes:
-        points: (S, 2) of each sector, counterclockwise [m]; the base where a sector has none.
-    """
+    """The farthest points of the tip in the sectors around the base, in a plane of the world."""
 
     points: tuple[tuple[float, float], ...]
+    """(S, 2) of each sector, counterclockwise [m]; the base where a sector has none."""
 
 
 def reach_outline(arm: Arm, view: tuple[int, int]) -> Outline:

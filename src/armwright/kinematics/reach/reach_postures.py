@@ -24,20 +24,13 @@ class ReachPostures:
 
     The reach in a direction is that of the widest posture found, and the tip stays at the height of that posture.
     Directions in which the arm reaches nearly as far as in any count, and in them all postures found.
-
-    Attributes:
-        arms: The arm, its first joint at the origin.
-        reach: The largest horizontal distance of the tip from the first joint [m].
-        targets: (K, 3) the points of all fractions and directions [m].
-        starts: Postures from each start of the inverse kinematics, (1, K, D).
-        fractions: Number of fractions.
     """
 
-    arms: ArmArrays
-    reach: float
-    targets: Array
-    starts: tuple[Postures, ...]
-    fractions: int
+    arms: ArmArrays  # the arm, its first joint at the origin
+    reach: float  # the largest horizontal distance of the tip from the first joint [m]
+    targets: Array  # (K, 3) the points of all fractions and directions [m]
+    starts: tuple[Postures, ...]  # postures from each start of the inverse kinematics, (1, K, D)
+    fractions: int  # number of fractions
 
     def found(self) -> Iterator[tuple[Postures, NDArray[np.bool_]]]:
         """Yield the postures from each start, and (K,) whether the tip is where it should be."""

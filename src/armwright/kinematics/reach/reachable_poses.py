@@ -40,17 +40,13 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class PostureConditions:
-    """What a posture has to satisfy besides its pose.
-
-    Attributes:
-        payload: Mass at the tip that the motors hold at rest, with the safety factor [kg]; None to ignore torques.
-        clearance: Least distance of links and motors from each other and from obstacles [m]; None to ignore it.
-        obstacles: The obstacles.
-    """
+    """What a posture has to satisfy besides its pose."""
 
     payload: float | None = None
+    """Mass at the tip that the motors hold at rest, with the safety factor [kg]; None to ignore torques."""
     clearance: float | None = None
-    obstacles: tuple[Obstacle, ...] = ()
+    """Least distance of links and motors from each other and from obstacles [m]; None to ignore it."""
+    obstacles: tuple[Obstacle, ...] = ()  # the obstacles
 
 
 @dataclass(frozen=True)
@@ -83,23 +79,14 @@ def sample_postures(arm: ArmArrays, n: int = N_SAMPLES) -> PostureSamples:
 
 @dataclass(frozen=True)
 class PoseSearch:
-    """The search for postures of one arm at P points with M directions.
+    """The search for postures of one arm at P points with M directions."""
 
-    Attributes:
-        arm: One stacked arm.
-        samples: Random postures of it.
-        points: (P, 3) positions of the tip [m].
-        directions: (M, 3) unit vectors along the tool's z axis.
-        tolerances: Errors below which a pose is reached.
-        n_starts: Number of the nearest samples from which a pose is tried.
-    """
-
-    arm: ArmArrays
-    samples: PostureSamples
-    points: Array
-    directions: Array
-    tolerances: Tolerances
-    n_starts: int = N_STARTS
+    arm: ArmArrays  # one stacked arm
+    samples: PostureSamples  # random postures of it
+    points: Array  # (P, 3) positions of the tip [m]
+    directions: Array  # (M, 3) unit vectors along the tool's z axis
+    tolerances: Tolerances  # errors below which a pose is reached
+    n_starts: int = N_STARTS  # number of the nearest samples from which a pose is tried
 
     def find(self) -> FoundPoses:
         """Find the poses within the joint limits."""
