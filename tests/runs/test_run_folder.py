@@ -8,6 +8,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -54,10 +55,11 @@ def test_trials_are_one_json_line_each(run: StudyResult) -> None:
     lines = [json.loads(line) for line in (folder(run) / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
     for line, trial in zip(lines, run.trials, strict=True):
         reason = ["reason"] if trial.source == "rules" else []
-        assert list(line) == ["number", "source", "proposal", "params", "values", *reason, "seconds"]
+        assert list(line) == ["number", "source", "proposal", "params", "values", *reason, "seconds", "q"]
         assert line["number"] == trial.number
         assert line["params"] == dict(trial.design.params)
         assert line["values"] == list(trial.values)
+        assert np.array_equal(np.float32(line["q"]), np.float32(run.history.evaluation([trial.number]).q[0]))
         assert set(line["seconds"]) == {"total", "sampling", "evaluation", "proposing"}
 
 

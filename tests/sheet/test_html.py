@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
+from armwright.problem.facts import ASKED
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.sheet.html import to_html
@@ -85,7 +86,7 @@ def test_html_shows_what_the_space_file_says_as_text(sheet: DataSheet) -> None:
 
 def test_html_states_each_key_figure(sheet: DataSheet) -> None:
     page = to_html(sheet)
-    assert "horizontal reach" in page
+    assert all(sheet.facts[name].label in page for name in ASKED)
     assert "not stated (a URDF states no price; try --price)" in page
 
 

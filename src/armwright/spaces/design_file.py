@@ -1,7 +1,6 @@
 """Design files: initial designs of a search, from an existing arm or another run."""
 
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel
 
@@ -11,18 +10,10 @@ from armwright.spaces.parameters import Design
 from armwright.yaml_documents import read_document
 
 
-class DesignFile(BaseModel, frozen=True, extra="forbid"):
-    """A design in the format of designs/NNNN/design.json; only `params` is required."""
+class DesignFile(BaseModel, frozen=True, extra="ignore"):
+    """What counts of a file in the format of designs/NNNN/design.json, which also holds what a run found."""
 
     params: dict[str, float | str]  # a value for each parameter of the space, by its name
-    number: Any = None
-    source: Any = None
-    reason: Any = None
-    objectives: Any = None
-    constraints: Any = None
-    masses: Any = None
-    targets: Any = None
-    verification: Any = None
 
 
 def read_design(path: str | Path, space: DesignSpace) -> Design:
