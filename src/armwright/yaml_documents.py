@@ -42,7 +42,7 @@ def load_document(text: str, error: type[Exception], where: str) -> Any:
 def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str) -> Schema:
     """Validate `data` as a value of `schema`; `where` names it in messages."""
     for key in data:
-        if key not in document_keys(schema):
+        if key not in document_keys(schema) and schema.model_config.get("extra") != "allow":
             raise error(f"{where}: {describe_unknown_key(str(key), (), schema)}")
     try:
         return schema.model_validate(data)

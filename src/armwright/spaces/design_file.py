@@ -10,7 +10,7 @@ from armwright.spaces.parameters import Design
 from armwright.yaml_documents import read_document
 
 
-class DesignFile(BaseModel, frozen=True, extra="ignore"):
+class DesignFile(BaseModel, frozen=True, extra="allow"):
     """What counts of a file in the format of designs/NNNN/design.json, which also holds what a run found."""
 
     params: dict[str, float | str]  # a value for each parameter of the space, by its name
