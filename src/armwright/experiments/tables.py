@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from armwright.experiments.compare_runs import LEVELS, Comparison, Contrast, MethodResult
+from armwright.experiments.latex import latex_table
 from armwright.experiments.run_record import RunSummary, shares_by_source
 from armwright.experiments.statistics import Interval, PairedTest, can_reject, least_p
 from armwright.files import naming_write_errors, replace_file, to_csv
@@ -67,21 +68,9 @@ def markdown(comparison: Comparison, title: str, notes: Sequence[str] = ()) -> s
 
 def latex(comparison: Comparison) -> str:
     """Return the paper's table, E_hv (σ_hv) of each method and task, in LaTeX (booktabs)."""
-    head, rows = _paper_table(comparison)
     published = comparison.published
     remarks = [f"published: {published.source}"] if published.values and published.source else []
-    lines = [
-        "% needs \\usepackage{booktabs}",
-        rf"\begin{{tabular}}{{{'l' * len(head)}}}",
-        r"\toprule",
-        _tex_row(head),
-        r"\midrule",
-        *map(_tex_row, rows),
-        r"\bottomrule",
-        r"\end{tabular}",
-        *(f"% {_tex(remark)}" for remark in (*remarks, *remarks_on(comparison))),
-    ]
-    return "\n".join(lines) + "\n"
+    return latex_table(*_paper_table(comparison), [*remarks, *remarks_on(comparison)])
 
 
 def sections(comparison: Comparison) -> list[Table]:
@@ -397,18 +386,3 @@ def _lines(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
         width = max(3, len(name), *map(len, others))
         columns.append([f"{text:<{width}}" for text in (name, "-" * width, *others)])
     return "\n".join(f"| {' | '.join(row)} |" for row in zip(*columns, strict=True))
-
-
-_TEX = str.maketrans(
-    {c: rf"\{c}" for c in "&%$#_{}"}
-    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "–": "--"}
-)
-
-
-def _tex_row(cells: Sequence[str]) -> str:
-    bold = (rf"\textbf{{{_tex(cell[2:-2])}}}" if cell.startswith("**") else _tex(cell) for cell in cells)
-    return f"{' & '.join(bold)} \\\\"
-
-
-def _tex(text: str) -> str:
-    return text.translate(_TEX)
