@@ -63,11 +63,11 @@ audit: .venv/.audit  ## known faults of all that may be installed, extras includ
 	@touch $@
 
 .venv/.run: .venv/.python pyproject.toml constraints.txt
-	$(PIP) --editable '.[live,llm,sim]'
+	$(PIP) --editable '.[figures,studies]'
 	@touch $@
 
 .venv/.test: .venv/.run
-	$(PIP) --group test
+	$(PIP) --editable '.[figures,live,llm,studies]' --group test
 	@touch $@
 
 .venv/.check: .venv/.run
@@ -87,7 +87,7 @@ audit: .venv/.audit  ## known faults of all that may be installed, extras includ
 	@touch $@
 
 .venv/.gp: .venv/.run
-	$(PIP) --editable '.[gp,live,llm,sim]'
+	$(PIP) --editable '.[figures,gp,studies]'
 	@touch $@
 
 .venv/.package: .venv/.python

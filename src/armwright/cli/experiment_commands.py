@@ -56,13 +56,13 @@ def experiment(
 
     The same command resumes; finished runs are kept.
     """
+    from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_files, show_outcome, show_plan
     from armwright.experiments import outcome, plan
     from armwright.experiments import runner as running
     from armwright.experiments.cells import plan_cells
     from armwright.experiments.tables import write_tables
     from armwright.llm.configuration import load_model_options
-    from armwright.pictures.comparison_figures import write_experiment_figures
 
     if print_:
         print_text(plan.builtin_text(name), end="")
@@ -84,6 +84,7 @@ def experiment(
     if print_commands:
         print_text("\n".join(cell.command for cell in due))
         return
+    drawing = can_draw(console, figures)
     failed: list[running.CellOutcome] = []
     try:
         outcome.write_plan(chosen, out)
@@ -95,9 +96,12 @@ def experiment(
         notes = notes_on_cells(skipped, failed)
         title, published = f"Experiment {chosen.name}", outcome.published(chosen)
         tables = write_tables(out, found, title, published, notes)
-        if figures:
+        drawn: list[Path] = []
+        if drawing:
+            from armwright.pictures.comparison_figures import write_experiment_figures
+
             console.print("drawing the figures")
-        drawn = write_experiment_figures(out, chosen, found) if figures else []
+            drawn = write_experiment_figures(out, chosen, found)
     except KeyboardInterrupt:
         exit_interrupted(console, f"every finished trial is in {out}/")
     if json_:
@@ -125,6 +129,7 @@ def compare(
     csv_: Csv = False,
 ) -> None:
     """Compare finished runs by method, task and seed: tables, intervals, tests."""
+    from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import show_comparison, show_files
     from armwright.experiments.compare_runs import compare_summaries
     from armwright.experiments.run_list import read_finished_runs
@@ -146,7 +151,7 @@ def compare(
     if out is not None:
         tables = write_tables(out, comparison, title, notes=notes)
         drawn: list[Path] = []
-        if figures:
+        if can_draw(console, figures):
             from armwright.pictures.comparison_figures import write_comparison_figures
 
             with activity("drawing the figures"):
@@ -182,6 +187,7 @@ def compare_arms(
     csv_: Csv = False,
 ) -> None:
     """Evaluate existing arms on TASK, and compare them with the designs of a run."""
+    from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import arm_rows, show_arms
     from armwright.existing.compare_arms import compare_arms, comparison_record
     from armwright.spaces.design_space import load_space
@@ -202,10 +208,14 @@ def compare_arms(
     drawn: list[Path] = []
     if run is not None and figures:
         from armwright.page.page import write_report
-        from armwright.pictures.figures import write_figures
 
-        with activity("drawing the page and the figures"):
-            drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
+        drawing = can_draw(open_console(json_ or csv_))
+        with activity("drawing the page and the figures" if drawing else "writing the page"):
+            drawn = [write_report(run)]
+            if drawing:
+                from armwright.pictures.figures import write_figures
+
+                drawn += [path for path in write_figures(run) if path.stem == "front"]
     if json_:
         print_json(comparison_record(compared))
     elif csv_:

@@ -99,9 +99,10 @@ def check(
 ) -> None:
     """Check TASK and a design space: what they mean, what cannot work, and what was hardly meant."""
     from armwright.cli.check import check_files, run_check
+    from armwright.cli.notes import can_draw
 
     problem = load_problem(task, space, objectives=objectives)
-    drawn = (out or Path(f"{problem.task.name}-check.png")) if picture else None
+    drawn = (out or Path(f"{problem.task.name}-check.png")) if can_draw(open_console(json_), picture) else None
     run_check(open_console(), problem, check_files(task, space), deep, drawn, json_)
 
 
@@ -200,6 +201,10 @@ def draft(
     Nothing is run.
     """
     from armwright.cli.show_inputs import show_draft
+    from armwright.extras import check_extra
+
+    if not print_prompt:
+        check_extra("llm", "a language model")
     from armwright.llm.configuration import load_model_options
     from armwright.llm.draft import Drafter, drafting_model
     from armwright.llm.draft_prompt import draft_prompt, draft_schema

@@ -93,10 +93,10 @@ def reach_map(
     json_: Json = False,
 ) -> None:
     """Map in which directions an arm can hold its tool at each point of a grid."""
+    from armwright.cli.notes import can_draw
     from armwright.kinematics.reach.reach_map import reach_map
     from armwright.page.page import write_report
     from armwright.page.reach_maps import MOST_POINTS, fingerprint
-    from armwright.pictures.reach_figure import write_reach_figure
     from armwright.proof.results import read_summary
 
     if not 0.0 < share <= 1.0:
@@ -127,8 +127,12 @@ def reach_map(
     conditions = _describe_conditions(payload, clearance, obstacles)
     texts = {"directions_text": _describe_directions(found, axis, cone), "conditions": conditions}
     found.save(file, arm=fingerprint(subject.arm), **texts)
-    write_reach_figure(found, _surroundings(subject, conditions), share, figure)
-    files = [file, figure]
+    files = [file]
+    if can_draw(open_console(json_)):
+        from armwright.pictures.reach_figure import write_reach_figure
+
+        write_reach_figure(found, _surroundings(subject, conditions), share, figure)
+        files.append(figure)
     if subject.run is not None and len(found.points) <= MOST_POINTS and read_summary(subject.run) is not None:
         files.append(write_report(subject.run))
     record = {

@@ -71,9 +71,10 @@ def design(
     """
     started = time.monotonic()
     from armwright.cli.check import check_before_search, check_files
-    from armwright.cli.notes import space_note
+    from armwright.cli.notes import can_draw, space_note
     from armwright.cli.progress import announce_compilation, search_progress
     from armwright.cli.show_results import show_search
+    from armwright.extras import naming_extras
     from armwright.proposers.factory import choose_proposer
     from armwright.study.front.front_run import find_front
     from armwright.study.front.search_budget import SearchBudget
@@ -83,11 +84,13 @@ def design(
         raise SettingsError("--from and --proposer both set the initial designs; use one of them")
     console = open_console(json_)
     announce_compilation(console)
-    plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=figures, started=started)
+    drawing = can_draw(console, figures)
+    plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=drawing, started=started)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
     if space is None and (note := space_note(problem)):
         console.print(note)
-    choice = None if proposer is None else choose_proposer(proposer)
+    with naming_extras(f"--proposer {proposer}"):
+        choice = None if proposer is None else choose_proposer(proposer)
     if choice is not None:
         if choice.proposer is None:
             raise SettingsError(f"--proposer {proposer} proposes no initial designs; leave it out")
@@ -105,7 +108,7 @@ def design(
                 out=folder,
                 watch=watch,
             )
-        drawn = _draw(folder) if figures else []
+        drawn = _draw(folder, drawing) if figures else []
     except KeyboardInterrupt:
         exit_interrupted(console, f"the search is saved in {folder}/")
     if json_:
@@ -198,13 +201,12 @@ def optimize(
     The same command resumes or shows the run; a larger --n-total extends it.
     """
     from armwright.cli.check import check_before_search, check_files
-    from armwright.cli.notes import design_note, space_note
+    from armwright.cli.notes import can_draw, design_note, space_note
     from armwright.cli.progress import announce_compilation, study_progress
     from armwright.cli.show_results import show_result
     from armwright.llm.configuration import load_model_options
     from armwright.proposers.factory import choose_proposer
     from armwright.spaces.design_file import read_design
-    from armwright.study.study import optimize as run_study
 
     console = open_console(json_)
     announce_compilation(console)
@@ -214,6 +216,9 @@ def optimize(
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
     choice = choose_proposer(proposer, given)
+    from armwright.study.study import optimize as run_study  # the extra `llm`, if it is missing, was named
+
+    drawing = can_draw(console, figures)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
     is_method_chosen = proposer != "auto" or model is not None or sampler != "auto"
@@ -247,7 +252,7 @@ def optimize(
         finished_before = run.resumed == len(run.trials)
         if figures and not finished_before:
             console.print("drawing the page and the figures")
-        drawn = _draw(folder) if figures else []
+        drawn = _draw(folder, drawing) if figures else []
     except (KeyboardInterrupt, StoppedError):
         exit_interrupted(console, f"every finished trial is in {folder}/" if folder.exists() else "nothing was started")
     except AnswerPendingError as pending:
@@ -271,10 +276,9 @@ def optimize(
         raise typer.Exit(1)
 
 
-def _draw(folder: Path) -> list[Path]:
-    """Return the figures of a finished run; draw them and the page if they are missing."""
+def _draw(folder: Path, drawing: bool) -> list[Path]:
+    """Return the figures of a finished run; make the page, and if `drawing` the figures, if they are missing."""
     from armwright.page.page import write_report
-    from armwright.pictures.figures import write_figures
     from armwright.proof.results import FIGURES, REPORT
     from armwright.runs.folder import RunFolder
 
@@ -282,4 +286,8 @@ def _draw(folder: Path) -> list[Path]:
         existing = sorted((folder / FIGURES).glob("*.png"))
         if not (folder / REPORT).is_file():
             write_report(folder)
-        return existing or write_figures(folder)
+        if existing or not drawing:
+            return existing
+        from armwright.pictures.figures import write_figures
+
+        return write_figures(folder)

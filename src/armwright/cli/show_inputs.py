@@ -4,7 +4,7 @@ import math
 import shlex
 import textwrap
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -12,7 +12,6 @@ from rich.console import Console
 from armwright.cli.streams import format_point, print_command, print_named
 from armwright.cli.tables import NO_BREAK, Column, Table, numbers, print_table
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
-from armwright.llm.draft import Draft
 from armwright.problem.checks.reach import distance_to_bases
 from armwright.problem.constraints import implied_constraints
 from armwright.problem.problem import Problem
@@ -21,6 +20,9 @@ from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
+
+if TYPE_CHECKING:
+    from armwright.llm.draft import Draft
 
 MAX_ROWS = 40  # of a table of targets
 
@@ -227,7 +229,7 @@ def _describe_payload(task: DesignTask) -> str:
     return ", ".join(f"{kg:g}" for kg in np.atleast_1d(task.payload)) + " kg" if task.payloads.any() else ""
 
 
-def show_draft(console: Console, draft: Draft) -> None:
+def show_draft(console: Console, draft: "Draft") -> None:
     """Print a drafted task and space, the assumptions and the next commands."""
     show_task(console, draft.task)
     if draft.space is None:

@@ -11,7 +11,6 @@ from typing import Any
 from armwright.exceptions import SettingsError, TaskError
 from armwright.experiments.plan import ExperimentPlan, MethodPlan
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import BUILTIN_PROMPTS
 from armwright.llm.recording_file import shipped_recordings
 from armwright.llm.servers import SERVER_KEY
 from armwright.llm.transcript import TRANSCRIPTS
@@ -167,6 +166,8 @@ def _task(name: str, folder: Path) -> tuple[str, str]:
 
 def _with_prompt(method: MethodPlan, folder: Path) -> MethodPlan:
     """Return the method with the path of its prompt file made absolute."""
+    from armwright.llm.prompt import BUILTIN_PROMPTS  # which loads jinja2: comparisons do without
+
     options = method.model_options
     if options.prompt in BUILTIN_PROMPTS:
         return method

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.extras import check_extra
 from armwright.llm.configuration import ConfiguredModel, configured_model
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import load_prompt
 from armwright.proposers.proposer import Proposer
 from armwright.proposers.rules import RulesProposer
 
@@ -62,8 +62,12 @@ def choose_proposer(name: str = "auto", options: ModelOptions | None = None) -> 
         )
     if kind in WITH_PLACE and not place:
         raise SettingsError(f"--proposer {kind} needs a {'run' if kind == 'replay' else 'folder'}: {kind}:PATH")
-    load_prompt(options.prompt)  # an unknown prompt is reported even if the proposer uses none
     configured = configured_model(options) if kind in ("auto", "llm") else None
+    if configured is not None or kind == "llm":
+        check_extra("llm", "a language model")
+    from armwright.llm.prompt import load_prompt  # after the check, which names the extra that brings all of it
+
+    load_prompt(options.prompt)  # an unknown prompt is reported even if the proposer uses none
     if configured is None and kind == "llm":
         raise SettingsError(
             "--proposer llm needs a language model: give --model openai-chat:gpt-4o (with its key in the environment), "

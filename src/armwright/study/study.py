@@ -34,9 +34,10 @@ from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.pending_trial import PendingTrial, new_trial
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.run_settings import run_config
 from armwright.study.sampler_advice import sampler_advice
 from armwright.study.schedule import ReplaySchedule, Schedule
-from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, run_config, study_method
+from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, study_method
 from armwright.study.workers.cluster import Workers
 from armwright.study.workers.dask_backend import DaskBackend
 from armwright.study.workers.evaluation_backend import (

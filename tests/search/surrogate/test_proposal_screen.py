@@ -22,7 +22,8 @@ from armwright.search.surrogate import candidates
 from armwright.search.surrogate.proposal_screen import LEAST_GAIN, LEAST_TRIALS, rejection
 from armwright.search.surrogate.surrogate import Observations, Surrogate
 from armwright.spaces.parameters import Design
-from armwright.study.settings import run_config, study_method
+from armwright.study.run_settings import run_config
+from armwright.study.settings import study_method
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 SETTINGS: dict[str, Any] = {"sampler": "surrogate", "n_init": 16, "n_step": 2}

@@ -15,6 +15,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
+from armwright.extras import naming_extras
 from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
@@ -25,8 +26,7 @@ from armwright.runs.trial import FinishedTrial
 from armwright.study.front.direct_search import DirectSearch, FrontRun
 from armwright.study.front.search_budget import SearchBudget, SearchProgress
 from armwright.study.front.time_plan import TimePlan
-from armwright.study.settings import run_config
-from armwright.study.study import optimize
+from armwright.study.run_settings import run_config
 
 N_PROPOSED = 20  # initial designs requested from a proposer
 
@@ -115,6 +115,8 @@ def _initial_matrix(
 
 def _proposed_matrix(problem: Problem, proposer: Proposer, seed: int, out: Path | None) -> Array:
     """Return (N, P) designs of a proposer, from a study whose counted trials are all its own."""
+    with naming_extras("a proposer of initial designs"):  # the only part of a direct search that is a study
+        from armwright.study.study import optimize
     folder = None if out is None else out / PROPOSALS
     study = optimize(problem, proposer=proposer, n_step=1, n_total=N_PROPOSED, seed=seed, out=folder)
     return _matrix(problem, study.history)
