@@ -4,6 +4,7 @@ import os
 import shlex
 import sys
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -201,10 +202,9 @@ def draft(
     Nothing is run.
     """
     from armwright.cli.show_inputs import show_draft
-    from armwright.extras import check_extra
 
     if not print_prompt:
-        check_extra("llm", "a language model")
+        import_module("armwright.llm.client")  # names the extra `llm`, which brings all that follows
     from armwright.llm.configuration import load_model_options
     from armwright.llm.draft import Drafter, drafting_model
     from armwright.llm.draft_prompt import draft_prompt, draft_schema

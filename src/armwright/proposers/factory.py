@@ -2,10 +2,10 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.extras import check_extra
 from armwright.llm.configuration import ConfiguredModel, configured_model
 from armwright.llm.model_options import ModelOptions
 from armwright.proposers.proposer import Proposer
@@ -64,8 +64,8 @@ def choose_proposer(name: str = "auto", options: ModelOptions | None = None) -> 
         raise SettingsError(f"--proposer {kind} needs a {'run' if kind == 'replay' else 'folder'}: {kind}:PATH")
     configured = configured_model(options) if kind in ("auto", "llm") else None
     if configured is not None or kind == "llm":
-        check_extra("llm", "a language model")
-    from armwright.llm.prompt import load_prompt  # after the check, which names the extra that brings all of it
+        import_module("armwright.llm.client")  # names the extra `llm`, which brings all that follows
+    from armwright.llm.prompt import load_prompt
 
     load_prompt(options.prompt)  # an unknown prompt is reported even if the proposer uses none
     if configured is None and kind == "llm":
