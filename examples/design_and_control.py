@@ -1,6 +1,6 @@
 """An evaluator that needs the whole design: arm, gears and controller are simulated in MuJoCo on the task's cycle.
 
-    pip install "armwright[sim]"
+    pip install "armwright[studies]"
     armwright optimize examples/9-codesign-task.yaml --space examples/9-codesign-space.yaml \
         --evaluator examples/design_and_control.py:drive --out runs/codesign
 

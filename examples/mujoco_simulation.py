@@ -1,6 +1,6 @@
 """An evaluator of your own: each arm is simulated in MuJoCo on its way along the targets.
 
-    pip install mujoco
+    pip install "armwright[studies]"
     armwright optimize target-1 --evaluator examples/mujoco_simulation.py:follow --n-total 50
 
 or, in two processes (on other machines, with --scheduler tcp://HOST:PORT of a Dask cluster):

@@ -2,8 +2,9 @@
 
     python tools/package.py [PYTHON]        # a Python to install into, such as python3.13; without it, this one
 
-The wheel is installed twice: with the newest versions of all that it needs, as pip does it, and with the lowest that
-pyproject.toml allows. Both must pass tools/smoke.py; what the first one wrote must load in MuJoCo.
+The wheel is installed with the newest versions of all that it needs, as pip does it: alone, then with the extras
+`figures` and `studies`. And with the lowest versions that pyproject.toml allows. All must pass tools/smoke.py; what the
+first one wrote must load in MuJoCo.
 """
 
 import shutil
@@ -17,6 +18,7 @@ from zipfile import ZipFile
 ROOT = Path(__file__).resolve().parents[1]
 DIST = ROOT / "dist"
 CITED = ("--from", "cffconvert==2.0.0", "cffconvert", "--validate", "--infile", "CITATION.cff")
+EXTRAS = ("figures", "studies")  # without which little can be tried
 NOT_PACKED = (".ci/",)  # of what git holds
 LOAD = """
 import sys
@@ -89,11 +91,13 @@ def try_tests(sdist: Path, folder: Path) -> None:
 def try_newest(wheel: Path, python: str, folder: Path) -> None:
     """As a user installs it."""
     own = environment(python, folder / "newest")
-    run(own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
+    pip = (own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
+    run(*pip, wheel)
     smoke(own, folder / "with-newest")
-    run(own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "mujoco")
-    made = [*(folder / "with-newest").glob("run/designs/*/arm.urdf"), folder / "with-newest" / "out" / "mjcf"]
+    made = [*(folder / "with-newest").glob("front/designs/*/arm.urdf"), folder / "with-newest" / "out" / "mjcf"]
     run(own, "-c", LOAD, *made)
+    run(*pip, f"{wheel}[{','.join(EXTRAS)}]")
+    smoke(own, folder / "with-extras")
 
 
 def try_lowest(wheel: Path, python: str, folder: Path) -> None:
@@ -102,7 +106,8 @@ def try_lowest(wheel: Path, python: str, folder: Path) -> None:
     uv = (sys.executable, "-m", "uv", "pip", "install", "--quiet", "--system-certs", "--python", own)
     # The oldest versions have no wheels for the newest Pythons, whose lowest are then those that have.
     lowest = ("--resolution", "lowest-direct", "--only-binary", ":all:")
-    run(*uv, *lowest, "--requirements", ROOT / "pyproject.toml")
+    extras = [option for extra in EXTRAS for option in ("--extra", extra)]
+    run(*uv, *lowest, "--requirements", ROOT / "pyproject.toml", *extras)
     run(*uv, "--no-deps", wheel)
     smoke(own, folder / "with-lowest")
 

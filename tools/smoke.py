@@ -1,4 +1,6 @@
-"""What an armwright that was just installed must do, without extras and without anything of the repository.
+"""What an armwright that was just installed must do, without anything of the repository.
+
+It has no extras, or `figures` and `studies`.
 
     python smoke.py FOLDER          # the Python that it is installed in, an empty folder
 
@@ -10,6 +12,7 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
@@ -48,11 +51,19 @@ if __name__ == "__main__":
         else:
             raise AssertionError("an extra is here")
 """
-CYCLE = "name: driven\ntargets: [[0.3, 0.0, 0.2], [0.2, 0.2, 0.3]]\ncycle: in_order\n"
-# What needs an extra, and which; all of them are asked for where the run folders "run" and "driven" are.
+# What needs an extra, and which; all of them are asked for where the run folder "front" is.
+NEEDS_OF_BASE = (
+    ("figures", "datasheet", "front"),
+    ("live", "live", "front"),
+    ("studies", "optimize", "target-1", "--out", "other"),
+    ("studies", "experiment", "paper", "--out", "other"),
+    ("studies", "export", "front", "--format", "optuna"),
+    ("llm", "optimize", "target-1", "--model", "openai-chat:gpt-4o", "--out", "other"),
+    ("llm", "draft", "reach a shelf", "--model", "openai-chat:gpt-4o"),
+    ("arms", "compare-arms", "target-1", "ur5e"),
+)
 NEEDS = (
     ("live", "live", "run"),
-    ("sim", "simulate", "driven"),
     ("live", "optimize", "target-1", "--live", "--out", "other"),
     ("llm", "optimize", "target-1", "--model", "openai-chat:gpt-4o", "--out", "other"),
     (
@@ -96,60 +107,78 @@ def armwright(*args: str, code: int = 0, **environment: str) -> subprocess.Compl
     return python("-m", "armwright", *args, code=code, **environment)
 
 
-def main(folder: Path) -> None:
+def base() -> None:
     """Everything that needs no extra, and one line for each thing that does."""
-    installed = {str(distribution.metadata["Name"]).lower() for distribution in metadata.distributions()}
-    assert not installed & {"pydantic-ai-slim", "starlette", "torch", "distributed", "robot-descriptions", "pytest"}
-    os.chdir(folder)
     assert armwright("--version").stdout.strip() == metadata.version("armwright")
     assert "optimize" in armwright("--help").stdout
+    armwright("design", "desk-sorting", "--evaluations", "5000", "--out", "front")
+    for made in ("report.html", "summary.json", "front.csv"):
+        assert (Path("front") / made).stat().st_size > 100, made
+    urdfs = list(Path("front").glob("designs/*/arm.urdf"))
+    assert urdfs
+    assert all(ET.parse(urdf).getroot().tag == "robot" for urdf in urdfs)
+    assert "is finished" in armwright("design", "desk-sorting", "--evaluations", "5000", "--out", "front").stdout
+    armwright("pick", "front", "--by", "price")
+    for kind in FORMATS:
+        armwright("export", "front", "--format", kind, "--out", f"out/{kind}")
+    assert "in MuJoCo" in armwright("simulate", "front").stdout
+    armwright("report", "front")
+    armwright("check", "target-1")
+    armwright("runs", ".")
+    assert len(json.loads(armwright("tasks", "--json").stdout)) > 30
+    armwright("actuators")
+    armwright("init", "mine.yaml")
+    Path("out/urdf").rename("arm.urdf")
+    armwright("compare-arms", "desk-sorting", "arm.urdf", "--run", "front")
+    health = armwright("doctor").stdout
+    assert health.count("ok extra") + health.count("-- extra") == 7, health
 
+
+def studies() -> None:
+    """Everything that needs the extras `studies` and `figures` alone."""
     run = armwright("optimize", "target-1", "--seed", "0", "--out", "run")
     assert "hypervolume" in run.stdout
     for made in ("report.html", "summary.json", "front.csv", "figures/front.png", "figures/front.pdf"):
-        assert (folder / "run" / made).stat().st_size > 100, made
-    urdfs = list((folder / "run" / "designs").glob("*/arm.urdf"))
-    assert urdfs
-    assert all(ET.parse(urdf).getroot().tag == "robot" for urdf in urdfs)
+        assert (Path("run") / made).stat().st_size > 100, made
     assert "is finished" in armwright("optimize", "target-1", "--seed", "0", "--out", "run").stdout
-    armwright("report", "run")
-    armwright("pick", "run", "--by", "torque")
-    for kind in FORMATS:
-        armwright("export", "run", "--format", kind, "--out", f"out/{kind}")
-
-    armwright("design", "target-1", "--evaluations", "100000", "--out", "front")
-    armwright("check", "target-1")
+    armwright("datasheet", "front")
+    armwright("export", "run", "--format", "optuna")
     Path("two-methods.yaml").write_text(EXPERIMENT, encoding="utf-8")
     told = json.loads(armwright("experiment", "two-methods.yaml", "--out", "cells", "--json").stdout)
     assert told
     armwright("compare", "cells", "--out", "compared")
-    armwright("runs", ".")
-
-    assert len(json.loads(armwright("tasks", "--json").stdout)) > 30
-    armwright("actuators")
-    armwright("init", "mine.yaml")
     armwright("optimize", "mine.yaml", "--n-total", "10", "--no-figures", "--robust", "--space", "slideopt")
-    Path("driven.yaml").write_text(CYCLE, encoding="utf-8")
-    armwright("optimize", "driven.yaml", "--n-init", "2", "--n-total", "2", "--no-figures", "--out", "driven")
     armwright("prompt", "target-1")
     armwright(
         "optimize", "target-1", "--proposer", "manual:asked", "--model-options", "{wait: false}", "--out", "by-hand"
     )
-    Path("out/urdf").rename("arm.urdf")
-    armwright("compare-arms", "target-1", "arm.urdf", "--run", "run")
-    health = armwright("doctor").stdout
-    assert health.count("-- extra") == 6, health
     assert 'pip install "armwright[llm]"' in armwright("doctor", "--model", "openai-chat:gpt-4o", code=1).stdout
-
     Path("gp.yaml").write_text(EXPERIMENT.replace("proposer: none", "proposer: none, sampler: gp"), encoding="utf-8")
-    for extra, *asked in NEEDS:
+    Path("script.py").write_text(PYTHON, encoding="utf-8")
+    python("script.py")
+
+
+def refuse(needs: Sequence[tuple[str, ...]]) -> None:
+    """Check that what needs an extra names it in one line."""
+    for extra, *asked in needs:
         done = armwright(*asked, code=2, OPENAI_API_KEY="sk-none")
         (line,) = [line for line in done.stderr.splitlines() if "Warning" not in line and not line.startswith("  ")]
         assert line.startswith("armwright: "), line
         assert f'pip install "armwright[{extra}]"' in line, line
 
-    Path("script.py").write_text(PYTHON, encoding="utf-8")
-    python("script.py")
+
+def main(folder: Path) -> None:
+    """Check what this installation can do, in an empty folder or in that of the base install."""
+    installed = {str(distribution.metadata["Name"]).lower() for distribution in metadata.distributions()}
+    assert not installed & {"pydantic-ai-slim", "starlette", "torch", "distributed", "robot-descriptions", "pytest"}
+    os.chdir(folder)
+    base()
+    if "optuna" in installed:
+        studies()
+        refuse(NEEDS)
+    else:
+        assert not installed & {"cloudpickle", "jinja2", "matplotlib", "threadpoolctl"}
+        refuse(NEEDS_OF_BASE)
     print(f"all of it works on Python {sys.version.split()[0]}, in {folder}")
 
 

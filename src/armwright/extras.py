@@ -1,4 +1,8 @@
-"""Optional dependencies (extras), such as `pip install "armwright[live]"`."""
+"""Optional dependencies (extras), such as `pip install "armwright[live]"`.
+
+A module may import a package of an extra like any other: the command or the public name that needs the module names
+the extra (`naming_extras`).
+"""
 
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -10,6 +14,7 @@ from armwright.exceptions import MissingExtraError
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     "arms": {"robot_descriptions": "robot_descriptions", "xacrodoc": "xacrodoc"},
     "distributed": {"cryptography": "cryptography", "distributed": "distributed"},
+    "figures": {"matplotlib": "matplotlib"},
     "gp": {"greenlet": "greenlet", "torch": "torch"},
     "live": {"ruamel.yaml": "ruamel.yaml", "starlette": "starlette", "uvicorn": "uvicorn"},
     "llm": {
@@ -18,7 +23,12 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
         "openai": "openai",
         "pydantic_ai": "pydantic-ai-slim",
     },
-    "sim": {"mujoco": "mujoco"},
+    "studies": {
+        "cloudpickle": "cloudpickle",
+        "jinja2": "jinja2",
+        "optuna": "optuna",
+        "threadpoolctl": "threadpoolctl",
+    },
 }
 
 
@@ -54,6 +64,18 @@ def requires_extra(extra: str, subject: str) -> Generator[None]:
         raise MissingExtraError(
             f"{subject} needs another version of {fault.name} ({reason}): {install_command(extra)}"
         ) from fault
+
+
+@contextmanager
+def naming_extras(subject: str) -> Generator[None]:
+    """Convert failed imports of an extra's package inside the context to MissingExtraError; `subject` needs them."""
+    try:
+        yield
+    except ModuleNotFoundError as fault:
+        extra = next((extra for extra, packages in EXTRAS.items() if fault.name in packages), None)
+        if extra is None:
+            raise
+        raise _missing(extra, subject, missing_packages(extra) or [str(fault.name)]) from fault
 
 
 def install_command(extra: str) -> str:

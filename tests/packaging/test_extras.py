@@ -1,6 +1,9 @@
 """Missing extras are reported in one line with the install command."""
 
+import json
+import os
 import re
+import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Mapping
@@ -13,9 +16,8 @@ import pytest
 import armwright as aw
 from armwright import extras
 from armwright.exceptions import MissingExtraError, UsageError
-from armwright.extras import EXTRAS, missing_packages, requires_extra
+from armwright.extras import EXTRAS, missing_packages, naming_extras, requires_extra
 from armwright.page.live_server import serve, start_server
-from armwright.proof.simulation import mujoco_version
 from armwright.robot.robot_descriptions import find_urdf
 from tests import ROOT
 from tests.support.extras import NEEDS_GP
@@ -31,7 +33,13 @@ def plain(name: str) -> str:
 
 
 def test_extras_match_pyproject() -> None:
-    stated = {extra: requirements for extra, requirements in STATED.items() if extra != "all"}
+    bring_studies = {extra for extra in STATED if "armwright[studies]" in STATED[extra]}
+    assert bring_studies == {"distributed", "gp", "llm"}
+    stated = {
+        extra: [requirement for requirement in requirements if requirement != "armwright[studies]"]
+        for extra, requirements in STATED.items()
+        if extra != "all"
+    }
     assert set(EXTRAS) == set(stated)
     assert STATED["all"] == [f"armwright[{','.join(sorted(stated))}]"]
     assert re.match(r"pydantic-ai-slim\[anthropic,google,openai\]", *stated["llm"])  # which brings their packages
@@ -59,7 +67,6 @@ ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
     "arms": ("arms", "robot_descriptions", lambda: find_urdf("ur5e")),
     "distributed": ("distributed", "distributed", lambda: aw.Workers(2)),
     "gp": ("gp", "torch", lambda: aw.optimize(aw.Problem(aw.load_task("target-1")), sampler="gp")),
-    "simulation": ("sim", "mujoco", mujoco_version),
     "page": ("live", "uvicorn", lambda: serve(Path("run"), print)),
     "page of a run": ("live", "starlette", lambda: start_server(Path("run"))),
     "model": ("llm", "pydantic_ai", lambda: aw.LlmProposer("openai-chat:gpt-4o")),
@@ -92,3 +99,58 @@ def test_incompatible_version_is_reported() -> None:
     assert words.startswith("the page needs another version of json (cannot import name 'no_such_name'")
     assert words.endswith(': pip install "armwright[live]"')
     assert "\n" not in words
+
+
+def test_failed_import_of_an_extras_package_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtraError) as fault, naming_extras("datasheet"):
+        import matplotlib  # noqa: F401
+    assert str(fault.value) == 'datasheet needs matplotlib: pip install "armwright[figures]"'
+    with pytest.raises(ModuleNotFoundError, match="no_such_module"), naming_extras("it"):
+        import no_such_module  # noqa: F401  # pyright: ignore[reportMissingImports]
+
+
+ASSEMBLY = [str(ROOT / "examples" / "2-assembly-task.yaml"), "--space", str(ROOT / "examples/2-assembly-space.yaml")]
+NO_FIGURES = 'no figures without matplotlib: pip install "armwright[figures]"'
+STUDIES = 'cloudpickle, jinja2, optuna and threadpoolctl: pip install "armwright[studies]"'
+LLM = 'a language model needs anthropic, google.genai, openai and pydantic_ai: pip install "armwright[llm]"'
+
+WITHOUT_EXTRAS: tuple[tuple[list[str], str], ...] = (  # what each command prints
+    (["check", *ASSEMBLY], NO_FIGURES),
+    (["design", *ASSEMBLY, "--evaluations", "1000", "--out", "run"], NO_FIGURES),
+    (["pick", "run"], "perturbed: "),
+    (["export", "run"], "</robot>"),
+    (["simulate", "run"], "pass in MuJoCo"),
+    (["report", "run"], "run/report.html"),
+    (["reach-map", "run", "--spacing", "0.4", "--directions", "1"], NO_FIGURES),
+    (["compare", "run"], "front search"),
+    (["runs", "."], "run"),
+    (["doctor"], f"extra studies: {STUDIES.replace(' and ', ', ').replace(':', ' not installed:')}"),
+)
+WITH_EXTRAS: tuple[tuple[list[str], str], ...] = (  # their only line
+    (["optimize", "target-1"], f"optimize needs {STUDIES}"),
+    (["optimize", "target-1", "--proposer", "llm"], LLM),
+    (["optimize", "target-1", "--model", "openai-chat:gpt-4o"], LLM),
+    (["draft", "reach a shelf", "--model", "openai-chat:gpt-4o"], LLM),
+    (["experiment", "paper"], f"experiment needs {STUDIES}"),
+    (["prompt", "target-1"], f"prompt needs {STUDIES}"),
+    (["export", "run", "--format", "optuna"], f"--format optuna needs {STUDIES}"),
+    (["design", "target-1", "--no-figures", "--proposer", "rules"], f"--proposer rules needs {STUDIES}"),
+    (["datasheet", "run"], 'datasheet needs matplotlib: pip install "armwright[figures]"'),
+)
+
+
+@pytest.mark.slow
+def test_base_install_needs_no_extra_and_names_those_that_are_missing(in_folder: Path) -> None:
+    asked = (*WITHOUT_EXTRAS, *WITH_EXTRAS)
+    command = [sys.executable, "-m", "tests.support.base_install", json.dumps([arguments for arguments, _ in asked])]
+    done = subprocess.run(
+        command, capture_output=True, check=True, encoding="utf-8", env={**os.environ, "PYTHONPATH": str(ROOT)}
+    )
+    ended = json.loads(done.stdout)
+    for (arguments, expected), (code, output, errors) in zip(asked, ended, strict=True):
+        if (arguments, expected) in WITHOUT_EXTRAS:
+            assert code == 0, errors
+            assert expected in " ".join((output + errors).split()), arguments
+        else:
+            assert (code, errors.strip()) == (2, f"armwright: {expected}"), arguments

@@ -1,7 +1,6 @@
 """Recommended designs, verified in the simulator, in summaries and by the command."""
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -73,19 +72,11 @@ def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
     assert "1 of 1 pass" in shown
 
 
-def test_simulate_refuses_what_it_cannot_drive(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_simulate_refuses_what_it_cannot_drive(run: Path, tmp_path: Path) -> None:
     assert "has the designs 0 to" in refused(2, "simulate", run, "--design", "7")
     assert "use one of them" in refused(2, "simulate", run, "--design", "0", "--all")
     aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_init=1, n_total=1, verify=False, out=tmp_path)
     assert "has no cycle" in refused(2, "simulate", tmp_path)
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    assert 'pip install "armwright[sim]"' in refused(2, "simulate", run)
-
-
-def test_without_mujoco_designs_are_not_simulated(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _, history = read_run(run)
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    assert {one.status for one in recommend(history)} == {"not simulated"}
 
 
 def test_pick_states_which_perturbations_a_design_survives(run: Path) -> None:

@@ -10,7 +10,7 @@ from armwright.page.repeat_command import repeat_command
 from armwright.problem.checks.instant import check_instantly
 from armwright.runs.config import FrontMethod
 from armwright.spaces.design_space import builtin_spaces, default_space, load_space, paper_space
-from armwright.study.settings import run_config
+from armwright.study.run_settings import run_config
 from armwright.tasks.catalogue import builtin_names
 
 # A design of each, found by `armwright design`: base [m], joints, links [m], motors

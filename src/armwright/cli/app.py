@@ -24,6 +24,7 @@ from armwright.cli import (
 from armwright.cli.signals import INTERRUPTED, install_handlers
 from armwright.cli.streams import abandon_streams, claim_streams, print_error
 from armwright.exceptions import ArmwrightError
+from armwright.extras import naming_extras
 from armwright.user_code import open_closed_streams
 
 app = typer.Typer(
@@ -62,12 +63,16 @@ COMMANDS = {
 
 
 def _claiming_streams(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a command that claims the streams first, but after Typer printed help, which uses sys.stdout."""
+    """Return a command that claims the streams first, and names the extra that it lacks.
+
+    Not before Typer has printed help, which uses sys.stdout.
+    """
 
     @wraps(function)
     def command(*arguments: object, **options: object) -> None:
         claim_streams()
-        function(*arguments, **options)
+        with naming_extras(function.__name__.replace("_", "-")):
+            function(*arguments, **options)
 
     return command
 

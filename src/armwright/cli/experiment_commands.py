@@ -55,13 +55,13 @@ def experiment(
 
     The same command resumes; finished runs are kept.
     """
+    from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_files, show_outcome, show_plan
     from armwright.experiments import outcome, plan
     from armwright.experiments import runner as running
     from armwright.experiments.cells import plan_cells
     from armwright.experiments.tables import write_tables
     from armwright.llm.configuration import load_model_options
-    from armwright.pictures.comparison_figures import write_comparison_figures
 
     if print_:
         print_text(plan.builtin_text(name), end="")
@@ -83,6 +83,7 @@ def experiment(
     if print_commands:
         print_text("\n".join(cell.command for cell in due))
         return
+    drawing = can_draw(console, figures)
     failed: list[running.CellOutcome] = []
     try:
         outcome.write_plan(chosen, out)
@@ -94,9 +95,12 @@ def experiment(
         notes = notes_on_cells(skipped, failed)
         title = f"Experiment {chosen.name}"
         tables = write_tables(out, found, title, notes)
-        if figures:
+        drawn: list[Path] = []
+        if drawing:
+            from armwright.pictures.comparison_figures import write_comparison_figures
+
             console.print("drawing the figures")
-        drawn = write_comparison_figures(out, found, *chosen.drawn) if figures else []
+            drawn = write_comparison_figures(out, found, *chosen.drawn)
     except KeyboardInterrupt:
         exit_interrupted(console, f"every finished trial is in {out}/")
     if json_:
@@ -125,12 +129,12 @@ def compare(
     csv_: Csv = False,
 ) -> None:
     """Compare finished runs by method, task and seed: tables, intervals, tests."""
+    from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import show_comparison, show_files
     from armwright.cli.show_results import show_runs
     from armwright.experiments.compare_runs import compare_summaries
     from armwright.experiments.run_list import find_runs, list_runs, read_finished_runs
     from armwright.experiments.tables import tables, write_tables
-    from armwright.pictures.comparison_figures import write_comparison_figures
 
     console = open_console(check_formats(json_, csv_))
     places = folders or [Path("runs")]
@@ -150,8 +154,12 @@ def compare(
         show_comparison(console, comparison, title, notes)
     if out is not None:
         written = write_tables(out, comparison, title, notes)
-        with activity("drawing the figures"):
-            drawn = write_comparison_figures(out, comparison) if figures else []
+        drawn: list[Path] = []
+        if can_draw(console, figures):
+            from armwright.pictures.comparison_figures import write_comparison_figures
+
+            with activity("drawing the figures"):
+                drawn = write_comparison_figures(out, comparison)
         show_files(console, written, drawn)
 
 
@@ -183,6 +191,7 @@ def compare_arms(
     csv_: Csv = False,
 ) -> None:
     """Evaluate existing arms on TASK, and compare them with the designs of a run."""
+    from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import arm_rows, show_arms
     from armwright.existing.compare_arms import compare_arms, comparison_record
     from armwright.spaces.design_space import load_space
@@ -203,9 +212,13 @@ def compare_arms(
     drawn: list[Path] = []
     if run is not None and figures:
         from armwright.page.page import write_report
-        from armwright.pictures.figures import write_figures
 
-        with activity("drawing the page and the figures"):
-            drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
+        drawing = can_draw(open_console(json_ or csv_))
+        with activity("drawing the page and the figures" if drawing else "writing the page"):
+            drawn = [write_report(run)]
+            if drawing:
+                from armwright.pictures.figures import write_figures
+
+                drawn += [path for path in write_figures(run) if path.stem == "front"]
     if not print_records(json_, csv_, comparison_record(compared), arm_rows(compared)):
         show_arms(open_console(), compared, drawn)

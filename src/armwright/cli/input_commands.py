@@ -4,6 +4,7 @@ import os
 import shlex
 import sys
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -96,9 +97,10 @@ def check(
 ) -> None:
     """Check TASK and a design space: what they mean, what cannot work, and what was hardly meant."""
     from armwright.cli.check import check_files, run_check
+    from armwright.cli.notes import can_draw
 
     problem = load_problem(task, space, objectives=objectives)
-    drawn = (out or Path(f"{problem.task.name}-check.png")) if picture else None
+    drawn = (out or Path(f"{problem.task.name}-check.png")) if can_draw(open_console(json_), picture) else None
     run_check(open_console(), problem, check_files(task, space), deep, drawn, json_)
 
 
@@ -183,6 +185,9 @@ def draft(
     Nothing is run.
     """
     from armwright.cli.show_inputs import show_draft
+
+    if not print_prompt:
+        import_module("armwright.llm.client")  # names the extra `llm`, which brings all that follows
     from armwright.llm.configuration import load_model_options
     from armwright.llm.draft import Drafter, drafting_model
     from armwright.llm.draft_prompt import draft_prompt, draft_schema

@@ -1,12 +1,23 @@
-"""Notes on what a task holds and what its objectives leave out."""
+"""Notes on what a task holds, what its objectives leave out, and on figures that cannot be drawn."""
 
 import shlex
 from pathlib import Path
 
+from rich.console import Console
+
+from armwright.extras import install_command, missing_packages
 from armwright.problem.objectives import CLEARANCE_QUANTITIES, WORKSPACE_QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.task import Task
+
+
+def can_draw(console: Console, wanted: bool = True) -> bool:
+    """Return whether figures are wanted and can be drawn; print what to install if only the latter fails."""
+    missing = wanted and missing_packages("figures")
+    if missing:
+        console.print(f"no figures without {missing[0]}: {install_command('figures')}", soft_wrap=True)
+    return wanted and not missing
 
 
 def unused_parts(problem: Problem) -> list[str]:

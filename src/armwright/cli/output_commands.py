@@ -79,10 +79,12 @@ def export(
 
     Any design of the run can be exported, not only those of the front.
     """
+    from armwright.extras import naming_extras
     from armwright.proof.export import OPTUNA, export_design
 
     if format_ == OPTUNA:
-        from armwright.study.optuna_export import export_study
+        with naming_extras(f"--format {OPTUNA}"):
+            from armwright.study.optuna_export import export_study
 
         if design is not None:
             raise SettingsError(f"--design {design} does not go with --format optuna, which exports the whole run")

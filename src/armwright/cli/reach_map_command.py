@@ -16,7 +16,7 @@ from armwright.text import decimals, rounded
 if TYPE_CHECKING:
     from armwright.arrays import Array
     from armwright.kinematics.reach.reach_map import PoseCoverage
-    from armwright.pictures.reach_figure import MappedArm
+    from armwright.pictures.mapped_arm import MappedArm
 
 GRID, CONDITIONS = "Grid and directions", "Conditions"
 
@@ -70,10 +70,10 @@ def reach_map(
     json_: Json = False,
 ) -> None:
     """Map in which directions an arm can hold its tool at each point of a grid."""
+    from armwright.cli.notes import can_draw
     from armwright.kinematics.reach.reach_map import reach_map
     from armwright.page.page import write_report
     from armwright.page.reach_maps import MOST_POINTS, fingerprint
-    from armwright.pictures.reach_figure import write_reach_figure
     from armwright.proof.results import read_summary
 
     if not 0.0 < share <= 1.0:
@@ -106,8 +106,12 @@ def reach_map(
     number = f"{len(found.directions)} directions" if len(found.directions) > 1 else "one direction"
     texts = {"directions_text": f"{number} {around}", "conditions": mapped.conditions}
     found.save(file, arm=fingerprint(mapped.arm), **texts)
-    files = [file, file.with_suffix(".png")]
-    write_reach_figure(found, mapped, share, files[1])
+    files = [file]
+    if can_draw(open_console(json_)):
+        from armwright.pictures.reach_figure import write_reach_figure
+
+        files.append(file.with_suffix(".png"))
+        write_reach_figure(found, mapped, share, files[1])
     is_shown = len(found.points) <= MOST_POINTS
     if run is not None and is_shown and read_summary(run) is not None:
         files.append(write_report(run))
@@ -148,7 +152,7 @@ def _subject(
     source: str, design: int | None, tip: str | None, task: str | None, conditions: str
 ) -> "tuple[MappedArm, Path, Path | None]":
     """Return the arm of a run or of a URDF, the file of its map, and the run."""
-    from armwright.pictures.reach_figure import MappedArm
+    from armwright.pictures.mapped_arm import MappedArm
     from armwright.proof.selection import pick
     from armwright.robot.robot_descriptions import find_urdf
     from armwright.robot.urdf_reader import read_urdf

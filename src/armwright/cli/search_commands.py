@@ -73,6 +73,7 @@ def design(
     The same command with a larger --budget or --evaluations continues the search.
     """
     started = time.monotonic()
+    from armwright.cli.notes import can_draw
     from armwright.cli.progress import search_progress
     from armwright.cli.show_results import show_search
     from armwright.study.front.front_run import find_front
@@ -80,7 +81,8 @@ def design(
     from armwright.study.front.time_plan import TimePlan
 
     console = open_console(json_)
-    plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=figures, started=started)
+    drawing = can_draw(console, figures)
+    plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=drawing, started=started)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
     folder = out or Path("runs") / f"{problem.task.name}-design-seed{seed}"
     _begin(console, problem, task, space, folder)
@@ -95,7 +97,7 @@ def design(
                 out=folder,
                 watch=watch,
             )
-        drawn = _draw(folder) if figures else []
+        drawn = _draw(folder, drawing) if figures else []
     except KeyboardInterrupt:
         exit_interrupted(console, f"the search is saved in {folder}/")
     if json_:
@@ -180,13 +182,12 @@ def optimize(
 
     The same command resumes or shows the run; a larger --n-total extends it.
     """
-    from armwright.cli.notes import design_note
+    from armwright.cli.notes import can_draw, design_note
     from armwright.cli.progress import study_progress
     from armwright.cli.show_results import show_result
     from armwright.llm.configuration import load_model_options
     from armwright.proposers.factory import choose_proposer
     from armwright.spaces.design_file import read_design
-    from armwright.study.study import optimize as run_study
 
     console = open_console(json_)
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
@@ -199,6 +200,9 @@ def optimize(
     problem = load()
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     choice = choose_proposer(proposer, given)
+    from armwright.study.study import optimize as run_study  # the extra `llm`, if it is missing, was named
+
+    drawing = can_draw(console, figures)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
     is_method_chosen = proposer != "auto" or model is not None or sampler != "auto"
@@ -232,7 +236,7 @@ def optimize(
         finished_before = run.resumed == len(run.trials)
         if figures and not finished_before:
             console.print("drawing the page and the figures")
-        drawn = _draw(folder) if figures else []
+        drawn = _draw(folder, drawing) if figures else []
     except (KeyboardInterrupt, StoppedError):
         exit_interrupted(console, f"every finished trial is in {folder}/" if folder.exists() else "nothing was started")
     except AnswerPendingError as pending:
@@ -268,10 +272,9 @@ def _begin(console: "Console", problem: "Problem", task: str, space: Path | None
     check_before_search(console, problem, check_files(task, space), folder)
 
 
-def _draw(folder: Path) -> list[Path]:
-    """Return the figures of a finished run; draw them and the page if they are missing."""
+def _draw(folder: Path, drawing: bool) -> list[Path]:
+    """Return the figures of a finished run; make the page, and if `drawing` the figures, if they are missing."""
     from armwright.page.page import write_report
-    from armwright.pictures.figures import write_figures
     from armwright.proof.results import FIGURES, REPORT
     from armwright.runs.folder import RunFolder
 
@@ -279,4 +282,8 @@ def _draw(folder: Path) -> list[Path]:
         existing = sorted((folder / FIGURES).glob("*.png"))
         if not (folder / REPORT).is_file():
             write_report(folder)
-        return existing or write_figures(folder)
+        if existing or not drawing:
+            return existing
+        from armwright.pictures.figures import write_figures
+
+        return write_figures(folder)

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
@@ -13,7 +13,6 @@ from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.existing.compare_arms import ArmComparison, ComparedArm
 from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_runs import Comparison
-from armwright.experiments.runner import CellOutcome
 from armwright.experiments.tables import markdown, remarks_on, sections
 from armwright.extras import install_command, missing_packages
 from armwright.llm.servers import describe_server
@@ -23,6 +22,9 @@ from armwright.sheet.record import NOT_MODELLED
 from armwright.study.workers.cluster import Workers
 from armwright.tasks.moments import MAX_MASS
 from armwright.text import rounded
+
+if TYPE_CHECKING:
+    from armwright.experiments.runner import CellOutcome
 
 
 def show_plan(
@@ -46,7 +48,7 @@ def show_plan(
         console.print(f"{len(with_model)} of them ask {models} for about {proposals:,} proposals in total")
 
 
-def notes_on_cells(skipped: Sequence[Skipped], failed: Sequence[CellOutcome]) -> list[str]:
+def notes_on_cells(skipped: Sequence[Skipped], failed: "Sequence[CellOutcome]") -> list[str]:
     """Return a line for each method and reason of skipped cells, and one for each failure."""
     reasons = Counter((one.cell.plan.label, one.reason) for one in skipped)
     notes = [
@@ -56,7 +58,7 @@ def notes_on_cells(skipped: Sequence[Skipped], failed: Sequence[CellOutcome]) ->
     return notes + [f"FAILED: {outcome.cell.description}: {outcome.fault}" for outcome in failed]
 
 
-def show_outcome(console: Console, outcome: CellOutcome, number: int, of: int) -> None:
+def show_outcome(console: Console, outcome: "CellOutcome", number: int, of: int) -> None:
     """Print the outcome of a cell."""
     if outcome.fault:
         console.print(f"[{number}/{of}] FAILED: {outcome.cell.description}: {outcome.fault}")

@@ -25,6 +25,9 @@ from armwright.text import percent, rounded
 if TYPE_CHECKING:
     from armwright.llm.draft import Draft
 
+if TYPE_CHECKING:
+    from armwright.llm.draft import Draft
+
 MAX_ROWS = 40  # of a table of targets
 
 

@@ -27,13 +27,13 @@ def simulate(
     json_: Json = False,
     csv_: Csv = False,
 ) -> None:
-    """Drive designs of RUN through their cycle in MuJoCo (extra sim), and say which pass.
+    """Drive designs of RUN through their cycle in MuJoCo, and say which pass.
 
     If a recommended design fails, the next one is tried.
     """
     import json
 
-    from armwright.pictures.simulation_figure import write_simulation_figure
+    from armwright.cli.notes import can_draw
     from armwright.proof.results import SUMMARY, read_summary
     from armwright.proof.simulated_run import Simulator
     from armwright.proof.simulation_files import SIMULATION, simulation_record, write_simulated
@@ -60,7 +60,9 @@ def simulate(
         if choice and summary is not None:
             summary["recommended"] = choice
             folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
-        for member in () if all_ else members:
+        for member in members if not all_ and can_draw(open_console(json_ or csv_)) else ():
+            from armwright.pictures.simulation_figure import write_simulation_figure
+
             write_simulation_figure(run, history.member(member.result.design).arm, member)
     if json_:
         print_json(record)

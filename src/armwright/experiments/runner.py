@@ -21,7 +21,8 @@ from armwright.search.samplers import sampler_factory, sampler_for
 from armwright.spaces.design_space import default_space, load_space
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.study.front.front_run import find_front
-from armwright.study.settings import run_config, study_method
+from armwright.study.run_settings import run_config
+from armwright.study.settings import study_method
 from armwright.study.study import optimize
 from armwright.study.workers.cluster import MAX_LOSSES, Cluster, Finished, Workers
 from armwright.tasks.catalogue import load_task

@@ -8,6 +8,7 @@ from typing import Any
 
 from armwright.exceptions import ArmwrightError
 from armwright.existing.compare_arms import EXISTING_ARMS
+from armwright.extras import naming_extras
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
 from armwright.page.content import RunContent, design_files
 from armwright.proof.results import REPORT, SUMMARY
@@ -19,8 +20,6 @@ from armwright.runs.control import (
 )
 from armwright.runs.folder import CONFIG, REACH_MAPS, is_held, read_config
 from armwright.runs.trials_file import TRIALS
-from armwright.sheet.design_sheet import design_sheet
-from armwright.sheet.html import to_html
 
 BESIDE = (REACH_MAPS, EXISTING_ARMS, REPORT)  # what commands beside the run add to the page; they end with the report
 WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL, *BESIDE)
@@ -68,6 +67,9 @@ class LiveRun:
             if self._content is None or number >= len(self._content.history):
                 return None
             if kind == "datasheet":
+                with naming_extras("a data sheet"):
+                    from armwright.sheet.design_sheet import design_sheet
+                    from armwright.sheet.html import to_html
                 return to_html(design_sheet(self.folder, number))
             return design_files(self._content.history, number).get(kind)
 

@@ -13,45 +13,18 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from armwright.arrays import Array
 from armwright.files import naming_write_errors
 from armwright.kinematics.reach.reach_map import PoseCoverage, ReachMap
 from armwright.pictures.drawing import legend_below, legend_mark, save_figure, several_panels
+from armwright.pictures.mapped_arm import MappedArm
 from armwright.pictures.style import FRONT, OBSTACLE, RC, TARGET
 from armwright.robot.arm import Arm
-from armwright.robot.urdf_reader import UrdfArm
 from armwright.tasks.obstacles import Obstacle
-from armwright.tasks.task import Task
 
 COLOURS = "viridis"
 POSITION_ONLY = "#E3E3E8"  # points reached in none of the directions
 FINE = 300  # cells along the longer side, for obstacles
 PANEL = 4.2  # [inch]
-
-
-@dataclass(frozen=True)
-class MappedArm:
-    """An arm whose reach is mapped, and the task around it."""
-
-    title: str
-    arm: Arm | UrdfArm
-    task: Task | None = None  # whose obstacles and targets are drawn
-    conditions: str = ""  # that usable poses satisfy, in words
-
-    @property
-    def body(self) -> Arm:
-        """The arm itself."""
-        return self.arm.arm if isinstance(self.arm, UrdfArm) else self.arm
-
-    @property
-    def targets(self) -> Array | None:
-        """(T, 3) targets [m]; the horizontal slice is at their mean height."""
-        return None if self.task is None else self.task.target_positions
-
-    @property
-    def obstacles(self) -> Sequence[Obstacle]:
-        """The obstacles of the task."""
-        return () if self.task is None else self.task.obstacles
 
 
 @dataclass(frozen=True)

@@ -123,9 +123,6 @@ def evaluate_survival(history: History, designs: Mapping[int, bool]) -> dict[int
     Args:
         history: The trials.
         designs: Trial numbers of feasible designs, and whether to simulate the changes of all their assumed values.
-
-    Raises:
-        MissingExtraError: MuJoCo is not installed, but a design should be simulated.
     """
     problem, numbers = history.problem, list(designs)
     if not problem.constraints or not numbers:

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import MissingExtraError, SettingsError
+from armwright.exceptions import SettingsError
 from armwright.problem.objectives import DEFLECTION, ORIENTATION_ERROR, POSITION_ERROR, PRICE, TORQUE
 from armwright.proof.perturbations import FACTORS, Survival, evaluate_survival
 from armwright.proof.ranking import knee_first
@@ -103,7 +103,7 @@ def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str,
 def recommend(
     history: History, simulator: Simulator | None = None, has_time: HasTime = unlimited
 ) -> list[Recommendation]:
-    """Return the recommended designs: simulated, unless MuJoCo, a cycle or its durations are missing.
+    """Return the recommended designs: simulated, unless a cycle or its durations are missing.
 
     With a custom evaluator neither our simulation nor our perturbations say what it would measure.
 
@@ -118,7 +118,7 @@ def recommend(
     try:
         simulator = simulator or Simulator(history)
         chosen = [_verified(role, numbers, simulator, has_time, len(roles)) for role, numbers in roles.items()]
-    except (MissingExtraError, SettingsError):
+    except SettingsError:
         chosen = [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in roles.items()]
     verified = {one.design: one.status == VERIFIED for one in chosen}
     if not has_time(0, len(verified)):

@@ -7,7 +7,7 @@ from armwright.kinematics.cycle.trajectory import Trajectory
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
 from armwright.proof.cycle_export import MODEL, TRAJECTORY, cycle_files, read_trajectory
-from armwright.proof.simulation import Drive, Limits, SimulatedDesign, mujoco_version, read_limits, simulate_design
+from armwright.proof.simulation import Drive, Limits, SimulatedDesign, read_limits, simulate_design
 from armwright.robot.arm import Arm
 from armwright.runs.history import History
 
@@ -35,14 +35,12 @@ class Simulator:
     """Simulate designs of a history, each at most once.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
         SettingsError: The task has no cycle.
     """
 
     def __init__(self, history: History) -> None:
         if history.problem.task.cycle is None:
             raise SettingsError(f"task {history.problem.task.name} has no cycle to simulate; try cycle: in_order")
-        mujoco_version()
         self.history = history
         self.members: dict[int, SimulatedMember] = {}
 
@@ -65,7 +63,6 @@ def simulate_arm(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, n
         number: Number of its design.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
         SettingsError: A duration of its steps is not known.
     """
     files = dict(cycle_files(problem, arm, evaluation, row, f"{problem.task.name}-{number}"))

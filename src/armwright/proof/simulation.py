@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.extras import check_extra, requires_extra
 from armwright.kinematics.cycle.trajectory import PERIOD, Trajectory
 from armwright.proof.simulation_model import NOTHING, TIMESTEP
 
@@ -122,9 +121,8 @@ class SimulatedDesign:
 
 
 def mujoco_version() -> str:
-    """Return the version of MuJoCo; MissingExtraError without it."""
-    with requires_extra("sim", "the simulation"):
-        return str(import_module("mujoco").__version__)
+    """Return the version of MuJoCo."""
+    return str(import_module("mujoco").__version__)
 
 
 def drive(model_xml: str, trajectory: Trajectory, target_names: tuple[str, ...], feed_forward: bool = True) -> Drive:
@@ -137,7 +135,6 @@ def drive(model_xml: str, trajectory: Trajectory, target_names: tuple[str, ...],
         feed_forward: Whether the drives are given the torques of the trajectory. Without them, servos alone hold the
             positions.
     """
-    check_extra("sim", "the simulation")
     return _Driver(model_xml, trajectory, target_names, feed_forward).run()
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from armwright.exceptions import SettingsError, did_you_mean
@@ -55,6 +56,8 @@ def choose_proposer(name: str = "auto", options: ModelOptions | None = None) -> 
     if kind in WITH_PLACE and not place:
         raise SettingsError(f"--proposer {kind} needs a {'run' if kind == 'replay' else 'folder'}: {kind}:PATH")
     configured = configured_model(options) if kind in ("auto", "llm") else None
+    if configured is not None or kind == "llm":
+        import_module("armwright.llm.client")  # names the extra `llm`, which brings all that follows
     if configured is None and kind == "llm":
         raise SettingsError(
             "--proposer llm needs a language model: give --model openai-chat:gpt-4o (with its key in the environment), "

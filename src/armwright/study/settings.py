@@ -1,23 +1,21 @@
 """Settings of a study, checked."""
 
 import math
-import operator
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from armwright.exceptions import SettingsError
 from armwright.problem.problem import Problem
 from armwright.proposers.factory import choose_proposer
 from armwright.proposers.proposer import Proposer
-from armwright.runs.config import FrontMethod, Method, RunConfig, record_objectives, versions
+from armwright.runs.config import Method
 from armwright.search.samplers import SamplerFactory, sampler_name
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
+from armwright.study.run_settings import check_integer
 from armwright.study.workers.cluster import Workers
 
-MAX_INTEGER = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")
 
 
@@ -64,22 +62,6 @@ def study_method(
     )
 
 
-def run_config(problem: Problem, method: Method | FrontMethod, seed: int) -> RunConfig:
-    """Return the settings of a new run."""
-    return RunConfig(
-        task=problem.task,
-        space=problem.space,
-        tolerance=problem.tolerance,
-        device=problem.device,
-        objectives=record_objectives(problem.objectives),
-        reference_point=problem.reference_point,
-        method=method,
-        seed=check_integer("seed", seed, 0),
-        evaluator=None if problem.evaluator is None else problem.evaluator.name,
-        versions=versions(problem.evaluator),
-    )
-
-
 def check_proposer(proposer: str | Proposer | None) -> Proposer | None:
     """Return the proposer of a name, or the given one."""
     if isinstance(proposer, str):
@@ -109,14 +91,3 @@ def _check_timeout(problem: Problem, timeout: float | None) -> None:
         raise SettingsError("evaluation_timeout ends custom evaluators; without --evaluator leave it out")
     if sys.platform == "win32":
         raise SettingsError("evaluation_timeout needs Linux or macOS; leave it out")
-
-
-def check_integer(name: str, value: Any, least: int) -> int:
-    """Return the value as an int; SettingsError unless it is an integer from `least` on."""
-    try:
-        number = operator.index(value)  # accepts the integers of numpy
-    except TypeError:
-        number = -1
-    if isinstance(value, bool) or not least <= number <= MAX_INTEGER:
-        raise SettingsError(f"{name}: expected a whole number from {least} to {MAX_INTEGER}, got {value!r}")
-    return number

@@ -18,7 +18,8 @@ from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.spaces.parameters import Design
 from armwright.study.loop import Study
 from armwright.study.progress import Progress, StudyResult
-from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, run_config, study_method
+from armwright.study.run_settings import run_config
+from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, study_method
 from armwright.study.workers.cluster import Workers
 
 

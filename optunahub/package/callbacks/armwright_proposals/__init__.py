@@ -11,7 +11,7 @@ except ModuleNotFoundError as missing:
     if missing.name != "armwright":
         raise
     raise ModuleNotFoundError(
-        'armwright is missing: pip install "armwright[llm]" (without [llm] for the rules alone)',
+        'armwright is missing: pip install "armwright[llm]" ([studies] for the rules alone)',
         name=missing.name,
     ) from missing
 

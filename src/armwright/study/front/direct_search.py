@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array, open_arrays
-from armwright.exceptions import MissingExtraError, RunFolderError, SettingsError
+from armwright.exceptions import RunFolderError, SettingsError
 from armwright.kinematics.ik.ik import MANY_ARMS
 from armwright.pareto import PENALTY
 from armwright.problem.problem import Problem
@@ -330,7 +330,7 @@ class DirectSearch:
         if not history.front:
             return ResultCosts(design)
         started, number = self.plan.elapsed, history.front[0].number
-        with suppress(MissingExtraError, SettingsError):  # such designs are not simulated later, either
+        with suppress(SettingsError):  # such designs are not simulated later, either
             Simulator(history)(number)
         simulated = self.plan.elapsed
         evaluate_survival(history, {number: False})

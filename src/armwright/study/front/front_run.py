@@ -23,7 +23,7 @@ from armwright.runs.trial import FinishedTrial
 from armwright.study.front.direct_search import DirectSearch, FrontRun
 from armwright.study.front.search_budget import SearchBudget, SearchProgress
 from armwright.study.front.time_plan import TimePlan
-from armwright.study.settings import run_config
+from armwright.study.run_settings import run_config
 
 
 def find_front(
