@@ -54,7 +54,7 @@ if __name__ == "__main__":
 # What needs an extra, and which; all of them are asked for where the run folder "front" is.
 NEEDS_OF_BASE = (
     ("figures", "datasheet", "front"),
-    ("live", "live", "front"),
+    ("live", "report", "--live", "front"),
     ("studies", "optimize", "target-1", "--out", "other"),
     ("studies", "experiment", "paper", "--out", "other"),
     ("studies", "export", "front", "--format", "optuna"),
@@ -63,7 +63,7 @@ NEEDS_OF_BASE = (
     ("arms", "compare-arms", "target-1", "ur5e"),
 )
 NEEDS = (
-    ("live", "live", "run"),
+    ("live", "report", "--live", "run"),
     ("live", "optimize", "target-1", "--live", "--out", "other"),
     ("llm", "optimize", "target-1", "--model", "openai-chat:gpt-4o", "--out", "other"),
     (
@@ -124,7 +124,7 @@ def base() -> None:
     assert "in MuJoCo" in armwright("simulate", "front").stdout
     armwright("report", "front")
     armwright("check", "target-1")
-    armwright("runs", ".")
+    armwright("compare", "--list", ".")
     assert len(json.loads(armwright("tasks", "--json").stdout)) > 30
     armwright("actuators")
     armwright("init", "mine.yaml")
@@ -148,7 +148,7 @@ def studies() -> None:
     assert told
     armwright("compare", "cells", "--out", "compared")
     armwright("optimize", "mine.yaml", "--n-total", "10", "--no-figures", "--robust", "--space", "slideopt")
-    armwright("prompt", "target-1")
+    armwright("optimize", "target-1", "--print-prompt", "next")
     armwright(
         "optimize", "target-1", "--proposer", "manual:asked", "--model-options", "{wait: false}", "--out", "by-hand"
     )

@@ -124,7 +124,7 @@ WITHOUT_EXTRAS: tuple[tuple[list[str], str], ...] = (  # what each command print
     (["report", "run"], "run/report.html"),
     (["reach-map", "run", "--spacing", "0.4", "--directions", "1"], NO_FIGURES),
     (["compare", "run"], "front search"),
-    (["runs", "."], "run"),
+    (["compare", "--list", "."], "run"),
     (["doctor"], f"extra studies: {STUDIES.replace(' and ', ', ').replace(':', ' not installed:')}"),
 )
 WITH_EXTRAS: tuple[tuple[list[str], str], ...] = (  # their only line
@@ -133,9 +133,8 @@ WITH_EXTRAS: tuple[tuple[list[str], str], ...] = (  # their only line
     (["optimize", "target-1", "--model", "openai-chat:gpt-4o"], LLM),
     (["draft", "reach a shelf", "--model", "openai-chat:gpt-4o"], LLM),
     (["experiment", "paper"], f"experiment needs {STUDIES}"),
-    (["prompt", "target-1"], f"prompt needs {STUDIES}"),
+    (["optimize", "target-1", "--print-prompt", "next"], f"optimize needs {STUDIES}"),
     (["export", "run", "--format", "optuna"], f"--format optuna needs {STUDIES}"),
-    (["design", "target-1", "--no-figures", "--proposer", "rules"], f"--proposer rules needs {STUDIES}"),
     (["datasheet", "run"], 'datasheet needs matplotlib: pip install "armwright[figures]"'),
 )
 
