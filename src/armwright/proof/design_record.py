@@ -21,6 +21,7 @@ from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.facts import Fact, Facts, alike, as_json, facts_of, reach_facts
+from armwright.problem.objectives import QUANTITIES
 from armwright.problem.over_reach import reach_lines
 from armwright.problem.unreached_reason import unreached_reason
 from armwright.proof.cycle_export import cycle_files, trajectory_of
@@ -104,7 +105,7 @@ def read_records(folder: Path, history: History, numbers: Sequence[int]) -> dict
             record = DesignRecord.model_validate_json(text)
         except ValueError:  # none, or a damaged one; pydantic's errors included
             continue
-        if record.number == number and _is_of(record, history):
+        if _is_of(record, history, number):
             found[number] = record
     return found | compute_records(history, [number for number in numbers if number not in found])
 
@@ -132,9 +133,11 @@ def compute_facts(history: History, numbers: Sequence[int]) -> dict[int, Facts]:
     return found
 
 
-def _is_of(record: DesignRecord, history: History) -> bool:
-    """Return whether a record is of this history's design, whose number another design may have had."""
-    return (record.model_extra or {}).get("params") == dict(history.trials[record.number].design.params)
+def _is_of(record: DesignRecord, history: History, number: int) -> bool:
+    """Return whether a record is of this design, whose number another may have had, and has all quantities of today."""
+    params = (record.model_extra or {}).get("params")
+    is_design = record.number == number and params == dict(history.trials[number].design.params)
+    return is_design and record.facts.keys() >= QUANTITIES.keys()
 
 
 def _alike(history: History, numbers: Sequence[int]) -> list[list[int]]:
