@@ -3,14 +3,12 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import armwright as aw
 from armwright.editor.app import MAX_BODY
 from tests.support.editor import ServedEditor, served_editor
-from tests.support.live_server import ask
 
 POSTS = ("/assess", "/points", "/save", "/design", "/stop")
 
@@ -25,16 +23,6 @@ def editor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ServedEd
 def texts(editor: ServedEditor) -> dict[str, str]:
     opened = json.loads(editor.get("/opened")[1])
     return {"task": opened["task"], "space": opened["space"]}
-
-
-def right_body(editor: ServedEditor, path: str) -> dict[str, Any]:
-    return {
-        "/assess": texts(editor),
-        "/points": {"text": "1,2,3"},
-        "/save": texts(editor),
-        "/design": {**texts(editor), "seconds": 5},
-        "/stop": {},
-    }[path]
 
 
 def test_edits_are_applied_assessed_and_saved(editor: ServedEditor) -> None:
@@ -56,24 +44,6 @@ def test_a_search_needs_a_valid_task_and_writes_nothing_without(editor: ServedEd
     assert (status, b"my-task.yaml" in reason) == (400, True)
     assert not editor.task.exists()
     assert json.loads(editor.get("/job")[1]) is None
-
-
-@pytest.mark.parametrize("path", POSTS)
-def test_only_the_page_itself_changes_anything(editor: ServedEditor, path: str) -> None:
-    body = right_body(editor, path)
-    for refused, headers in (
-        (403, {"X_Armwright_Key": ""}),
-        (403, {"X_Armwright_Key": editor.key[:-1]}),
-        (403, {"Origin": ""}),
-        (403, {"Origin": "http://evil.example"}),
-        (403, {"Origin": f"http://localhost:{editor.port}"}),
-        (415, {"Content_Type": "text/plain"}),
-        (421, {"Host": "evil.example"}),
-    ):
-        assert editor.post(path, body, **headers)[0] == refused
-        assert not editor.task.exists()
-    assert editor.get(path)[0] == 405
-    assert ask(editor.port, "OPTIONS", path, X_Armwright_Key=editor.key)[0] == 405
 
 
 @pytest.mark.parametrize(

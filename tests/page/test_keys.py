@@ -96,6 +96,32 @@ def test_every_address_but_the_shell_needs_the_key(server: Server) -> None:
         assert ask(server.port, "GET", path)[0] == 403
 
 
+def test_only_the_page_itself_is_served(server: Server, tmp_path: Path) -> None:
+    """With DNS rebinding, the browser considers page and server one site."""
+    own = f"127.0.0.1:{server.port}"
+    right = {"Origin": f"http://{own}", "Content_Type": "application/json", "X_Armwright_Key": server.key}
+    before = files(tmp_path)
+    # Without a search, the editor has no page of a run.
+    posts = [r.path for r in server.routes if "POST" in (r.methods or ()) and not r.path.startswith("/run/")]
+    foreign = ("null", "http://evil.example", f"http://localhost:{server.port}", f"https://{own}")
+    hosts = ("evil.example", f"evil.example:{server.port}", "127.0.0.1", f"127.0.0.1:{server.port + 1}")
+    assert posts
+    for path in posts:
+        for status, changes in (
+            *((403, {"Origin": origin}) for origin in foreign),
+            (415, {"Content_Type": "text/plain"}),
+            *((421, {"Host": host, "Origin": f"http://{host}"}) for host in hosts),
+        ):
+            assert ask(server.port, "POST", path, b"{}", **(right | changes))[0] == status, (path, changes)
+        assert ask(server.port, "POST", path, b"{}", X_Armwright_Key=server.key)[0] == 403
+        for method in ("GET", "OPTIONS"):
+            assert ask(server.port, method, path, **right)[0] == 405
+    for host in hosts:
+        assert ask(server.port, "GET", "/", Host=host)[0] == 421
+    assert ask(server.port, "GET", "/", Host=f"localhost:{server.port}")[0] == 200
+    assert files(tmp_path) == before
+
+
 def test_no_websocket_is_opened(server: Server) -> None:
     own = (f"127.0.0.1:{server.port}", f"http://127.0.0.1:{server.port}")
     for host, origin in (own, ("evil.example", own[1]), (own[0], "http://evil.example"), (own[0], "null")):
@@ -122,6 +148,10 @@ def test_headers_of_proxies_change_nothing(server: Server) -> None:
     own = f"127.0.0.1:{server.port}"
     assert ask(server.port, "POST", path, body, Origin=f"http://{own}", **right, **forged)[0] == 204
     assert ask(server.port, "POST", path, body, Origin=f"https://{own}", **right, **forged)[0] == 403
+
+
+def files(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def history(tab: Tab) -> list[str]:
@@ -215,8 +245,8 @@ def neighbour() -> Iterator[tuple[str, list[dict[str, str]]]]:
         there.shutdown()
 
 
-STEAL = """async ([home, paths]) => {
-    const got = [];
+STEAL = """async ([home, paths, posts]) => {
+    const got = [], body = '{"action":"pause"}';
     const attempt = async (what) => {
         try { got.push(String(await what())); } catch (fault) { got.push(fault.name); } };
     const loads = (element) => new Promise((done) => {
@@ -227,6 +257,18 @@ STEAL = """async ([home, paths]) => {
         await attempt(async () => (await fetch(home + path, { headers: { 'x-armwright-key': 'x' } })).text());
         await attempt(async () => (await fetch(home + path, { mode: 'no-cors', credentials: 'include' })).type);
         await attempt(() => loads(Object.assign(document.createElement('script'), { src: home + path })));
+    }
+    for (const path of posts) {
+        for (const headers of [{ 'Content-Type': 'application/json', 'X-Armwright-Key': 'x' }, {}]) {
+            const mode = 'Content-Type' in headers ? 'cors' : 'no-cors';
+            await attempt(async () => (await fetch(home + path, { method: 'POST', body, headers, mode })).text());
+        }
+        await attempt(() => new Promise((done) => {
+            const target = document.createElement('iframe'), form = document.createElement('form');
+            target.name = form.target = path; target.onload = () => done('sent');
+            Object.assign(form, { method: 'POST', action: home + path, enctype: 'text/plain' });
+            form.innerHTML = `<input name='{"action":"pause","x":"' value='"}'>`;
+            document.body.append(target, form); form.submit(); }));
     }
     await attempt(() => JSON.stringify([sessionStorage, localStorage, document.cookie]));
     await attempt(() => document.referrer);
@@ -241,7 +283,7 @@ STEAL = """async ([home, paths]) => {
 
 
 def test_a_page_on_another_port_gets_neither_key_nor_data(
-    server: Server, browser: Browser, neighbour: tuple[str, list[dict[str, str]]]
+    server: Server, browser: Browser, tmp_path: Path, neighbour: tuple[str, list[dict[str, str]]]
 ) -> None:
     """Ports share cookies, so only what belongs to an origin can be kept from the servers of other users."""
     address, got = neighbour
@@ -250,8 +292,10 @@ def test_a_page_on_another_port_gets_neither_key_nor_data(
     wait(tab, server)
     other = tab.context.new_page()
     other.goto(address)
-    paths = [route.path[1:] for route in server.routes if "GET" in (route.methods or ())]
-    stolen: list[Any] = other.evaluate(STEAL, [f"http://127.0.0.1:{server.port}/", paths])
+    before = files(tmp_path)
+    home = f"http://127.0.0.1:{server.port}/"
+    paths, posts = ([r.path[1:] for r in server.routes if method in (r.methods or ())] for method in ("GET", "POST"))
+    stolen: list[Any] = other.evaluate(STEAL, [home, paths, posts])
     # The user leaves our page for the other one, in the same tab and from a link.
     tab.page.on("dialog", lambda dialog: dialog.accept())
     tab.page.evaluate(
@@ -260,7 +304,8 @@ def test_a_page_on_another_port_gets_neither_key_nor_data(
         address,
     )
     expect(tab.page).to_have_title("neighbour")
-    stolen += tab.page.evaluate(STEAL, [f"http://127.0.0.1:{server.port}/", paths])
+    stolen += tab.page.evaluate(STEAL, [home, paths, posts])
+    assert files(tmp_path) == before
     for text in (*stolen, *(str(headers) for headers in got)):
         assert server.key not in text
         assert MARK not in text
@@ -295,3 +340,4 @@ def test_no_log_holds_the_key(served: tuple[Path, int, str], in_folder: Path, co
             connection.recv(64)
         process.send_signal(signal.SIGINT)
         assert process.communicate(timeout=PATIENCE) == ("", "")
+    assert process.returncode == 0
