@@ -19,7 +19,6 @@ from armwright.experiments.cells import plan_cells
 from armwright.experiments.plan import load_experiment
 from armwright.llm.transcript import Transcript
 from armwright.proof.results import read_summary
-from armwright.runs.folder import read_config
 from armwright.spaces.design_space import load_space
 from armwright.tasks.catalogue import load_task
 from armwright.yaml_documents import MAX_BYTES
@@ -130,25 +129,6 @@ def test_damaged_summary_is_made_again(run: Path, place: tuple[str, ...], value:
     (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     assert read_summary(run) is None
     looked_at(run)
-
-
-def remove_setting(run: Path, field: str) -> None:
-    text = (run / "config.yaml").read_text(encoding="utf-8")
-    assert f"    {field}: " in text
-    lines = [line for line in text.splitlines() if not line.startswith(f"    {field}: ")]
-    (run / "config.yaml").write_text("\n".join(lines), encoding="utf-8")
-
-
-@pytest.mark.parametrize("field", ["memory", "answer", "name"])
-def test_config_without_a_proposer_setting_is_refused(run: Path, field: str) -> None:
-    remove_setting(run, field)
-    with pytest.raises(RunFolderError, match=field):
-        read_config(run)
-
-
-def test_config_without_a_prompt_is_read(run: Path) -> None:
-    remove_setting(run, "prompt")
-    assert read_config(run).study.proposer is not None
 
 
 @pytest.mark.parametrize("value", ["x", "llm-", "llm-x", "llm-9999999999", "-1\n"])

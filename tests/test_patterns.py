@@ -21,7 +21,7 @@ SEARCHES = {"search", "sub", "subn", "findall", "finditer", "split"}
 LETTERS = 30_000  # of a text: some milliseconds in linear time, a minute in quadratic time
 SECONDS = 1.0  # of CPU time
 ENDS = ("\0", "\n", '"', "x")
-TRIES = 100
+TRIES = 50
 
 
 class Pattern(NamedTuple):
@@ -98,8 +98,7 @@ def test_pattern_reads_long_repetitions_in_time(pattern: Pattern) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        r"([\w-]*)(?:\*{2,}|\.{3,}|…)([\w-]*)", r"\s*(\d+\.?\d*)\s*(\S.*?)?\s*x", r"(?:a+b?)+c", r'//[^"\n]*$',
-        r"\d+x", r"JOINTS:\s*\w*\s*\w*;", r"\s+$",
+        r"([\w-]*)(?:\*{2,}|\.{3,}|…)([\w-]*)", r"(?:a+b?)+c", r'//[^"\n]*$', r"JOINTS:\s*\w*\s*\w*;",
     ],
 )  # fmt: skip
 def test_pattern_that_takes_quadratic_time_is_noticed(text: str) -> None:

@@ -100,7 +100,7 @@ def test_evaluator_that_swallows_interrupts_is_named_and_ended(in_folder: Path, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("evaluator", [STUBBORN, HOLDS_LOCK], indirect=True)
+@pytest.mark.parametrize("evaluator", [HOLDS_LOCK], indirect=True)
 def test_second_interrupt_ends_an_evaluator_at_once(in_folder: Path, evaluator: tuple[str, ...]) -> None:
     with begun(*STUDY, in_folder / "run", *evaluator, until="begun") as process:
         process.send_signal(signal.SIGINT)

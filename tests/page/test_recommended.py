@@ -107,27 +107,6 @@ def test_cards_state_what_the_kernels_compute(
     assert stated["Thermal utilisation"] == f"{100 * value('thermal_utilisation'):.3g} % of allowed"
 
 
-def test_every_quantity_of_a_card_is_explained(run: Path, tab: Tab) -> None:
-    tab.open(run / "report.html")
-    card = tab.page.locator(".card").first
-    assert card.locator("dt details.why").count() == card.locator("dt").count()
-    sentences = card.locator("dt details.why p").all_text_contents()
-    assert all(text[0].isupper() and text.endswith(".") and len(text) > 20 for text in sentences)
-    explanation = card.locator("dt details.why").first
-    assert explanation.locator("p").is_hidden()
-    explanation.locator("summary").click()
-    assert explanation.locator("p").is_visible()
-
-
-def test_objectives_and_constraints_are_explained_below_the_table(run: Path, tab: Tab) -> None:
-    tab.open(run / "report.html")
-    tab.page.locator("#meanings summary").click()
-    stated = tab.page.locator("#meanings dt").all_inner_texts()
-    of_constraints = [constraint.quantity for constraint in problem().constraints]
-    quantities = {q.name: q for q in (*problem().objectives, *of_constraints)}
-    assert stated == [f"{q.label} [{q.unit}]" for q in quantities.values()]
-
-
 def test_cards_show_different_pictures_and_select_their_designs(
     run: Path, tab: Tab, recommended: list[Mapping[str, Any]]
 ) -> None:
