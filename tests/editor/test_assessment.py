@@ -70,10 +70,3 @@ def test_a_fault_of_the_space_leaves_the_scene(files: EditedFiles) -> None:
     assert found.scene is not None
     assert found.scene["bases"] is None
     assert found.meaning == {}
-
-
-@pytest.mark.parametrize("text", ["", "[]", "1", "null", "a: .nan", "targets: 7", "cycle: []", "tool: [1]", "- {a: 1}"])
-def test_any_document_is_assessed(files: EditedFiles, text: str) -> None:
-    good = texts_of(*PAIRS[0])
-    for texts in (Texts(text, good.space), Texts(good.task, text), Texts(text, text)):
-        assert assess(texts, files).errors

@@ -120,18 +120,6 @@ def test_direct_search_reports_the_conflict_of_all_its_designs_and_of_all_sessio
     assert resumed.summary["feasibility"]["conflict"] == conflict
 
 
-def test_admitting_bounds_admit_a_design_that_was_evaluated() -> None:
-    problem = Problem(task("worst_error <= 1e-3", "length <= 0.15"))
-    run = optimize(problem, proposer="rules", n_init=20, n_total=20, seed=0)
-    conflict = run.summary["feasibility"]["conflict"]
-    for bounds in (conflict["admitting"], [conflict["admitting_alone"]]):
-        changed = {constraint.split()[0] for constraint in bounds}
-        kept = [c for c in problem.task.constraints if c.split()[0] not in changed]
-        eased = Problem(task(*kept, *bounds))
-        outcomes = eased.evaluate([trial.design for trial in run.trials])
-        assert (outcomes.violations <= 0.0).all(axis=1).any()
-
-
 @pytest.mark.parametrize("n", [0, 5])
 def test_tally_without_constraints_is_kept(n: int) -> None:
     tally = ViolationTally.of(np.empty((n, 0)))
