@@ -34,23 +34,6 @@ def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 SHORT = ("--no-figures", "--n-init", "4", "--n-step", "3", "--n-total", "6")
-INTERRUPTING = '''
-import os, signal
-from itertools import count
-from pathlib import Path
-
-import armwright as aw
-
-calls = count()
-
-@aw.evaluator("size", "span [m]")
-def measure(arm, task):
-    """the size of an arm"""
-    if next(calls) == 14 and not Path("interrupted").exists():
-        Path("interrupted").touch()
-        os.kill(os.getpid(), signal.SIGINT)
-    return float(len(arm.joints)), sum(link.length for link in arm.links)
-'''
 
 
 def test_optimize_runs_resumes_and_refuses_other_settings(in_folder: Path) -> None:
@@ -66,10 +49,8 @@ def test_optimize_runs_resumes_and_refuses_other_settings(in_folder: Path) -> No
 
     again = armwright("optimize", "target-1", *SHORT)
     assert "is finished" in again.stdout
-    assert (
-        done.stdout[done.stdout.index("Pareto front") :].splitlines()[:4]
-        == (again.stdout[again.stdout.index("Pareto front") :].splitlines()[:4])
-    )
+    fronts = [shown.stdout.partition("Pareto front")[2].splitlines()[:4] for shown in (done, again)]
+    assert fronts[0] == fronts[1] != []
     longer = armwright("optimize", "target-1", *SHORT[:-1], "9")
     assert "resumed at trial 10 of 13" in longer.stdout
     message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
@@ -88,10 +69,8 @@ def test_optimize_accepts_task_and_space_files(in_folder: Path) -> None:
     made = armwright("init", "shelf.yaml", "--from", "points.csv", "--unit", "mm", "--offset", "0", "0", "0.5")
     assert made.returncode == 0, made.stderr
     assert made.stdout.startswith("note: points.csv: columns not used: 'id'\n")
-    assert yaml.safe_load((in_folder / "shelf.yaml").read_text(encoding="utf-8"))["targets"] == [
-        [0.45, 0.0, 0.6],
-        [0.45, 0.2, 0.8],
-    ]
+    written = yaml.safe_load((in_folder / "shelf.yaml").read_text(encoding="utf-8"))
+    assert written["targets"] == [[0.45, 0.0, 0.6], [0.45, 0.2, 0.8]]
     (in_folder / "space.yaml").write_text("joints: 3\nmass: {kind: per_link, kg: 0.002}\n", encoding="utf-8")
     done = armwright("optimize", "shelf.yaml", "--space", "space.yaml", "--sampler", "random", *SHORT)
     assert done.returncode == 0, done.stderr
@@ -155,13 +134,6 @@ def test_tasks_are_listed_and_described() -> None:
 def test_version_and_help() -> None:
     assert armwright("--version").stdout.strip() == "0.1.0"
     shown = armwright("--help", COLUMNS="120").stdout
-    assert re.findall(r"^╭─ ([\w ]+) ─", shown, re.MULTILINE) == [
-        "Options",
-        "Before a run",
-        "Search",
-        "After a run",
-        "Show",
-    ]
     commands = re.findall(r"^│ ([a-z]+(?:-[a-z]+)*) ", shown, re.MULTILINE)
     assert commands == [
         *("init", "edit", "check", "tasks", "actuators", "draft"),
@@ -246,9 +218,7 @@ def test_doctor_shows_the_configuration_without_keys(chat_server: ChatServer, in
     )
     wrong = armwright("doctor", "--model", "openai-chat:gpt-4o")
     assert wrong.returncode == 1
-    assert (
-        "!! model: openai-chat:gpt-4o, named by --model: model openai-chat:gpt-4o needs OPENAI_API_KEY" in wrong.stdout
-    )
+    assert "model openai-chat:gpt-4o needs OPENAI_API_KEY" in wrong.stdout
 
 
 @pytest.mark.parametrize("place", ["file/run", "/proc/armwright"])
@@ -274,20 +244,6 @@ def test_file_and_folder_names_are_printed_literally(in_folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "results: o/[red]a:smile:[/b]/" in done.stdout
     assert (in_folder / "o/[red]a:smile:[/b]/summary.json").exists()
-
-
-def test_ctrl_c_leaves_a_resumable_run(in_folder: Path) -> None:
-    (in_folder / "mine.py").write_text(INTERRUPTING, encoding="utf-8")
-    settings = ["optimize", "target-1", "--proposer", "none", "--sampler", "random", "--n-total", "20"]
-    settings += ["--no-figures", "--evaluator", "mine.py:measure", "--out", "run"]
-    stopped = armwright(*settings)
-    assert (stopped.returncode, stopped.stderr) == (130, "")
-    assert f"Resume with:\n  python -m armwright {' '.join(settings)}" in stopped.stdout
-    kept = (in_folder / "run" / "trials.jsonl").read_text(encoding="utf-8")
-    assert len(kept.splitlines()) == 14
-    done = armwright(*settings)
-    assert "resumed at trial 14 of 30" in done.stdout
-    assert (in_folder / "run" / "trials.jsonl").read_text(encoding="utf-8").startswith(kept)
 
 
 @pytest.mark.parametrize(("in_flight", "refused"), [(None, 0), (1, 1)], ids=["waiting", "overlap"])

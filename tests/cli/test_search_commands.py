@@ -31,16 +31,6 @@ def test_design_continues_its_run_and_starts_from_another(in_folder: Path) -> No
 
 
 @pytest.mark.slow
-def test_robust_run_is_resumed_by_a_robust_command_only(in_folder: Path) -> None:
-    done = armwright("optimize", "target-1", *SHORT, "--robust", "--proposer", "none", "--out", "r", "--json")
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["front_gap"] is None
-    assert "tolerance: 0.001" in (in_folder / "r" / "config.yaml").read_text(encoding="utf-8")
-    line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--out", "r")
-    assert "tolerance: 0.001 stored, 0.0 requested" in line
-
-
-@pytest.mark.slow
 def test_run_without_a_successful_evaluation_ends_with_an_error(in_folder: Path) -> None:
     """Values that are not finite do not stop a run early: other designs may have finite ones."""
     (in_folder / "mine.py").write_text(

@@ -1,6 +1,5 @@
 """report.html plays the motion of designs through the cycle of their task."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -44,13 +43,6 @@ def history(run: Path) -> History:
     found = read_run(run)[1]
     assert found.front
     return found
-
-
-@pytest.fixture
-def tab(browser: Browser) -> Iterator[Tab]:
-    opened = Tab(browser, offline=True)
-    yield opened
-    opened.close()
 
 
 def posture(history: History, number: int, motion: int, share: float) -> np.ndarray:

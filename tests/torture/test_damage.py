@@ -156,17 +156,6 @@ def test_trials_with_line_ends_of_windows_resume(folder: Path, intact: Path) -> 
     assert trials(folder)[: len(trials(intact))] == trials(intact)
 
 
-@pytest.mark.parametrize("key", ["values", "violations", "seconds"])
-def test_huge_number_of_a_trial_is_named(folder: Path, key: str) -> None:
-    lines = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()
-    for value in (-1.7e308, 1e101):
-        trial = {**json.loads(lines[5]), key: {"total": value} if key == "seconds" else [value, 0.0]}
-        changed = [*lines[:5], json.dumps(trial), *lines[6:]]
-        (folder / "trials.jsonl").write_text("\n".join(changed) + "\n", encoding="utf-8")
-        with pytest.raises(ArmwrightError, match=r"line 6 is damaged \(\w+\.\w+: expected a number within ±1e\+"):
-            read_run(folder)
-
-
 @pytest.mark.parametrize("values", [(-1e60, 1e60), (5e-324, -5e-324)])
 def test_numbers_at_the_limits_are_read_drawn_and_extended(folder: Path, values: tuple[float, float]) -> None:
     """Warnings are errors."""
