@@ -102,8 +102,9 @@ def run(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        (("verification", "robust_numbers"), {}), (("hypervolume", "history"), [[1], 2]), (("attribution", "bbo"), None),
-        (("proposer", "failures"), 1), (("seconds",), {}), (("front_gap",), {"share": 1}), (("front_size",), 10**400),
+        (("verification", "robust_numbers"), {}), (("hypervolume", "history"), [[1], 2]), (("seconds",), {}),
+        (("attribution", "bbo"), None), (("proposer", "failures"), 1), (("front_size",), 10**400),
+        (("front_gap",), {"share": 1}),
     ],
     ids=str,
 )  # fmt: skip

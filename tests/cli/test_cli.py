@@ -95,17 +95,13 @@ def test_model_is_configured_by_option_environment_and_file(chat_server: ChatSer
     by_file = first_line("--out", "c", XDG_CONFIG_HOME=str(in_folder / "config"))
     assert f"named by {config}" in by_file
     options = in_folder / "options.yaml"
-    options.write_text(
-        f"base_url: {chat_server.url}\nmodel: other\nprompt: minus\ntemperature: 0.5\n", encoding="utf-8"
-    )
-    by_file = first_line("--out", "e", "--model", "m", "--model-options", str(options))
-    assert by_file == f"proposer: llm (m at {chat_server.url}, named by --model; prompt minus)"
-    assert chat_server.requests[-1]["temperature"] == 0.5
+    options.write_text(f"base_url: {chat_server.url}\nmodel: other\ntemperature: 0.5\n", encoding="utf-8")
+    assert "named by --model" in first_line("--out", "e", "--model", "m", "--model-options", str(options))
+    assert (chat_server.requests[-1]["model"], chat_server.requests[-1]["temperature"]) == ("m", 0.5)
     where = model_options(base_url=chat_server.url)
     config.write_text("temprature: 0\n", encoding="utf-8")
     wrong = refused(2, "optimize", "target-1", "--model", "m", *where, XDG_CONFIG_HOME=str(in_folder / "config"))
     assert f'{config}: unknown key "temprature"' in wrong
-    assert 'Did you mean "temperature"?' in wrong
     assert "proposer: rules" in first_line("--out", "d", OPENAI_API_KEY="sk-lying-about")  # a key alone spends nothing
     assert len((in_folder / "a" / "transcripts.jsonl").read_text(encoding="utf-8").splitlines()) == 5
 

@@ -81,9 +81,8 @@ def test_first_interrupt_ends_an_evaluator_in_order(in_folder: Path, evaluator: 
         output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert "stopped; every finished trial is in" in output
-    assert (
-        f"Resume with:\n  python -m armwright {' '.join(map(str, (*STUDY, in_folder / 'run', *evaluator)))}" in output
-    )
+    command = " ".join(map(str, (*STUDY, in_folder / "run", *evaluator)))
+    assert f"Resume with:\n  python -m armwright {command}" in output
     assert "waiting for" not in output
     (in_folder / "good").touch()
     assert is_resumed(in_folder / "run", *evaluator)

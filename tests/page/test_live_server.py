@@ -52,14 +52,10 @@ class LiveStudy:
         self.folder = folder
         self.process = start("optimize", "target-1", "--live", "--no-figures", "--out", folder, *options)
         assert self.process.stdout is not None
-        self.said: list[str] = []
-        while not (
-            found := re.search(r"^live: (http://127\.0\.0\.1:\d+/#key=[\w-]{32})$", self.said[-1] if self.said else "")
-        ):
-            line = self.process.stdout.readline()
-            assert line, "".join(self.said)
-            self.said.append(line)
-        self.address = found[1]
+        addresses = (
+            re.search(r"^live: (http://127\.0\.0\.1:\d+/#key=[\w-]{32})$", line) for line in self.process.stdout
+        )
+        self.address = next(found[1] for found in addresses if found)
 
     def __enter__(self) -> Self:
         return self
@@ -70,8 +66,7 @@ class LiveStudy:
 
     def end(self) -> int:
         """Waits for its end."""
-        rest, _ = self.process.communicate(timeout=PATIENCE)
-        self.said.append(rest)
+        self.said, _ = self.process.communicate(timeout=PATIENCE)
         return self.process.returncode
 
 
@@ -139,7 +134,7 @@ def test_live_page_receives_designs_sends_hints_and_stops(
 
     page.get_by_role("button", name="Stop after this design").click()
     assert study.end() == 130
-    assert "stopped" in "".join(study.said)
+    assert "stopped" in study.said
     expect(page.locator("#doing")).to_have_text(re.compile(r"^stopped at \d+ of 4004; repeat the command to resume"))
     expect(page.locator("#pause")).to_be_hidden()
     finished = len(read_run(study.folder)[1])

@@ -22,13 +22,13 @@ from armwright.problem.objective import Objective
 from armwright.runs.control import stop_study
 from armwright.study.progress import Progress
 from armwright.study.workers.cluster import Finished
+from tests.support.command_line import start
 from tests.support.dask_processes import (
     TASK,
     Bench,
     ShellCluster,
     all_ended,
     descendants,
-    start,
     wait_until,
 )
 from tests.torture.short import n_lines, trials
