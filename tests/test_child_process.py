@@ -21,6 +21,7 @@ PLANTED = (
 )  # fmt: skip
 EVALUATOR = """
 import armwright
+import helper
 
 @armwright.evaluator("reach [m]", "height [m]")
 def reach(arm, task):
@@ -61,23 +62,14 @@ def planted(in_folder: Path) -> Path:
 def test_planted_modules_are_not_imported(planted: Path, tmp_path_factory: pytest.TempPathFactory, name: str) -> None:
     there = tmp_path_factory.mktemp("there")
     (there / "ev.py").write_text(EVALUATOR, encoding="utf-8")
+    (there / "helper.py").write_text("", encoding="utf-8")
+    for hidden in ("json", "queue", "pickle", "secrets", "statistics"):  # Python's own come first
+        (there / f"{hidden}.py").write_text(f'open("{planted}/note", "a").write("{hidden}\\n")\n', encoding="utf-8")
     arguments = [argument.format(there=there) for argument in COMMANDS[name]]
     with started(*arguments) as process:
         _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     assert not (planted / "note").exists()
-
-
-@pytest.mark.slow
-def test_modules_beside_an_evaluator_hide_none_of_pythons_own(in_folder: Path) -> None:
-    (in_folder / "ev.py").write_text(f"import helper\n{EVALUATOR}", encoding="utf-8")
-    (in_folder / "helper.py").write_text("", encoding="utf-8")
-    for name in ("json", "queue", "pickle", "secrets", "statistics"):
-        (in_folder / f"{name}.py").write_text(f'open("{in_folder}/note", "a").write("{name}\\n")\n', encoding="utf-8")
-    with started("optimize", "target-1", *SHORT, "--evaluator", "ev.py:reach", *HOW) as process:
-        _, errors = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, errors
-    assert not (in_folder / "note").exists()
 
 
 @contextmanager

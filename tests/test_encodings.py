@@ -53,7 +53,7 @@ def test_commands_read_and_write_utf8_in_the_c_locale(in_folder: Path) -> None:
     task = "name: piece\ndescription: Pièce … ³ 腕\ntargets: [[0.3, 0.1, 0.2]]\n"
     Path("pièce.yaml").write_text(task, encoding="utf-8")
     study = ("optimize", "pièce.yaml", "--proposer", "rules", "--n-init", "4", "--n-total", "4")
-    for command in ((*study, "--figures", "--out", "é-c"), ("check", "pièce.yaml"), ("check", "none…é.yaml")):
+    for command in ((*study, "--figures", "--out", "é-c"), ("check", "none…é.yaml")):
         done = armwright(*command, environment=ASCII)
         assert "Traceback" not in done.stderr
         assert done.returncode == (2 if "none…é.yaml" in command else 0), done.stderr

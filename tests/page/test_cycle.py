@@ -4,13 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
 
 import armwright as aw
 from armwright.kinematics.arms.forward import joint_positions
 from armwright.page.page import write_report
 from armwright.runs.folder import read_run
-from armwright.runs.history import History
+from armwright.runs.history import FrontMember, History
 from armwright.tasks.task import Task
 from tests.support.browser import Tab
 
@@ -49,6 +48,12 @@ def posture(history: History, number: int, motion: int, share: float) -> np.ndar
     """The joint values (J,) of a design at a share of a motion."""
     _, paths = history.evaluation([number]).paths.of_arm(0)
     return paths[motion].at(np.array([share]))[0, 0]
+
+
+def check_posture(tab: Tab, history: History, member: FrontMember) -> None:
+    """Assert that the arm is drawn in its posture at the current target."""
+    q = history.evaluation([member.number]).q[0, tab.ask("armwright.state.target")]
+    assert np.array(tab.ask("armwright.drawnJoints()")) == pytest.approx(joint_positions(member.arm, q), abs=1e-4)
 
 
 def test_motion_in_time_follows_the_joint_path(run: Path, tab: Tab, history: History) -> None:
@@ -90,10 +95,7 @@ def test_play_drives_the_arm_through_its_cycle(run: Path, tab: Tab, history: His
     on_line = np.array([target == 1 for target, _ in seen])
     assert on_line.any()
     assert np.abs(tips[on_line][:, [0, 2]] - [0.3, 0.2]).max() < 5e-3
-    # Stopping shows the posture at the current target again.
-    target = tab.ask("armwright.state.target")
-    q = history.evaluation([member.number]).q[0, target]
-    assert np.array(tab.ask("armwright.drawnJoints()")) == pytest.approx(joint_positions(member.arm, q), abs=1e-4)
+    check_posture(tab, history, member)
 
 
 def test_selecting_another_design_while_playing_plays_its_motion(run: Path, tab: Tab, history: History) -> None:
@@ -107,16 +109,11 @@ def test_selecting_another_design_while_playing_plays_its_motion(run: Path, tab:
     assert tab.faults == []
 
 
-def test_reduced_motion_steps_from_target_to_target(run: Path, browser: Browser, history: History) -> None:
-    tab = Tab(browser, offline=True, reduced_motion="reduce")
-    try:
-        member = history.front[0]
-        tab.open(run / "report.html", f"#design={member.number}&target=1")
-        tab.page.locator("#play").click()
-        tab.page.get_by_text("Target 2 of 3").wait_for()
-        tab.page.locator("#play").click()
-        target = tab.ask("armwright.state.target")
-        q = history.evaluation([member.number]).q[0, target]
-        assert np.array(tab.ask("armwright.drawnJoints()")) == pytest.approx(joint_positions(member.arm, q), abs=1e-4)
-    finally:
-        tab.close()
+def test_reduced_motion_steps_from_target_to_target(run: Path, tab: Tab, history: History) -> None:
+    tab.page.emulate_media(reduced_motion="reduce")
+    member = history.front[0]
+    tab.open(run / "report.html", f"#design={member.number}&target=1")
+    tab.page.locator("#play").click()
+    tab.page.get_by_text("Target 2 of 3").wait_for()
+    tab.page.locator("#play").click()
+    check_posture(tab, history, member)

@@ -30,21 +30,6 @@ __all__ = ["served"]  # a fixture
 HINT = "a SCARA arm, please; <b>its base</b> behind the targets"
 
 
-class Gate:
-    """Answers as `designer`, but lets a question wait until it is opened."""
-
-    def __init__(self) -> None:
-        self.closed_after = 10**9  # questions that are answered at once
-        self.asked = 0
-        self.open = threading.Event()
-
-    def __call__(self, request: Request) -> Answer:
-        self.asked += 1
-        if self.asked > self.closed_after:
-            self.open.wait(PATIENCE)
-        return designer(request)
-
-
 class LiveStudy:
     """`armwright optimize … --live` in a process of its own; a context manager, at whose end it is gone."""
 
@@ -87,9 +72,14 @@ def live() -> Iterator[ExitStack]:
 def test_live_page_receives_designs_sends_hints_and_stops(
     tmp_path: Path, tab: Tab, live: ExitStack, chat_server: ChatServer
 ) -> None:
-    gate = Gate()
-    gate.closed_after = 3  # a check, and two steps of the first proposal
-    chat_server.answer = gate
+    gate = threading.Event()
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 3:  # a check, and two steps of the first proposal
+            gate.wait(PATIENCE)
+        return designer(request)
+
+    chat_server.answer = answer
     model = ("--model", "test-model", *model_options(base_url=chat_server.url, origin="scripted"))
     counts = ("--n-init", "4", "--n-step", "4", "--n-total", "4000")
     study = live.enter_context(LiveStudy(tmp_path / "run", *model, *counts))
@@ -113,7 +103,7 @@ def test_live_page_receives_designs_sends_hints_and_stops(
     other.open(study.address)
     expect(other.page.locator("#hints")).to_contain_text(HINT)
 
-    gate.open.set()
+    gate.set()
     expect(page.locator("#hints")).to_contain_text("used at iteration 9")
     expect(other.page.locator("#hints")).to_contain_text("used at iteration 9")
     prompts = chat_server.prompts()

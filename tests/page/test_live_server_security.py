@@ -13,7 +13,6 @@ from typing import Any
 import psutil
 import pytest
 import yaml
-from playwright.sync_api import Browser
 
 from armwright.page.page import write_report
 from armwright.page.request_guard import HEADERS
@@ -164,7 +163,7 @@ def changed(file: Path, change: Callable[[dict[str, Any]], dict[str, Any]]) -> l
     return records
 
 
-def test_names_in_a_run_folder_are_escaped(tmp_path: Path, browser: Browser) -> None:
+def test_names_in_a_run_folder_are_escaped(tmp_path: Path, tab: Tab) -> None:
     """The answers of a model, and names of objectives, sources, faults, arms and the folder, may be a stranger's."""
     folder = Path(shutil.copytree(a_run(), tmp_path / re.sub("[/]", "", LINK)[:60]))
     config = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
@@ -185,7 +184,6 @@ def test_names_in_a_run_folder_are_escaped(tmp_path: Path, browser: Browser) -> 
         record = json.loads(file.read_text(encoding="utf-8"))
         record["facts"] |= {name: {**one, "label": LINK, "explanation": LINK} for name, one in record["facts"].items()}
         file.write_text(json.dumps(record), encoding="utf-8")
-    tab = Tab(browser, offline=True)
     page = write_report(folder)
     tab.open(page, "#design=5")
     tab.page.locator("#pareto").hover()
@@ -197,4 +195,3 @@ def test_names_in_a_run_folder_are_escaped(tmp_path: Path, browser: Browser) -> 
     assert [html for html in made if re.search("evil|src=.?x", html)] == []
     assert "evil.example" in tab.ask("document.body.textContent")
     assert [address for address in tab.requests if not address.startswith(("file:", "data:", "blob:"))] == []
-    tab.close()

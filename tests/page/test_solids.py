@@ -7,7 +7,6 @@ import numpy as np
 import pinocchio
 import pytest
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from playwright.sync_api import Browser
 
 from armwright.kinematics.arms.forward import motor_solids
 from armwright.page.page import write_report
@@ -66,12 +65,11 @@ def test_drawn_solids_are_those_of_the_exported_arm() -> None:
 
 
 @pytest.mark.slow
-def test_page_and_figures_draw_motors_and_columns(tmp_path: Path, browser: Browser) -> None:
+def test_page_and_figures_draw_motors_and_columns(tmp_path: Path, tab: Tab) -> None:
     """A column stands on the ground, below the base, where the arm has one."""
     optimize(Problem(TASK, WITH_COLUMN), proposer="none", n_init=30, n_total=30, out=tmp_path, verify=False)
     write_report(tmp_path)
     history = read_run(tmp_path)[1]
-    tab = Tab(browser, offline=True)
     tab.open(tmp_path / "report.html")
     has_column = set()
     for number in range(10):
@@ -91,4 +89,3 @@ def test_page_and_figures_draw_motors_and_columns(tmp_path: Path, browser: Brows
         has_column.add(column is not None)
     assert has_column == {True, False}
     assert not tab.faults
-    tab.close()
