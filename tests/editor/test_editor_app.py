@@ -14,9 +14,8 @@ POSTS = ("/assess", "/points", "/save", "/design", "/stop")
 
 
 @pytest.fixture
-def editor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ServedEditor]:
-    monkeypatch.chdir(tmp_path)
-    with served_editor(tmp_path / "my-task.yaml") as served:
+def editor(in_folder: Path) -> Iterator[ServedEditor]:
+    with served_editor(in_folder / "my-task.yaml") as served:
         yield served
 
 

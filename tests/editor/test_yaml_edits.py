@@ -177,16 +177,9 @@ def test_any_text_is_edited_or_refused(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "path"),
     [
-        (TEXT, ("targets", 7)),
-        (TEXT, ("targets", "x")),
-        (TEXT, ("name", "x")),
-        (TEXT, ("targets", -1)),
-        (TEXT, ("payload", 0)),
-        ("a: &b [1]\nc: *b\n", ("a",)),
-        ("{payload: 1}\n", ("payload",)),
-        ("- 1\n", (0,)),
-        ("text\n", ("payload",)),
-        ("a: 1\na: 2\n", ("a",)),
+        *((TEXT, path) for path in (("targets", 7), ("targets", "x"), ("name", "x"), ("targets", -1), ("payload", 0))),
+        *(("a: &b [1]\nc: *b\n", ("a",)), ("a: 1\na: 2\n", ("a",)), ("- 1\n", (0,))),
+        *((text, ("payload",)) for text in ("{payload: 1}\n", "text\n")),
     ],
 )
 def test_edits_without_a_place_are_refused(text: str, path: tuple[str | int, ...]) -> None:

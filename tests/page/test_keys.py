@@ -59,13 +59,9 @@ def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Serv
 
 
 @pytest.fixture(params=["live", "editor"])
-def server(
-    request: pytest.FixtureRequest, served: tuple[Path, int, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Server]:
-    monkeypatch.chdir(tmp_path)
-    run = tmp_path / "secret-run"
-    shutil.copytree(served[0], run)
-    with a_server(request.param, tmp_path, run) as begun:
+def server(request: pytest.FixtureRequest, served: tuple[Path, int, str], in_folder: Path) -> Iterator[Server]:
+    run = Path(shutil.copytree(served[0], in_folder / "secret-run"))
+    with a_server(request.param, in_folder, run) as begun:
         yield begun
 
 
@@ -200,15 +196,14 @@ def test_the_key_leaves_the_address_and_stays_in_the_tab(server: Server, browser
 
 @pytest.mark.parametrize("kind", ["live", "editor"])
 def test_a_page_of_an_earlier_server_says_so(
-    served: tuple[Path, int, str], tmp_path: Path, browser: Browser, monkeypatch: pytest.MonkeyPatch, kind: str
+    served: tuple[Path, int, str], in_folder: Path, browser: Browser, kind: str
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     tab = Tab(browser)
-    with a_server(kind, tmp_path, served[0]) as first:
+    with a_server(kind, in_folder, served[0]) as first:
         tab.page.goto(first.address)
         tab.page.locator("#loading").wait_for(state="hidden")
         port = first.port
-    with a_server(kind, tmp_path, served[0], port) as second:
+    with a_server(kind, in_folder, served[0], port) as second:
         sentence = (
             "this tab has the key of another server, such as an earlier one; open the address that the terminal shows"
         )
