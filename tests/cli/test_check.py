@@ -118,17 +118,6 @@ def test_decimal_comma_is_warned_of_where_the_target_is_in_reach(in_folder: Path
     assert "got 4: [0, 4, 0.1, 0.2]; write decimals with a point" in refused(2, "check", "task.yaml")
 
 
-def test_search_samples_the_constraints_once(in_folder: Path) -> None:
-    task = write(in_folder, targets=[HERE], constraints=["worst_error >= 50"])
-    options = ("--n-init", "2", "--n-total", "1", "--proposer", "none", "--no-figures", "--out", "run")
-    done = armwright("optimize", task, *options)
-    assert done.returncode == 0, done.stderr
-    assert 'warning: no random design satisfies "worst_error >= 50"' in done.stdout
-    assert " samples)" in done.stdout
-    again = armwright("optimize", task, *options)
-    assert "worst_error >= 50" not in again.stdout.partition("violates")[0]
-
-
 def test_deep_check_samples_the_constraints(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("armwright.cli.check.DEEP_SECONDS", 0.0)
     task = write(in_folder, targets=[HERE], constraints=["worst_error >= 50", "mass <= 1"])

@@ -309,18 +309,6 @@ def test_a_page_on_another_port_gets_neither_key_nor_data(
     tab.close()
 
 
-def test_files_are_downloaded_with_the_key(served: tuple[Path, int, str], browser: Browser) -> None:
-    """Those of the editor's search are downloaded in tests/editor/test_engineers_path.py."""
-    _, port, key = served
-    tab = Tab(browser)
-    tab.open(f"http://127.0.0.1:{port}/#key={key}")
-    with tab.page.expect_download() as download:
-        tab.page.get_by_role("button", name="URDF", exact=True).first.click()
-    assert Path(download.value.path()).read_text(encoding="utf-8").startswith("<?xml")
-    assert all(key not in url for url in tab.requests)
-    tab.close()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["report", "edit"])
 def test_no_log_holds_the_key(served: tuple[Path, int, str], in_folder: Path, command: str) -> None:

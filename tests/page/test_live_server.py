@@ -152,6 +152,7 @@ def test_live_page_shows_the_end_and_outlives_the_study(tmp_path: Path, tab: Tab
     with tab.page.expect_download() as download:
         tab.page.get_by_role("button", name="URDF").click()
     assert Path(download.value.path()).read_text(encoding="utf-8").startswith("<?xml")
+    assert all(study.address.partition("=")[2] not in url for url in tab.requests)
     assert tab.faults == []
 
 
