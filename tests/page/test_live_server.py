@@ -1,6 +1,8 @@
 """The live page, with a study in another process and a real browser."""
 
 import re
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -21,7 +23,7 @@ from armwright.runs.control import read_control
 from armwright.runs.folder import RunFolder, read_run
 from tests.support.browser import Tab
 from tests.support.chat_server import Answer, ChatServer, Request, designer, wants_design
-from tests.support.command_line import PATIENCE, start
+from tests.support.command_line import PATIENCE
 from tests.support.live_server import ask, post_control, served
 from tests.support.wire_formats import model_options
 
@@ -35,7 +37,9 @@ class LiveStudy:
 
     def __init__(self, folder: Path, *options: str) -> None:
         self.folder = folder
-        self.process = start("optimize", "target-1", "--live", "--no-figures", "--out", folder, *options)
+        command = [sys.executable, "-m", "armwright", "optimize", "target-1", "--live", "--no-figures", "--out", folder]
+        # Its server outlives it, with its stderr, which is therefore no pipe.
+        self.process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True, encoding="utf-8")
         assert self.process.stdout is not None
         addresses = (
             re.search(r"^live: (http://127\.0\.0\.1:\d+/#key=[\w-]{32})$", line) for line in self.process.stdout

@@ -41,20 +41,13 @@ def test_constraints_that_no_design_satisfies_together_are_named() -> None:
     )
 
 
-def test_constraints_that_no_design_satisfies_are_named_one_by_one() -> None:
+def test_smallest_conflicts_and_bounds_are_named() -> None:
+    """Constraints that no design satisfies one by one; bounds of 0 stay if others can change."""
     record = record_of([0.5, -1.0, 1.5, 3.0], [0.1, 0.1, 2.0, 1.0])
     assert record["conflicts"] == [["mass <= 2"], ["clearance >= 0.01"], ["jumps <= 0"]]
     assert record["admitting"] == ["mass <= 2.2", "price <= 550", "clearance >= -0.01", "jumps <= 1"]
     assert record["admitting_alone"] is None
-
-
-def test_bounds_of_zero_stay_if_others_can_change() -> None:
-    record = record_of([-1.0, -1.0, -1.0, 1.0], [2.0, 3.0, -1.0, 0.0])
-    assert record["admitting"] == ["mass <= 6", "price <= 2000"]
-    assert record["admitting_alone"] is None
-
-
-def test_conflict_may_take_three_constraints() -> None:
+    assert record_of([-1.0, -1.0, -1.0, 1.0], [2.0, 3.0, -1.0, 0.0])["admitting"] == ["mass <= 6", "price <= 2000"]
     pairs = [[-1.0, -1.0, 1.0, -1.0], [-1.0, 1.0, -1.0, -1.0], [1.0, -1.0, -1.0, -1.0]]
     assert record_of(*pairs)["conflicts"] == [["mass <= 2", "price <= 500", "clearance >= 0.01"]]
 
