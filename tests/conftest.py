@@ -69,6 +69,26 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture
+def tab(browser: Browser) -> Iterator[browsers.Tab]:
+    """A tab without a network."""
+    opened = browsers.Tab(browser, offline=True)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="session")
+def studied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run that tests only read: black box and rules on target-2, 40 counted trials, with its page."""
+    import armwright as aw
+    from armwright.page.page import write_report
+
+    folder = tmp_path_factory.mktemp("studied") / "run"
+    aw.optimize(aw.Problem(aw.load_task("target-2")), proposer="rules", n_total=40, seed=1, out=folder)
+    write_report(folder)
+    return folder
+
+
+@pytest.fixture
 def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder."""
     monkeypatch.chdir(tmp_path)

@@ -130,8 +130,9 @@ NAMES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("command", WRITERS)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("command", "name"), [*(("report", name) for name in NAMES), *((command, "trials.jsonl") for command in WRITERS)]
+)
 def test_links_among_the_files_of_a_run_are_refused(run: Path, tmp_path: Path, command: str, name: str) -> None:
     place, outside = run / name, tmp_path / "outside"
     if place.exists():

@@ -9,17 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from armwright.exceptions import (
-    RunFolderError,
-    SettingsError,
-    SpaceError,
-    TaskError,
-)
+from armwright.exceptions import RunFolderError, SettingsError, SpaceError, TaskError
 from armwright.experiments.cells import plan_cells
 from armwright.experiments.plan import load_experiment
 from armwright.llm.transcript import Transcript
 from armwright.proof.results import read_summary
-from armwright.runs.folder import read_config
 from armwright.spaces.design_space import load_space
 from armwright.tasks.catalogue import load_task
 from armwright.yaml_documents import MAX_BYTES
@@ -33,7 +27,6 @@ from tests.fuzz.run_targets import a_run, looked_at
         ("name: !!bool maybe", "tags"),  # KeyError
         ("name: !!timestamp never", "tags"),  # AttributeError
         ("name: !!python/object/apply:os.system [id]", "tags"),
-        ("name: ! x", "tags"),
         (f"name: {'1:' * 400}1.0", "base 60"),  # OverflowError
         (f"name: {'1:' * 1_000_000}1", "base 60"),  # hours
         ("name: 0x" + "f" * 20_000, "expected text, got a huge number"),  # a number of too many digits to be shown
@@ -45,17 +38,14 @@ from tests.fuzz.run_targets import a_run, looked_at
         ("a: &a [x]\nb: [*a, *a]", "aliases"),
         ("[" * 100_000, "nested too deeply"),
         ("a: " + "{a: " * 100_000, "nested too deeply"),
-        ("- " * 100_000, "nested too deeply"),
         pytest.param("a: [" + "1," * 400_000 + "1]", "400,000 values", marks=pytest.mark.slow),
         ("name: many\ntargets: [" + "[0,0,0]," * 10_001 + "]", "at most 10000"),
         ("name: x\ntargets: [[1e308, 0, 0]]", "more than 1000 m away"),
         ("name: x\ntargets: [[.nan, 0, 0]]", "finite number"),
         ("name: x\ntargets: [[" + "9" * 400 + ", 0, 0]]", "target"),
         ("name: ../../x\ntargets: [[0, 0, 0]]", "expected a name of at most 64 letters"),
-        ("name: /etc/x\ntargets: [[0, 0, 0]]", "expected a name of at most 64 letters"),
         ('name: "a\\nb"\ntargets: [[0, 0, 0]]', "expected a name of at most 64 letters"),
         ("name: CON\ntargets: [[0, 0, 0]]", "Windows"),
-        ("name: nul.x\ntargets: [[0, 0, 0]]", "Windows"),
         ("name: a.\ntargets: [[0, 0, 0]]", "Windows"),
     ],
     ids=lambda value: value[:30],
@@ -112,11 +102,9 @@ def run(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        (("verification",), 3), (("verification", "robust_numbers"), None), (("verification", "robust_numbers"), {}),
-        (("hypervolume",), {}), (("hypervolume", "history"), [[1], 2]), (("hypervolume", "final"), "x"),
-        (("attribution",), []), (("attribution", "bbo"), None), (("proposer", "failures"), 1),
-        (("proposer_bias",), "x"),
-        (("seconds",), {}), (("front_gap",), {"share": 1}), (("front_size",), 10**400), (("n_trials",), -1),
+        (("verification", "robust_numbers"), {}), (("hypervolume", "history"), [[1], 2]), (("seconds",), {}),
+        (("attribution", "bbo"), None), (("proposer", "failures"), 1), (("front_size",), 10**400),
+        (("front_gap",), {"share": 1}),
     ],
     ids=str,
 )  # fmt: skip
@@ -130,25 +118,6 @@ def test_damaged_summary_is_made_again(run: Path, place: tuple[str, ...], value:
     (run / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     assert read_summary(run) is None
     looked_at(run)
-
-
-def remove_setting(run: Path, field: str) -> None:
-    text = (run / "config.yaml").read_text(encoding="utf-8")
-    assert f"    {field}: " in text
-    lines = [line for line in text.splitlines() if not line.startswith(f"    {field}: ")]
-    (run / "config.yaml").write_text("\n".join(lines), encoding="utf-8")
-
-
-@pytest.mark.parametrize("field", ["memory", "answer", "name"])
-def test_config_without_a_proposer_setting_is_refused(run: Path, field: str) -> None:
-    remove_setting(run, field)
-    with pytest.raises(RunFolderError, match=field):
-        read_config(run)
-
-
-def test_config_without_a_prompt_is_read(run: Path) -> None:
-    remove_setting(run, "prompt")
-    assert read_config(run).study.proposer is not None
 
 
 @pytest.mark.parametrize("value", ["x", "llm-", "llm-x", "llm-9999999999", "-1\n"])

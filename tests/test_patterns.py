@@ -12,7 +12,6 @@ import pytest
 from hypothesis import strategies as st
 
 import armwright
-from armwright.units import read_quantity
 from tests.fuzz.__main__ import TooSlowError, limited
 
 ROOT = Path(armwright.__file__).parent
@@ -21,7 +20,7 @@ SEARCHES = {"search", "sub", "subn", "findall", "finditer", "split"}
 LETTERS = 30_000  # of a text: some milliseconds in linear time, a minute in quadratic time
 SECONDS = 1.0  # of CPU time
 ENDS = ("\0", "\n", '"', "x")
-TRIES = 100
+TRIES = 50
 
 
 class Pattern(NamedTuple):
@@ -98,15 +97,9 @@ def test_pattern_reads_long_repetitions_in_time(pattern: Pattern) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        r"([\w-]*)(?:\*{2,}|\.{3,}|…)([\w-]*)", r"\s*(\d+\.?\d*)\s*(\S.*?)?\s*x", r"(?:a+b?)+c", r'//[^"\n]*$',
-        r"\d+x", r"JOINTS:\s*\w*\s*\w*;", r"\s+$",
+        r"([\w-]*)(?:\*{2,}|\.{3,}|…)([\w-]*)", r"(?:a+b?)+c", r'//[^"\n]*$', r"JOINTS:\s*\w*\s*\w*;",
     ],
 )  # fmt: skip
 def test_pattern_that_takes_quadratic_time_is_noticed(text: str) -> None:
     with pytest.raises(TooSlowError):
         reads_in_time(Pattern(text))
-
-
-@pytest.mark.parametrize("text", ["1" * 100_000 + "\n x", " " * 100_000 + "1 x", "1" + " " * 100_000 + "\nx"])
-def test_long_quantities_are_read_at_once(text: str) -> None:
-    assert read_quantity(text, "m") is None

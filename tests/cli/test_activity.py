@@ -11,15 +11,14 @@ from tests.support.command_line import PATIENCE
 
 
 class Screen(io.StringIO):
-    """A terminal, or a pipe, that notices when something is written."""
+    """A terminal that notices when something is written."""
 
-    def __init__(self, is_terminal: bool) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.is_terminal = is_terminal
         self.written = threading.Event()
 
     def isatty(self) -> bool:
-        return self.is_terminal
+        return True
 
     def write(self, text: str) -> int:
         if "drawing" in text:
@@ -27,8 +26,13 @@ class Screen(io.StringIO):
         return super().write(text)
 
 
-def test_terminal_shows_what_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Screen(is_terminal=True)
+def test_terminals_show_what_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    for quiet, delay in ((Screen(), PATIENCE), (io.StringIO(), 0.0)):  # of short work, and of a pipe
+        monkeypatch.setattr(sys, "stderr", quiet)
+        with activity("drawing", delay=delay):
+            pass
+        assert "drawing" not in quiet.getvalue()
+    screen = Screen()
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setenv("TERM", "xterm")
     with activity("drawing [figures]", delay=0.0):
@@ -37,24 +41,8 @@ def test_terminal_shows_what_takes_long(monkeypatch: pytest.MonkeyPatch) -> None
     assert screen.getvalue().endswith("\x1b[2K")  # the line is gone in the end
 
 
-def test_short_work_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Screen(is_terminal=True)
-    monkeypatch.setattr(sys, "stderr", screen)
-    with activity("drawing", delay=PATIENCE):
-        pass
-    assert "drawing" not in screen.getvalue()
-
-
-def test_pipes_get_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Screen(is_terminal=False)
-    monkeypatch.setattr(sys, "stderr", screen)
-    with activity("drawing", delay=0.0):
-        pass
-    assert screen.getvalue() == ""
-
-
 def test_errors_end_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "stderr", Screen(is_terminal=True))
+    monkeypatch.setattr(sys, "stderr", Screen())
     with pytest.raises(ValueError, match="broken"), activity("drawing", delay=PATIENCE):
         raise ValueError("broken")
     assert not [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]

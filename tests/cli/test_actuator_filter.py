@@ -32,15 +32,13 @@ def test_actuators_are_chosen_by_bounds() -> None:
     assert "left out, as their price is unknown" in shown
 
 
-def test_bounds_may_be_in_other_units() -> None:
+def test_bounds_may_be_in_other_units_and_of_named_actuators() -> None:
+    assert chosen("XM430-W350", "MG996R", "--where", "peak_torque>2") == {"XM430-W350"}
+    assert "none of 42 actuators has price < 1 USD" in refused(1, "actuators", "--where", "price<1")
     assert chosen("--where", "mass<=60 g") == chosen("--where", "mass<=0.06")
     assert chosen("--where", "speed>100 rpm") == {
         r.name for r in catalogue().values() if r.speed is not None and r.speed > 100 * 3.141592653589793 / 30
     }
-
-
-def test_named_actuators_can_be_filtered_too() -> None:
-    assert chosen("XM430-W350", "MG996R", "--where", "peak_torque>2") == {"XM430-W350"}
 
 
 def test_csv_and_json_hold_the_same_values() -> None:
@@ -67,7 +65,3 @@ def test_csv_and_json_hold_the_same_values() -> None:
 )
 def test_mistakes_are_one_line(options: tuple[str, ...], words: str) -> None:
     assert words in refused(2, "actuators", *options)
-
-
-def test_too_narrow_bounds_are_named() -> None:
-    assert "none of 42 actuators has price < 1 USD" in refused(1, "actuators", "--where", "price<1")

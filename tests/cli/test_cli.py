@@ -4,7 +4,6 @@ import inspect
 import io
 import json
 import re
-import shutil
 import subprocess
 import sys
 import threading
@@ -19,7 +18,6 @@ from rich.text import Text
 from armwright.cli import search_commands
 from armwright.cli.app import app
 from armwright.cli.progress import study_progress
-from armwright.cli.show_results import show_result
 from armwright.llm import client as chat
 from armwright.problem.problem import Problem
 from armwright.proposers.replay import ReplayProposer
@@ -35,25 +33,7 @@ def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
 
 
-DRAWN = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
-SHORT = ("--no-figures", *DRAWN)
-INTERRUPTING = '''
-import os, signal
-from itertools import count
-from pathlib import Path
-
-import armwright as aw
-
-calls = count()
-
-@aw.evaluator("size", "span [m]")
-def measure(arm, task):
-    """the size of an arm"""
-    if next(calls) == 14 and not Path("interrupted").exists():
-        Path("interrupted").touch()
-        os.kill(os.getpid(), signal.SIGINT)
-    return float(len(arm.joints)), sum(link.length for link in arm.links)
-'''
+SHORT = ("--no-figures", "--n-init", "4", "--n-step", "3", "--n-total", "6")
 
 
 def test_optimize_runs_resumes_and_refuses_other_settings(in_folder: Path) -> None:
@@ -69,41 +49,12 @@ def test_optimize_runs_resumes_and_refuses_other_settings(in_folder: Path) -> No
 
     again = armwright("optimize", "target-1", *SHORT)
     assert "is finished" in again.stdout
-    assert (
-        done.stdout[done.stdout.index("Pareto front") :].splitlines()[:4]
-        == (again.stdout[again.stdout.index("Pareto front") :].splitlines()[:4])
-    )
+    fronts = [shown.stdout.partition("Pareto front")[2].splitlines()[:4] for shown in (done, again)]
+    assert fronts[0] == fronts[1] != []
     longer = armwright("optimize", "target-1", *SHORT[:-1], "9")
     assert "resumed at trial 10 of 13" in longer.stdout
     message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
     assert "proposer.name: rules stored, None requested" in message
-
-
-def test_attribution_table_fits_a_narrow_terminal_and_needs_a_proposer() -> None:
-    def shown(proposer: str) -> str:
-        console = Console(file=io.StringIO(), width=80, markup=False, highlight=False)
-        show_result(console, optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_total=6), [])
-        return console.file.getvalue()  # type: ignore[attr-defined]
-
-    table = shown("rules").split("Attribution")[1].splitlines()[1:5]
-    assert table[0].split("  ")[0] == "source"
-    assert [re.split(r"\s\s+", row)[:2] for row in table[1:]] == [["random", "4"], ["rules", "1"], ["black box", "5"]]
-    assert max(map(len, table)) < 60
-    assert "Attribution" not in shown("none")
-
-
-@pytest.mark.slow
-def test_missing_results_of_a_finished_run_are_rewritten(in_folder: Path) -> None:
-    armwright("optimize", "target-1", *DRAWN, "--out", "run")
-    run = in_folder / "run"
-    before = {path.relative_to(run) for path in run.rglob("*")}
-    for name in ("hypervolume", "front", "arms"):
-        assert {Path("figures", f"{name}.png"), Path("figures", f"{name}.pdf")} <= before
-    shutil.rmtree(run / "figures")
-    shutil.rmtree(run / "designs")
-    (run / "front.csv").unlink()
-    assert "is finished" in armwright("optimize", "target-1", *DRAWN, "--out", "run").stdout
-    assert {path.relative_to(run) for path in run.rglob("*")} == before
 
 
 def test_json_output_is_alone_on_stdout(in_folder: Path) -> None:
@@ -118,10 +69,8 @@ def test_optimize_accepts_task_and_space_files(in_folder: Path) -> None:
     made = armwright("init", "shelf.yaml", "--from", "points.csv", "--unit", "mm", "--offset", "0", "0", "0.5")
     assert made.returncode == 0, made.stderr
     assert made.stdout.startswith("note: points.csv: columns not used: 'id'\n")
-    assert yaml.safe_load((in_folder / "shelf.yaml").read_text(encoding="utf-8"))["targets"] == [
-        [0.45, 0.0, 0.6],
-        [0.45, 0.2, 0.8],
-    ]
+    written = yaml.safe_load((in_folder / "shelf.yaml").read_text(encoding="utf-8"))
+    assert written["targets"] == [[0.45, 0.0, 0.6], [0.45, 0.2, 0.8]]
     (in_folder / "space.yaml").write_text("joints: 3\nmass: {kind: per_link, kg: 0.002}\n", encoding="utf-8")
     done = armwright("optimize", "shelf.yaml", "--space", "space.yaml", "--sampler", "random", *SHORT)
     assert done.returncode == 0, done.stderr
@@ -146,22 +95,13 @@ def test_model_is_configured_by_option_environment_and_file(chat_server: ChatSer
     by_file = first_line("--out", "c", XDG_CONFIG_HOME=str(in_folder / "config"))
     assert f"named by {config}" in by_file
     options = in_folder / "options.yaml"
-    options.write_text(
-        f"base_url: {chat_server.url}\nmodel: other\nprompt: minus\ntemperature: 0.5\n", encoding="utf-8"
-    )
-    by_file = first_line("--out", "e", "--model", "m", "--model-options", str(options))
-    assert by_file == f"proposer: llm (m at {chat_server.url}, named by --model; prompt minus)"
-    assert chat_server.requests[-1]["temperature"] == 0.5
-    config.write_text(
-        "temperature: 0.25\nbase_url: http://127.0.0.1:9\n", encoding="utf-8"
-    )  # defaults for a model named elsewhere
+    options.write_text(f"base_url: {chat_server.url}\nmodel: other\ntemperature: 0.5\n", encoding="utf-8")
+    assert "named by --model" in first_line("--out", "e", "--model", "m", "--model-options", str(options))
+    assert (chat_server.requests[-1]["model"], chat_server.requests[-1]["temperature"]) == ("m", 0.5)
     where = model_options(base_url=chat_server.url)
-    first_line("--out", "f", "--model", "m", *where, XDG_CONFIG_HOME=str(in_folder / "config"))
-    assert chat_server.requests[-1]["temperature"] == 0.25
     config.write_text("temprature: 0\n", encoding="utf-8")
     wrong = refused(2, "optimize", "target-1", "--model", "m", *where, XDG_CONFIG_HOME=str(in_folder / "config"))
     assert f'{config}: unknown key "temprature"' in wrong
-    assert 'Did you mean "temperature"?' in wrong
     assert "proposer: rules" in first_line("--out", "d", OPENAI_API_KEY="sk-lying-about")  # a key alone spends nothing
     assert len((in_folder / "a" / "transcripts.jsonl").read_text(encoding="utf-8").splitlines()) == 5
 
@@ -190,13 +130,6 @@ def test_tasks_are_listed_and_described() -> None:
 def test_version_and_help() -> None:
     assert armwright("--version").stdout.strip() == "0.1.0"
     shown = armwright("--help", COLUMNS="120").stdout
-    assert re.findall(r"^╭─ ([\w ]+) ─", shown, re.MULTILINE) == [
-        "Options",
-        "Before a run",
-        "Search",
-        "After a run",
-        "Show",
-    ]
     commands = re.findall(r"^│ ([a-z]+(?:-[a-z]+)*) ", shown, re.MULTILINE)
     assert commands == [
         *("init", "edit", "check", "tasks", "actuators", "draft"),
@@ -204,7 +137,7 @@ def test_version_and_help() -> None:
         *("pick", "export", "simulate", "datasheet", "reach-map", "compare", "compare-arms"),
         *("report", "doctor"),
     ]
-    assert "--n-step" in armwright("optimize", "--help").stdout
+    assert len(inspect.signature(search_commands.optimize).parameters) <= 28
 
 
 def test_no_bracket_of_a_help_text_is_taken_for_markup() -> None:
@@ -216,49 +149,25 @@ def test_no_bracket_of_a_help_text_is_taken_for_markup() -> None:
         assert Text.from_markup(text).plain == text.replace("\\[", "[")
 
 
-def test_optimize_shows_its_options_in_groups() -> None:
-    """At most 28 options, --help included, and as many parameters."""
-    shown = armwright("optimize", "--help", COLUMNS="120").stdout
-    groups = ["Arguments", "Options", "Task", "Search", "Language model", "Evaluation", "Output"]
-    assert re.findall(r"^╭─ ([\w ]+) ─", shown, re.MULTILINE) == groups
-    assert 15 <= len(re.findall(r"^│ +--", shown, re.MULTILINE)) <= 28
-    assert len(inspect.signature(search_commands.optimize).parameters) <= 28
-
-
 @pytest.mark.parametrize(
     ("args", "words"),
     [
         (("targt-1",), 'unknown task "targt-1". Did you mean "target-1"?'),
         (("nothing.yaml",), "there is no file nothing.yaml"),
-        (("a" * 300,), "unknown task"),
         (("target-1", "--space", "turns.yaml"), "exceeds ±2π"),
-        (
-            ("target-1", "--proposer", "none", *model_options(base_url="http://x")),
-            "none does not use base_url = http://x",
-        ),
         (("bad.yaml",), 'unknown key "target".'),
         (("target-1", "--space", "nothing.yaml"), "cannot read nothing.yaml"),
         (("target-1", "--n-step", "0"), "n_step: expected a whole number from 1 to"),
-        (("target-1", "--seed", "-1"), "seed: expected a whole number"),
         (("target-1", "--sampler", "tpee"), 'Did you mean "tpe"?'),
-        (("target-1", "--proposer", "rule"), 'Did you mean "rules"?'),
         (("target-1", "--proposer", "llm"), "needs a language model"),
         (("target-1", "--model", "openai-chat:gpt-4o"), "OPENAI_API_KEY"),
-        (("target-1", "--model", "gpt-4o"), "openai-chat:gpt-4o"),
-        (("target-1", "--model", "m", *model_options(base_url="localhost")), "http://"),
-        (
-            ("target-1", *model_options(base_url="http://127.0.0.1:9")),
-            "base_url = http://127.0.0.1:9 needs a language model",
-        ),
         (("target-1", "--memory", "chta"), 'unknown memory "chta". Did you mean "chat"?'),
         (("target-1", "--max-cost", "1"), "max_cost = 1.0 needs a language model, and none is configured"),
         (
             ("target-1", "--proposer", "replay:x", *model_options(temperature=0)),
             "replay:x does not use temperature = 0.0",
         ),
-        (("target-1", *model_options(in_flight=2)), "in_flight = 2 needs a language model"),
         (("target-1", *model_options(temprature=0)), 'Did you mean "temperature"?'),
-        (("target-1", "--model-options", "none.yaml"), "cannot read none.yaml"),
         (("target-1", "--max-cost", "-1"), "command line: max_cost: expected a number above 0, got -1.0"),
         (("target-1", "--proposer", "manual"), "needs a folder: manual:PATH"),
         (("target-1", "--model", "m", *model_options(base_url="http://x/v1?key=secret")), "ARMWRIGHT_API_KEY"),
@@ -305,15 +214,7 @@ def test_doctor_shows_the_configuration_without_keys(chat_server: ChatServer, in
     )
     wrong = armwright("doctor", "--model", "openai-chat:gpt-4o")
     assert wrong.returncode == 1
-    assert (
-        "!! model: openai-chat:gpt-4o, named by --model: model openai-chat:gpt-4o needs OPENAI_API_KEY" in wrong.stdout
-    )
-
-
-def test_damaged_run_folder_exits_with_1(in_folder: Path) -> None:
-    armwright("optimize", "target-1", *SHORT, "--out", "run")
-    (in_folder / "run" / "trials.jsonl").write_text("garbage\n", encoding="utf-8")
-    assert "line 1 is damaged" in refused(1, "optimize", "target-1", *SHORT, "--out", "run")
+    assert "model openai-chat:gpt-4o needs OPENAI_API_KEY" in wrong.stdout
 
 
 @pytest.mark.parametrize("place", ["file/run", "/proc/armwright"])
@@ -324,18 +225,11 @@ def test_unwritable_output_folder_exits_with_1(in_folder: Path, place: str) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", [("tasks",), ("optimize", "target-1", *SHORT)])
-def test_unwritable_output_is_one_line(in_folder: Path, command: tuple[str, ...]) -> None:
+def test_unwritable_output_is_one_line(in_folder: Path) -> None:
     with open("/dev/full", "w", encoding="utf-8") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "armwright", *command],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-        )
-    assert done.returncode == 1
-    assert done.stderr.strip().splitlines() == ["armwright: No space left on device: the output"]
+        command = [sys.executable, "-m", "armwright", "optimize", "target-1", *SHORT]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, encoding="utf-8")
+    assert (done.returncode, done.stderr) == (1, "armwright: No space left on device: the output\n")
 
 
 def test_file_and_folder_names_are_printed_literally(in_folder: Path) -> None:
@@ -348,28 +242,7 @@ def test_file_and_folder_names_are_printed_literally(in_folder: Path) -> None:
     assert (in_folder / "o/[red]a:smile:[/b]/summary.json").exists()
 
 
-def test_unknown_option_exits_with_2() -> None:
-    done = armwright("optimize", "target-1", "--nstep", "5")
-    assert done.returncode == 2
-    assert "--n-step" in done.stderr
-
-
-def test_ctrl_c_leaves_a_resumable_run(in_folder: Path) -> None:
-    (in_folder / "mine.py").write_text(INTERRUPTING, encoding="utf-8")
-    settings = ["optimize", "target-1", "--proposer", "none", "--sampler", "random", "--n-total", "20"]
-    settings += ["--no-figures", "--evaluator", "mine.py:measure", "--out", "run"]
-    stopped = armwright(*settings)
-    assert (stopped.returncode, stopped.stderr) == (130, "")
-    assert f"Resume with:\n  python -m armwright {' '.join(settings)}" in stopped.stdout
-    kept = (in_folder / "run" / "trials.jsonl").read_text(encoding="utf-8")
-    assert len(kept.splitlines()) == 14
-    done = armwright(*settings)
-    assert "resumed at trial 14 of 30" in done.stdout
-    assert (in_folder / "run" / "trials.jsonl").read_text(encoding="utf-8").startswith(kept)
-
-
-@pytest.mark.parametrize("in_flight", [None, 1], ids=["waiting", "overlap"])
-@pytest.mark.parametrize("refused", [0, 1])
+@pytest.mark.parametrize(("in_flight", "refused"), [(None, 0), (1, 1)], ids=["waiting", "overlap"])
 def test_ctrl_c_cancels_model_calls_in_flight(
     chat_server: ChatServer, in_folder: Path, in_flight: int | None, refused: int
 ) -> None:
@@ -403,7 +276,7 @@ import armwright.cli.app as cli
 
 class Finalised:
     def __del__(self):
-        os.kill(os.getpid(), signal.{name})
+        os.kill(os.getpid(), signal.SIGTERM)
         threading.Event().wait(600)  # here the signal is heeded, and what it raises is dropped
 
 def app():
@@ -417,18 +290,14 @@ cli.main()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_interrupt_dropped_by_python_still_ends_the_command(name: str) -> None:
+def test_interrupt_dropped_by_python_still_ends_the_command() -> None:
     """This happens in finalisers and library callbacks, where exceptions cannot propagate."""
-    done = subprocess.run(
-        [sys.executable, "-c", DROPPED.format(name=name)], capture_output=True, text=True, encoding="utf-8"
-    )
+    done = subprocess.run([sys.executable, "-c", DROPPED], capture_output=True, text=True, encoding="utf-8")
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
-@pytest.mark.parametrize("width", [60, 120])
-def test_progress_is_shown_in_a_terminal(width: int) -> None:
-    console = Console(file=io.StringIO(), force_terminal=True, width=width, markup=False, highlight=False)
+def test_progress_is_shown_in_a_terminal() -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, width=60, markup=False, highlight=False)
     with study_progress(console) as watch:
         optimize(Problem(load_task("target-1")), proposer="rules", n_init=3, n_step=5, n_total=7, watch=watch)
     shown = console.file.getvalue()  # type: ignore[attr-defined]
@@ -454,7 +323,6 @@ def test_reasons_of_a_model_are_shown_as_they_enter() -> None:
     ("command", "heavy"),
     [
         ("--help", {"warp", "optuna", "matplotlib", "moocore", "numpy", "pydantic", "pydantic_ai"}),
-        ("tasks", {"warp", "optuna", "pydantic_ai", "scipy", "armwright.llm", "armwright.proposers"}),
         ("tasks target-1", {"warp", "optuna", "pydantic_ai", "armwright.llm", "armwright.proposers"}),
     ],
 )

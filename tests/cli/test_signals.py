@@ -81,6 +81,8 @@ def test_first_interrupt_ends_an_evaluator_in_order(in_folder: Path, evaluator: 
         output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert "stopped; every finished trial is in" in output
+    command = " ".join(map(str, (*STUDY, in_folder / "run", *evaluator)))
+    assert f"Resume with:\n  python -m armwright {command}" in output
     assert "waiting for" not in output
     (in_folder / "good").touch()
     assert is_resumed(in_folder / "run", *evaluator)
@@ -100,7 +102,7 @@ def test_evaluator_that_swallows_interrupts_is_named_and_ended(in_folder: Path, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("evaluator", [STUBBORN, HOLDS_LOCK], indirect=True)
+@pytest.mark.parametrize("evaluator", [HOLDS_LOCK], indirect=True)
 def test_second_interrupt_ends_an_evaluator_at_once(in_folder: Path, evaluator: tuple[str, ...]) -> None:
     with begun(*STUDY, in_folder / "run", *evaluator, until="begun") as process:
         process.send_signal(signal.SIGINT)

@@ -47,10 +47,7 @@ def test_findings_and_meaning_are_those_of_check(files: EditedFiles, task: str, 
     ("old", "new", "message"),
     [
         ("payload: 0.2 ", "payload: two ", "payload"),
-        ("[0.33, -0.15, 0.12]", "[330, -150, 120]", "330"),
         ("[0.33, -0.15, 0.12]", "[5, 0, 0.1]", "reach"),
-        ("[0.33, -0.15, 0.12]", "[0,33, -0.15, 0.12]", "three numbers"),
-        ("name: ", "nam: ", "Did you mean"),
         ("targets:", "targets: [", "not valid YAML"),
     ],
 )
@@ -70,10 +67,3 @@ def test_a_fault_of_the_space_leaves_the_scene(files: EditedFiles) -> None:
     assert found.scene is not None
     assert found.scene["bases"] is None
     assert found.meaning == {}
-
-
-@pytest.mark.parametrize("text", ["", "[]", "1", "null", "a: .nan", "targets: 7", "cycle: []", "tool: [1]", "- {a: 1}"])
-def test_any_document_is_assessed(files: EditedFiles, text: str) -> None:
-    good = texts_of(*PAIRS[0])
-    for texts in (Texts(text, good.space), Texts(good.task, text), Texts(text, text)):
-        assert assess(texts, files).errors

@@ -35,7 +35,7 @@ def test_new_files_begin_with_templates_and_are_written_by_save(tmp_path: Path) 
     assert aw.Problem(task, space).objectives
 
 
-def test_a_file_that_changed_on_disk_is_kept(tmp_path: Path) -> None:
+def test_a_file_that_changed_or_appeared_on_disk_is_kept(tmp_path: Path) -> None:
     files = EditedFiles(tmp_path / "new.yaml")
     files.save(files.texts())
     (tmp_path / "new.yaml").write_text("name: theirs\n", encoding="utf-8")
@@ -46,14 +46,11 @@ def test_a_file_that_changed_on_disk_is_kept(tmp_path: Path) -> None:
     files.save(mine, overwrite=True)
     assert (tmp_path / "new.yaml").read_text(encoding="utf-8") == "name: mine\n"
     files.save(Texts("name: later\n", mine.space))
-
-
-def test_a_file_that_appeared_meanwhile_is_kept(tmp_path: Path) -> None:
-    files = EditedFiles(tmp_path / "new.yaml")
-    (tmp_path / "new-space.yaml").write_text("name: theirs\n", encoding="utf-8")
-    with pytest.raises(ChangedOnDiskError, match=r"new-space\.yaml"):
-        files.save(files.texts())
-    assert not (tmp_path / "new.yaml").exists()
+    later = EditedFiles(tmp_path / "later.yaml")
+    (tmp_path / "later-space.yaml").write_text("name: theirs\n", encoding="utf-8")
+    with pytest.raises(ChangedOnDiskError, match=r"later-space\.yaml"):
+        later.save(later.texts())
+    assert not (tmp_path / "later.yaml").exists()
 
 
 def test_links_and_modes_stay(tmp_path: Path) -> None:

@@ -3,38 +3,25 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import armwright as aw
 from armwright.editor.app import MAX_BODY
 from tests.support.editor import ServedEditor, served_editor
-from tests.support.live_server import ask
 
 POSTS = ("/assess", "/points", "/save", "/design", "/stop")
 
 
 @pytest.fixture
-def editor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ServedEditor]:
-    monkeypatch.chdir(tmp_path)
-    with served_editor(tmp_path / "my-task.yaml") as served:
+def editor(in_folder: Path) -> Iterator[ServedEditor]:
+    with served_editor(in_folder / "my-task.yaml") as served:
         yield served
 
 
 def texts(editor: ServedEditor) -> dict[str, str]:
     opened = json.loads(editor.get("/opened")[1])
     return {"task": opened["task"], "space": opened["space"]}
-
-
-def right_body(editor: ServedEditor, path: str) -> dict[str, Any]:
-    return {
-        "/assess": texts(editor),
-        "/points": {"text": "1,2,3"},
-        "/save": texts(editor),
-        "/design": {**texts(editor), "seconds": 5},
-        "/stop": {},
-    }[path]
 
 
 def test_edits_are_applied_assessed_and_saved(editor: ServedEditor) -> None:
@@ -58,36 +45,8 @@ def test_a_search_needs_a_valid_task_and_writes_nothing_without(editor: ServedEd
     assert json.loads(editor.get("/job")[1]) is None
 
 
-@pytest.mark.parametrize("path", POSTS)
-def test_only_the_page_itself_changes_anything(editor: ServedEditor, path: str) -> None:
-    body = right_body(editor, path)
-    for refused, headers in (
-        (403, {"X_Armwright_Key": ""}),
-        (403, {"X_Armwright_Key": editor.key[:-1]}),
-        (403, {"Origin": ""}),
-        (403, {"Origin": "http://evil.example"}),
-        (403, {"Origin": f"http://localhost:{editor.port}"}),
-        (415, {"Content_Type": "text/plain"}),
-        (421, {"Host": "evil.example"}),
-    ):
-        assert editor.post(path, body, **headers)[0] == refused
-        assert not editor.task.exists()
-    assert editor.get(path)[0] == 405
-    assert ask(editor.port, "OPTIONS", path, X_Armwright_Key=editor.key)[0] == 405
-
-
 @pytest.mark.parametrize(
-    "body",
-    [
-        b"",
-        b"[]",
-        b"null",
-        b"\xff",
-        b"[" * 10_000,
-        b'{"task": 1}',
-        b'{"path": "/etc/passwd", "task": "", "space": ""}',
-        b'{"seconds": NaN}',
-    ],
+    "body", [b"", b"[]", b"\xff", b"[" * 10_000, b'{"task": 1}', b'{"path": "/etc/passwd", "task": "", "space": ""}']
 )
 def test_bodies_that_the_page_never_sends_are_refused(editor: ServedEditor, body: bytes) -> None:
     for path in POSTS:
@@ -100,20 +59,9 @@ def test_large_bodies_are_refused(editor: ServedEditor) -> None:
     assert editor.post("/assess", {**texts(editor), "task_edits": [{"path": ["a"] * 50}]})[0] == 422
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        "/my-task.yaml",
-        "/../my-task.yaml",
-        "/run/../opened/x",
-        "/run/%2e%2e/%2e%2e/etc/passwd",
-        "//etc/passwd",
-        "/opened/",
-        "/vendor/three.min.js",
-    ],
-)
-def test_no_file_is_served_by_name(editor: ServedEditor, path: str) -> None:
-    assert editor.get(path)[0] in (307, 404)
+def test_no_file_is_served_by_name(editor: ServedEditor) -> None:
+    for path in ("/my-task.yaml", "/../my-task.yaml", "/run/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd", "/opened/"):
+        assert editor.get(path)[0] in (307, 404)
 
 
 @pytest.mark.parametrize(
@@ -122,10 +70,10 @@ def test_no_file_is_served_by_name(editor: ServedEditor, path: str) -> None:
         "a: &a [x, x]\nb: [*a, *a]\n",
         "!!python/object/apply:os.system ['true']",
         "targets: " + "[" * 2_000,
-        "1:" * 5_000,
         "name: x\x00y",
         "\ud800",
         "#" * 250_000,
+        *("", "[]", "null", "targets: 7", "cycle: []"),
     ],
 )
 def test_hostile_texts_are_assessed(editor: ServedEditor, task: str) -> None:

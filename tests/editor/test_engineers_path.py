@@ -24,27 +24,16 @@ FIELDS = {
     "Payload [kg]": "0.2",
     "Least number of joints": "3",
     "Largest number of joints": "4",
-    "Base, x, smallest": "-200",
-    "Base, x, largest": "200",
-    "Base, y, smallest": "-200",
-    "Base, y, largest": "200",
+    **{f"Base, {axis}, {end}": value for axis in "xy" for end, value in (("smallest", "-200"), ("largest", "200"))},
     "Base, z, smallest": "20",
     "Base, z, largest": "120",
 }
 
 
 @pytest.fixture
-def editor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ServedEditor]:
-    monkeypatch.chdir(tmp_path)
-    with served_editor(tmp_path / "shelf.yaml") as served:
+def editor(in_folder: Path) -> Iterator[ServedEditor]:
+    with served_editor(in_folder / "shelf.yaml") as served:
         yield served
-
-
-@pytest.fixture
-def tab(browser: Browser) -> Iterator[Tab]:
-    opened = Tab(browser)
-    yield opened
-    opened.close()
 
 
 def draw_task(page: Page) -> None:
@@ -81,7 +70,8 @@ def saved(page: Page, card: str, button: str, folder: Path) -> Path:
     return path
 
 
-def test_from_six_points_to_a_simulated_arm(tab: Tab, editor: ServedEditor, tmp_path: Path) -> None:
+def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEditor, tmp_path: Path) -> None:
+    tab = Tab(browser)
     tab.page.goto(editor.address)
     tab.page.locator("#loading").wait_for(state="hidden")
     draw_task(tab.page)
@@ -121,3 +111,4 @@ def test_from_six_points_to_a_simulated_arm(tab: Tab, editor: ServedEditor, tmp_
     check: Callable[[Path], list[str]] = runpy.run_path(str(ROOT / "benchmarks" / "check_simulation.py"))["check"]
     assert check(tmp_path / "runs/shelf-1/designs" / f"{designs[0]:04d}") == []
     assert tab.faults == []
+    tab.close()

@@ -1,18 +1,15 @@
 """report.html plays the motion of designs through the cycle of their task."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
 
 import armwright as aw
 from armwright.kinematics.arms.forward import joint_positions
 from armwright.page.page import write_report
-from armwright.proof.results import read_summary
 from armwright.runs.folder import read_run
-from armwright.runs.history import History
+from armwright.runs.history import FrontMember, History
 from armwright.tasks.task import Task
 from tests.support.browser import Tab
 
@@ -47,21 +44,22 @@ def history(run: Path) -> History:
     return found
 
 
-@pytest.fixture
-def tab(browser: Browser) -> Iterator[Tab]:
-    opened = Tab(browser, offline=True)
-    yield opened
-    opened.close()
-
-
 def posture(history: History, number: int, motion: int, share: float) -> np.ndarray:
     """The joint values (J,) of a design at a share of a motion."""
     _, paths = history.evaluation([number]).paths.of_arm(0)
     return paths[motion].at(np.array([share]))[0, 0]
 
 
+def check_posture(tab: Tab, history: History, member: FrontMember) -> None:
+    """Assert that the arm is drawn in its posture at the current target."""
+    q = history.evaluation([member.number]).q[0, tab.ask("armwright.state.target")]
+    assert np.array(tab.ask("armwright.drawnJoints()")) == pytest.approx(joint_positions(member.arm, q), abs=1e-4)
+
+
 def test_motion_in_time_follows_the_joint_path(run: Path, tab: Tab, history: History) -> None:
     tab.open(run / "report.html")
+    held = tab.ask("Object.keys(armwright.content.head.cycles).map(Number)")
+    assert sorted(held) == sorted(member.number for member in history.front)
     number = history.front[0].number
     # Half of a motion's time is half of the motion. The cycle: a line, a rest, two joint motions, a rest.
     for time, motion, share, target in (
@@ -73,27 +71,6 @@ def test_motion_in_time_follows_the_joint_path(run: Path, tab: Tab, history: His
         assert (at["target"], at["step"], at["moves"]) == (target, target + 1, share < 1.0)
     off_front = next(n for n in range(len(history)) if n not in {member.number for member in history.front})
     assert tab.ask(f"armwright.during(armwright.content.head, {off_front}, 0)") is None
-
-
-def test_recommended_designs_say_whether_they_are_verified_and_what_they_survive(run: Path, tab: Tab) -> None:
-    summary = read_summary(run)
-    assert summary is not None
-    first = summary["recommended"][0]
-    tab.open(run / "report.html", f"#design={first['design']}")
-    assert f"Recommended ({first['role']}" in tab.text("#design-summary")
-    verdict = first["survival"]["verdict"]
-    assert verdict.startswith("holds ")
-    assert f"): {first['status']}; {verdict}." in tab.text("#design-summary")
-
-
-def test_page_says_which_objectives_ignore_errors_within_tolerances(tmp_path: Path, tab: Tab) -> None:
-    targets = [{"position": [0.3, 0.1, 0.2], "tolerance": 0.01}, [0.2, 0.3, 0.1]]
-    problem = aw.Problem(Task.model_validate({"name": "near", "targets": targets}))
-    aw.optimize(problem, proposer="none", n_init=2, n_total=2, verify=False, out=tmp_path)
-    write_report(tmp_path)
-    tab.open(tmp_path / "report.html", "#design=0")
-    text = " In this task, errors below the stated tolerances count as 0 in position_error."
-    assert text in tab.text("#design-note")
 
 
 def test_play_drives_the_arm_through_its_cycle(run: Path, tab: Tab, history: History) -> None:
@@ -118,10 +95,7 @@ def test_play_drives_the_arm_through_its_cycle(run: Path, tab: Tab, history: His
     on_line = np.array([target == 1 for target, _ in seen])
     assert on_line.any()
     assert np.abs(tips[on_line][:, [0, 2]] - [0.3, 0.2]).max() < 5e-3
-    # Stopping shows the posture at the current target again.
-    target = tab.ask("armwright.state.target")
-    q = history.evaluation([member.number]).q[0, target]
-    assert np.array(tab.ask("armwright.drawnJoints()")) == pytest.approx(joint_positions(member.arm, q), abs=1e-4)
+    check_posture(tab, history, member)
 
 
 def test_selecting_another_design_while_playing_plays_its_motion(run: Path, tab: Tab, history: History) -> None:
@@ -135,22 +109,11 @@ def test_selecting_another_design_while_playing_plays_its_motion(run: Path, tab:
     assert tab.faults == []
 
 
-def test_reduced_motion_steps_from_target_to_target(run: Path, browser: Browser, history: History) -> None:
-    tab = Tab(browser, offline=True, reduced_motion="reduce")
-    try:
-        member = history.front[0]
-        tab.open(run / "report.html", f"#design={member.number}&target=1")
-        tab.page.locator("#play").click()
-        tab.page.get_by_text("Target 2 of 3").wait_for()
-        tab.page.locator("#play").click()
-        target = tab.ask("armwright.state.target")
-        q = history.evaluation([member.number]).q[0, target]
-        assert np.array(tab.ask("armwright.drawnJoints()")) == pytest.approx(joint_positions(member.arm, q), abs=1e-4)
-    finally:
-        tab.close()
-
-
-def test_page_holds_the_motions_of_the_front(run: Path, tab: Tab, history: History) -> None:
-    tab.open(run / "report.html")
-    held = tab.ask("Object.keys(armwright.content.head.cycles).map(Number)")
-    assert sorted(held) == sorted(member.number for member in history.front)
+def test_reduced_motion_steps_from_target_to_target(run: Path, tab: Tab, history: History) -> None:
+    tab.page.emulate_media(reduced_motion="reduce")
+    member = history.front[0]
+    tab.open(run / "report.html", f"#design={member.number}&target=1")
+    tab.page.locator("#play").click()
+    tab.page.get_by_text("Target 2 of 3").wait_for()
+    tab.page.locator("#play").click()
+    check_posture(tab, history, member)

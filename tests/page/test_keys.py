@@ -59,13 +59,9 @@ def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Serv
 
 
 @pytest.fixture(params=["live", "editor"])
-def server(
-    request: pytest.FixtureRequest, served: tuple[Path, int, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Server]:
-    monkeypatch.chdir(tmp_path)
-    run = tmp_path / "secret-run"
-    shutil.copytree(served[0], run)
-    with a_server(request.param, tmp_path, run) as begun:
+def server(request: pytest.FixtureRequest, served: tuple[Path, int, str], in_folder: Path) -> Iterator[Server]:
+    run = Path(shutil.copytree(served[0], in_folder / "secret-run"))
+    with a_server(request.param, in_folder, run) as begun:
         yield begun
 
 
@@ -96,6 +92,32 @@ def test_every_address_but_the_shell_needs_the_key(server: Server) -> None:
         assert ask(server.port, "GET", path)[0] == 403
 
 
+def test_only_the_page_itself_is_served(server: Server, tmp_path: Path) -> None:
+    """With DNS rebinding, the browser considers page and server one site."""
+    own = f"127.0.0.1:{server.port}"
+    right = {"Origin": f"http://{own}", "Content_Type": "application/json", "X_Armwright_Key": server.key}
+    before = files(tmp_path)
+    # Without a search, the editor has no page of a run.
+    posts = [r.path for r in server.routes if "POST" in (r.methods or ()) and not r.path.startswith("/run/")]
+    foreign = ("null", "http://evil.example", f"http://localhost:{server.port}", f"https://{own}")
+    hosts = ("evil.example", f"evil.example:{server.port}", "127.0.0.1", f"127.0.0.1:{server.port + 1}")
+    assert posts
+    for path in posts:
+        for status, changes in (
+            *((403, {"Origin": origin}) for origin in foreign),
+            (415, {"Content_Type": "text/plain"}),
+            *((421, {"Host": host, "Origin": f"http://{host}"}) for host in hosts),
+        ):
+            assert ask(server.port, "POST", path, b"{}", **(right | changes))[0] == status, (path, changes)
+        assert ask(server.port, "POST", path, b"{}", X_Armwright_Key=server.key)[0] == 403
+        for method in ("GET", "OPTIONS"):
+            assert ask(server.port, method, path, **right)[0] == 405
+    for host in hosts:
+        assert ask(server.port, "GET", "/", Host=host)[0] == 421
+    assert ask(server.port, "GET", "/", Host=f"localhost:{server.port}")[0] == 200
+    assert files(tmp_path) == before
+
+
 def test_no_websocket_is_opened(server: Server) -> None:
     own = (f"127.0.0.1:{server.port}", f"http://127.0.0.1:{server.port}")
     for host, origin in (own, ("evil.example", own[1]), (own[0], "http://evil.example"), (own[0], "null")):
@@ -122,6 +144,10 @@ def test_headers_of_proxies_change_nothing(server: Server) -> None:
     own = f"127.0.0.1:{server.port}"
     assert ask(server.port, "POST", path, body, Origin=f"http://{own}", **right, **forged)[0] == 204
     assert ask(server.port, "POST", path, body, Origin=f"https://{own}", **right, **forged)[0] == 403
+
+
+def files(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def history(tab: Tab) -> list[str]:
@@ -170,15 +196,14 @@ def test_the_key_leaves_the_address_and_stays_in_the_tab(server: Server, browser
 
 @pytest.mark.parametrize("kind", ["live", "editor"])
 def test_a_page_of_an_earlier_server_says_so(
-    served: tuple[Path, int, str], tmp_path: Path, browser: Browser, monkeypatch: pytest.MonkeyPatch, kind: str
+    served: tuple[Path, int, str], in_folder: Path, browser: Browser, kind: str
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     tab = Tab(browser)
-    with a_server(kind, tmp_path, served[0]) as first:
+    with a_server(kind, in_folder, served[0]) as first:
         tab.page.goto(first.address)
         tab.page.locator("#loading").wait_for(state="hidden")
         port = first.port
-    with a_server(kind, tmp_path, served[0], port) as second:
+    with a_server(kind, in_folder, served[0], port) as second:
         sentence = (
             "this tab has the key of another server, such as an earlier one; open the address that the terminal shows"
         )
@@ -215,8 +240,8 @@ def neighbour() -> Iterator[tuple[str, list[dict[str, str]]]]:
         there.shutdown()
 
 
-STEAL = """async ([home, paths]) => {
-    const got = [];
+STEAL = """async ([home, paths, posts]) => {
+    const got = [], body = '{"action":"pause"}';
     const attempt = async (what) => {
         try { got.push(String(await what())); } catch (fault) { got.push(fault.name); } };
     const loads = (element) => new Promise((done) => {
@@ -227,6 +252,18 @@ STEAL = """async ([home, paths]) => {
         await attempt(async () => (await fetch(home + path, { headers: { 'x-armwright-key': 'x' } })).text());
         await attempt(async () => (await fetch(home + path, { mode: 'no-cors', credentials: 'include' })).type);
         await attempt(() => loads(Object.assign(document.createElement('script'), { src: home + path })));
+    }
+    for (const path of posts) {
+        for (const headers of [{ 'Content-Type': 'application/json', 'X-Armwright-Key': 'x' }, {}]) {
+            const mode = 'Content-Type' in headers ? 'cors' : 'no-cors';
+            await attempt(async () => (await fetch(home + path, { method: 'POST', body, headers, mode })).text());
+        }
+        await attempt(() => new Promise((done) => {
+            const target = document.createElement('iframe'), form = document.createElement('form');
+            target.name = form.target = path; target.onload = () => done('sent');
+            Object.assign(form, { method: 'POST', action: home + path, enctype: 'text/plain' });
+            form.innerHTML = `<input name='{"action":"pause","x":"' value='"}'>`;
+            document.body.append(target, form); form.submit(); }));
     }
     await attempt(() => JSON.stringify([sessionStorage, localStorage, document.cookie]));
     await attempt(() => document.referrer);
@@ -241,7 +278,7 @@ STEAL = """async ([home, paths]) => {
 
 
 def test_a_page_on_another_port_gets_neither_key_nor_data(
-    server: Server, browser: Browser, neighbour: tuple[str, list[dict[str, str]]]
+    server: Server, browser: Browser, tmp_path: Path, neighbour: tuple[str, list[dict[str, str]]]
 ) -> None:
     """Ports share cookies, so only what belongs to an origin can be kept from the servers of other users."""
     address, got = neighbour
@@ -250,8 +287,10 @@ def test_a_page_on_another_port_gets_neither_key_nor_data(
     wait(tab, server)
     other = tab.context.new_page()
     other.goto(address)
-    paths = [route.path[1:] for route in server.routes if "GET" in (route.methods or ())]
-    stolen: list[Any] = other.evaluate(STEAL, [f"http://127.0.0.1:{server.port}/", paths])
+    before = files(tmp_path)
+    home = f"http://127.0.0.1:{server.port}/"
+    paths, posts = ([r.path[1:] for r in server.routes if method in (r.methods or ())] for method in ("GET", "POST"))
+    stolen: list[Any] = other.evaluate(STEAL, [home, paths, posts])
     # The user leaves our page for the other one, in the same tab and from a link.
     tab.page.on("dialog", lambda dialog: dialog.accept())
     tab.page.evaluate(
@@ -260,24 +299,13 @@ def test_a_page_on_another_port_gets_neither_key_nor_data(
         address,
     )
     expect(tab.page).to_have_title("neighbour")
-    stolen += tab.page.evaluate(STEAL, [f"http://127.0.0.1:{server.port}/", paths])
+    stolen += tab.page.evaluate(STEAL, [home, paths, posts])
+    assert files(tmp_path) == before
     for text in (*stolen, *(str(headers) for headers in got)):
         assert server.key not in text
         assert MARK not in text
     assert len(got) >= 2
     assert all("cookie" not in headers and headers.get("referer", address) == address for headers in got)
-    tab.close()
-
-
-def test_files_are_downloaded_with_the_key(served: tuple[Path, int, str], browser: Browser) -> None:
-    """Those of the editor's search are downloaded in tests/editor/test_engineers_path.py."""
-    _, port, key = served
-    tab = Tab(browser)
-    tab.open(f"http://127.0.0.1:{port}/#key={key}")
-    with tab.page.expect_download() as download:
-        tab.page.get_by_role("button", name="URDF", exact=True).first.click()
-    assert Path(download.value.path()).read_text(encoding="utf-8").startswith("<?xml")
-    assert all(key not in url for url in tab.requests)
     tab.close()
 
 
@@ -295,3 +323,4 @@ def test_no_log_holds_the_key(served: tuple[Path, int, str], in_folder: Path, co
             connection.recv(64)
         process.send_signal(signal.SIGINT)
         assert process.communicate(timeout=PATIENCE) == ("", "")
+    assert process.returncode == 0

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
@@ -37,12 +36,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def tab(folder: Path, browser: Browser) -> Iterator[Tab]:
-    opened = Tab(browser, offline=True)
-    opened.open(folder / "report.html")
-    yield opened
-    opened.close()
-    assert not opened.faults
+def tab(folder: Path, tab: Tab) -> Iterator[Tab]:
+    tab.open(folder / "report.html")
+    yield tab
+    assert not tab.faults
 
 
 def stored(folder: Path, design: int) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path as Path2D
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
-from playwright.sync_api import Browser
 
 import armwright as aw
 from armwright.existing.compare_arms import compare_arms
@@ -126,13 +125,6 @@ def test_texts_of_figures_are_whole_and_apart(run: Path, drawn: dict[str, Drawn]
         for (text, path), (other, box) in product(one.lines, texts):
             is_crossed = text != other and path.intersects_bbox(box.padded(-TOUCHING), filled=False)
             assert not is_crossed, f"{name}: the line of {text!r} crosses {other!r}"
-
-
-@pytest.fixture
-def tab(browser: Browser) -> Iterator[Tab]:
-    opened = Tab(browser, offline=True)
-    yield opened
-    opened.close()
 
 
 @pytest.mark.parametrize("width", WIDTHS)

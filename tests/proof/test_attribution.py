@@ -53,11 +53,8 @@ def test_trial_gains_the_hypervolume_it_adds_on_entry() -> None:
 
 
 def test_attribution_without_a_reference_point_has_no_hypervolume() -> None:
+    assert attribution_by_source(history([])) == {}
     past = history([("", (4, 4)), ("", (8, 0))], OPEN)
     assert hypervolume_gains(past) is None
     assert attribution_by_source(past)["random"].hypervolume_gained is None
     assert attribution_by_source(past)["random"].front == 2
-
-
-def test_attribution_without_trials_is_empty() -> None:
-    assert attribution_by_source(history([])) == {}

@@ -1,8 +1,6 @@
 """Best known fronts of the built-in tasks, each in the space that it is meant for."""
 
 import dataclasses
-import runpy
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,12 +12,8 @@ from armwright.proof.front_gap import best_known_hypervolume, front_gap, known_f
 from armwright.spaces.design_space import builtin_spaces, default_space, paper_space
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.payload import Payload
-from armwright.tasks.task import Task
-from tests import ROOT
 
 PAPER = Problem(load_task("target-1"))
-OPEN = Task(name="open", targets=((0.3, 0.0, 0.3), (0.2, 0.1, 0.4)))
-EFFORT = (POSITION_ERROR, dataclasses.replace(TORQUE, name="effort"))
 CYCLES = [name for name in builtin_names() if name in builtin_spaces()]
 POINTS = [name for name in builtin_names() if name not in builtin_spaces()]
 # Hypervolumes of the fronts with all designs that were found, before some were chosen for the package.
@@ -77,19 +71,21 @@ def test_best_known_fronts_are_feasible_and_as_good_as_stated(name: str) -> None
 
 def test_other_problems_have_no_such_front() -> None:
     problem = problem_of("desk-sorting")
-    task = problem.task
-    assert known_front(Problem(task.model_copy(update={"name": "mine"}), problem.space)) is not None
-    payload = task.payload
+    task, space, payload = problem.task, problem.space, problem.task.payload
+    assert known_front(Problem(task.model_copy(update={"name": "mine"}), space.model_copy(update={"name": "mine"})))
     assert isinstance(payload, Payload)
     heavier = task.model_copy(update={"payload": payload.model_copy(update={"mass": 0.2})})
-    assert known_front(Problem(heavier, problem.space)) is None
-    assert known_front(Problem(task, problem.space, tolerance=1e-3)) is None
-    assert known_front(Problem(task, default_space("screwing"))) is None
-    bounded = task.model_copy(update={"constraints": ("price <= 1000",)})
-    assert known_front(Problem(bounded, problem.space)) is None
-    points = known_front(PAPER)
-    assert points is not None
-    assert points.values.shape[1] == 2
+    effort = (POSITION_ERROR, dataclasses.replace(TORQUE, name="effort"))
+    for other in (
+        Problem(heavier, space),
+        Problem(task, space, tolerance=1e-3),
+        Problem(task, default_space("screwing")),
+        Problem(task.model_copy(update={"constraints": ("price <= 1000",)}), space),
+        Problem(PAPER.task, paper_space(5)),
+        Problem(PAPER.task, paper_space().model_copy(update={"link": (0.03, 0.31)})),
+        Problem(PAPER.task, objectives=effort),
+    ):
+        assert known_front(other) is None
 
 
 def test_front_gap_to_the_best_known_front() -> None:
@@ -125,35 +121,3 @@ def test_shares_count_the_designs_that_are_not_kept(name: str) -> None:
     assert gap.share == pytest.approx(hypervolume(found, reference) / WHOLE[name], rel=1e-12, abs=0.0)
     kept = hypervolume(known.values, reference) / WHOLE[name]
     assert 0.999 <= kept <= 1.0
-
-
-def test_fronts_are_reduced_by_the_designs_that_cost_least(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
-    reduced = runpy.run_path(str(ROOT / "benchmarks" / "reference_fronts.py"))["reduced"]
-    angles = np.linspace(0.01, 0.49, 200) * np.pi
-    front = 1.0 - np.column_stack([np.sin(angles), np.cos(angles)])
-    kept = reduced(front, (1.0, 1.0))
-    least = 0.999 * hypervolume(front, (1.0, 1.0))
-    assert hypervolume(front[kept], (1.0, 1.0)) >= least
-    assert (kept[0], kept[-1]) == (0, 199)
-    assert all(hypervolume(front[np.delete(kept, i)], (1.0, 1.0)) < least for i in range(1, len(kept) - 1))
-    assert reduced(front[:2], (1.0, 1.0)).tolist() == [0, 1]
-
-
-@pytest.mark.parametrize(
-    "problem",
-    [
-        Problem(OPEN),
-        Problem(PAPER.task, paper_space(5)),
-        Problem(PAPER.task, paper_space().model_copy(update={"link": (0.03, 0.31)})),
-        Problem(PAPER.task, tolerance=1e-3),
-        Problem(PAPER.task, objectives=EFFORT),
-    ],
-)
-def test_changed_problems_have_no_best_known_front(problem: Problem) -> None:
-    assert known_front(problem) is None
-
-
-def test_renamed_space_keeps_its_best_known_front() -> None:
-    renamed: Any = paper_space().model_copy(update={"name": "mine"})
-    assert known_front(Problem(PAPER.task.model_copy(update={"name": "mine"}), renamed)) is not None

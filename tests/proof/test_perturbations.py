@@ -122,19 +122,16 @@ def test_torque_at_less_voltage_is_that_at_a_higher_speed(record: ActuatorRecord
     assert record.at_voltage(1.0).actuator() == record.actuator()
 
 
-def test_heavier_payload_breaks_what_a_task_with_it_breaks() -> None:
+def test_changed_payload_breaks_what_a_task_with_it_breaks() -> None:
     bounds: dict[str, Any] = {"constraints": ["torque_utilisation <= 0.3", "dynamic_utilisation <= 0.3"]}
-    payload = DESK["payload"] | {"mass": 1.1 * DESK["payload"]["mass"]}
-    found = perturbation(Desk(**bounds), HEAVIER)
-    assert_breaks(found, HEAVIER, Desk(payload=payload, **bounds))
-
-
-def test_payload_off_centre_breaks_what_a_task_with_it_breaks() -> None:
-    bounds: dict[str, Any] = {"constraints": ["torque_utilisation <= 0.3", "dynamic_utilisation <= 0.3"]}
-    found = perturbation(Desk(**bounds), SHIFTED)
-    assert found.changes == 6
-    for change, center in (("x +10 mm", [0.01, 0.0, 0.02]), ("z -10 mm", [0.0, 0.0, 0.01])):
-        assert_breaks(found, change, Desk(payload=DESK["payload"] | {"center": center}, **bounds))
+    shifted, heavier = (perturbation(Desk(**bounds), name) for name in (SHIFTED, HEAVIER))
+    assert (shifted.changes, heavier.changes) == (6, 1)
+    for found, change, values in (
+        (heavier, HEAVIER, {"mass": 1.1 * DESK["payload"]["mass"]}),
+        (shifted, "x +10 mm", {"center": [0.01, 0.0, 0.02]}),
+        (shifted, "z -10 mm", {"center": [0.0, 0.0, 0.01]}),
+    ):
+        assert_breaks(found, change, Desk(payload=DESK["payload"] | values, **bounds))
 
 
 def test_moved_base_and_links_break_what_their_evaluation_breaks() -> None:
@@ -152,14 +149,6 @@ def test_moved_base_and_links_break_what_their_evaluation_breaks() -> None:
         assert found.verdict.startswith(expected)
 
 
-@pytest.mark.slow
-def test_designs_hold_with_room_to_the_limits() -> None:
-    found = survival_of(Desk(**ROOM))
-    breaks = {one.name for one in found.perturbations if one.broken}
-    assert breaks <= {MOVED}  # the tolerances of the targets are 1 mm
-    assert [one.name for one in found.perturbations] == [MOVED, SUPPLY, ASSUMED, HEAVIER, SHIFTED]
-
-
 def test_stated_motors_and_empty_grippers_are_not_changed() -> None:
     names = [one.name for one in survival_of(Desk(space=stated(factor=1.0), payload=0.0)).perturbations]
     assert names == [MOVED, SUPPLY]
@@ -168,6 +157,7 @@ def test_stated_motors_and_empty_grippers_are_not_changed() -> None:
 @pytest.mark.slow
 def test_feasible_changes_of_all_values_are_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
     found = survival_of(Desk(**ROOM), simulates=True)
+    assert {one.name for one in found.perturbations if one.broken} <= {MOVED}  # the tolerances of the targets are 1 mm
     assert found.simulated == ("all halved", "all doubled")
     tight = survival_of(Desk(), simulates=True)
     assert "all halved" not in tight.simulated

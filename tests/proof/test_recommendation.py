@@ -15,6 +15,7 @@ from armwright.proof.results import read_summary
 from armwright.proof.selection import pick, survival_of
 from armwright.proof.simulated_run import Simulator
 from armwright.runs.folder import read_run
+from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests.proof.test_simulation import SPACE, Desk
@@ -49,18 +50,9 @@ def test_a_finished_run_states_what_is_verified(run: Path) -> None:
 @pytest.mark.slow
 def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
     content = json.loads(armwright("simulate", run, "--json").stdout)
-    assert list(content) == ["mujoco", "timestep", "feed_forward", "simulated", "passed", "designs"]
     assert (content["simulated"], content["passed"]) == (1, 1)
     (design,) = content["designs"]
-    assert list(design) == [
-        *("design", "verdict", "reasons", "cycle_time", "energy"),
-        *("targets", "joints", "contacts"),
-    ]
-    assert list(design["targets"][0])[:4] == ["step", "target", "tip_error", "angle_error"]
-    assert list(design["joints"][0]) == [
-        *("joint", "peak_torque", "rms_torque", "claimed_peak_torque"),
-        *("claimed_rms_torque", "peak_speed", "saturated_fraction"),
-    ]
+    assert (design["design"], design["verdict"]) == (0, "pass")
     assert json.loads((run / "simulation.json").read_text(encoding="utf-8")) == content
     assert "#0, verified; holds all but: " in " ".join(armwright("simulate", run).stdout.split())
     place = run / "designs" / "0000"
@@ -68,8 +60,6 @@ def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
     rows = (place / "simulation.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].startswith("time,step,tip_x,tip_y,tip_z,q_1")
     assert len(rows) == len((place / "trajectory.csv").read_text(encoding="utf-8").splitlines())
-    shown = armwright("simulate", run, "--design", "0").stdout
-    assert "1 of 1 pass" in shown
 
 
 def test_simulate_refuses_what_it_cannot_drive(run: Path, tmp_path: Path) -> None:
@@ -135,9 +125,16 @@ class Verdicts:
         return SimpleNamespace(result=SimpleNamespace(verdict="fail" if fails else "pass", reasons=reasons))
 
 
-def test_failing_designs_are_demoted_with_their_reason() -> None:
-    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+@pytest.fixture(scope="module")
+def history() -> History:
+    return aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+
+
+def test_failing_designs_are_demoted_with_their_reason(history: History) -> None:
     order = candidates(history)
+    assert list(order) == ["knee", "least position_error", "least torque"]
+    for index, role in enumerate(("least position_error", "least torque")):
+        assert history.values[order[role][0], index] == min(member.values[index] for member in history.front)
     knee, second = order["knee"][:2]
     chosen = {one.role: one for one in recommend(history, cast("Simulator", Verdicts({knee})))}
     assert (chosen["knee"].design, chosen["knee"].status) == (second, "verified")
@@ -147,20 +144,12 @@ def test_failing_designs_are_demoted_with_their_reason() -> None:
         assert one.status == "not verified: joint_2 is at its torque limit"
 
 
-def test_recommended_designs_are_not_simulated_without_time() -> None:
-    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+def test_recommended_designs_are_not_simulated_without_time(history: History) -> None:
     simulator = SimpleNamespace(members={})
     chosen = recommend(history, cast("Simulator", simulator), has_time=lambda *_: False)
     assert [one.design for one in chosen] == [numbers[0] for numbers in candidates(history).values()]
     assert {one.status for one in chosen} == {"not simulated: the time is up"}
     assert {one.survival for one in chosen} == {None}
-
-
-def test_ends_of_the_front_have_the_least_objectives() -> None:
-    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
-    for index, role in enumerate(("least position_error", "least torque")):
-        first = candidates(history)[role][0]
-        assert history.values[first, index] == min(member.values[index] for member in history.front)
 
 
 @pytest.mark.slow
@@ -177,5 +166,3 @@ def test_cheapest_and_stiffest_designs_are_roles_where_they_are_known() -> None:
         assert list(roles) == ["knee", *(f"least {name}" for name in (*ends, "price", "deflection"))]
         for name in ("price", "deflection"):
             assert roles[f"least {name}"][0] == pick(history, by=name)[0].number
-    toy = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=10, verify=False).history
-    assert list(candidates(toy)) == ["knee", "least position_error", "least torque"]

@@ -7,7 +7,7 @@ import pytest
 
 from armwright.problem.problem import Problem
 from armwright.proof.results import read_summary, verify_run
-from armwright.proof.verification import START_SPREAD, STARTS, verify
+from armwright.proof.verification import START_SPREAD, STARTS, Verification, verify, verify_front
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
@@ -44,13 +44,17 @@ def designs() -> list[Design]:
     return PROBLEM.space.sample(60, seed=4)
 
 
-def test_exact_values_agree_with_the_reference(designs: list[Design]) -> None:
-    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
+@pytest.fixture(scope="module")
+def found(designs: list[Design]) -> Verification:
+    return verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
+
+
+def test_exact_values_agree_with_the_reference(designs: list[Design], found: Verification) -> None:
     agree(found.exact, values_of(PROBLEM, designs))
 
 
 @pytest.mark.slow
-def test_perturbed_values_are_the_worst_over_copies(designs: list[Design]) -> None:
+def test_perturbed_values_are_the_worst_over_copies(designs: list[Design], found: Verification) -> None:
     rows = PROBLEM.space.matrix(designs)
     copies = list(perturbed(PROBLEM.space, rows))
     assert len(copies) == 2 * 7
@@ -58,23 +62,20 @@ def test_perturbed_values_are_the_worst_over_copies(designs: list[Design]) -> No
         off = np.abs(copy - rows)
         assert np.all(np.count_nonzero(off > 1e-12, axis=1) == 1)
         assert off.max(axis=1) == pytest.approx(1e-3)
-    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
     worst = np.max([values_of(PROBLEM, PROBLEM.space.designs(copy)) for copy in copies], axis=0)
     agree(found.moved, worst)
 
 
 @pytest.mark.slow
-def test_restarted_values_are_the_worst_of_twenty(designs: list[Design]) -> None:
-    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
+def test_restarted_values_are_the_worst_of_twenty(designs: list[Design], found: Verification) -> None:
     shape = STARTS, len(PROBLEM.task.targets), PROBLEM.space.joints
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
     worst = np.max([values_of(PROBLEM, designs, start) for start in starts], axis=0)
     agree(found.started, worst)
 
 
-def test_robustness_follows_from_the_worst_cases(designs: list[Design]) -> None:
+def test_robustness_follows_from_the_worst_cases(designs: list[Design], found: Verification) -> None:
     values = PROBLEM.evaluate(designs).values
-    found = verify(PROBLEM, designs, values, BOX)
     allowed = values + np.maximum(0.05 * values, 0.005 * np.array(BOX))
     for i in range(len(designs)):
         robust = np.all(found.exact[i] <= allowed[i]) and np.all(found.moved[i] <= allowed[i])
@@ -120,8 +121,6 @@ def test_verify_run_marks_the_front(tmp_path: Path) -> None:
 
 
 def test_history_without_a_reference_point_is_not_verified() -> None:
-    from armwright.proof.verification import verify_front
-
     problem = Problem(Task(name="open", targets=((0.3, 0.0, 0.3),)))
     (design,) = problem.space.sample(1, seed=0)
     trial = FinishedTrial(0, "random", design, tuple(problem.evaluate([design]).values[0].tolist()))

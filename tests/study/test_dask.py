@@ -22,12 +22,12 @@ from armwright.problem.objective import Objective
 from armwright.runs.control import stop_study
 from armwright.study.progress import Progress
 from armwright.study.workers.cluster import Finished
+from tests.support.command_line import start
 from tests.support.dask_processes import (
     TASK,
     Bench,
     ShellCluster,
     all_ended,
-    begin_command,
     descendants,
     wait_until,
 )
@@ -196,7 +196,7 @@ def test_killed_local_workers_and_search_are_resumed(tmp_path: Path, bench: Benc
         """Two more designs are held by two workers."""
         before = len(bench.evaluated)
         bench.ask("hold")
-        process = begin_command(*command)
+        process = start(*command)
         wait_until(lambda: len(bench.evaluated) == before + 2)
         return process
 
@@ -262,7 +262,7 @@ def test_version_mismatch_and_lost_scheduler_are_one_line(tmp_path: Path, bench:
         cluster.add_worker()
         bench.ask("hold")
         command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--out", out)
-        search = begin_command(*command, "--scheduler", cluster.address)
+        search = start(*command, "--scheduler", cluster.address)
         wait_until(lambda: bool(bench.evaluated))
         cluster.scheduler.kill()
         said, complained = search.communicate()
@@ -310,7 +310,7 @@ def test_worker_evaluator_exception_has_its_traceback_and_design(
 def test_command_line_shows_the_evaluator_traceback(tmp_path: Path, bench: Bench) -> None:
     bench.ask("fail")
     command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--out", tmp_path / "run")
-    search = begin_command(*command)
+    search = start(*command)
     _, complained = search.communicate()
     assert search.returncode == 1
     *trace, cause, line = complained.splitlines()
@@ -342,7 +342,7 @@ def test_hanging_evaluation_is_ended_on_a_worker(tmp_path: Path, shell: ShellClu
 def test_process_of_an_evaluator_ends_with_a_killed_search(tmp_path: Path, bench: Bench) -> None:
     bench.ask("hold")
     command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--evaluation-timeout", "1000")
-    search = begin_command(*command, "--out", tmp_path / "run")
+    search = start(*command, "--out", tmp_path / "run")
     wait_until(lambda: len(bench.evaluated) == 1)
     started = descendants(search.pid)
     search.kill()
@@ -430,7 +430,7 @@ def test_ctrl_c_ends_an_experiment_and_its_workers(tmp_path: Path) -> None:
     plan, cells = two_cells(tmp_path / "out", n_total=10_000)
     file = tmp_path / "two.yaml"
     file.write_text(yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True)), encoding="utf-8")
-    process = begin_command("experiment", file, "--workers", "2", "--out", tmp_path / "out")
+    process = start("experiment", file, "--workers", "2", "--out", tmp_path / "out")
     wait_until(lambda: have_begun(cells))
     started = descendants(process.pid)
     process.send_signal(signal.SIGINT)

@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 
 import armwright as aw
-from tests.support.command_line import PATIENCE, start, wait_until
+from tests.support.command_line import PATIENCE, wait_until
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 
@@ -103,9 +103,6 @@ class ShellCluster:
         for process in (*self.workers, self.scheduler):
             process.kill()
             process.wait()
-
-
-begin_command = start
 
 
 def descendants(pid: int) -> list[psutil.Process]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.urdf_writer import to_urdf
@@ -63,7 +64,7 @@ def with_frames_anyhow(arm: Arm, seed: int, off: float = 0.0) -> str:
             axis.set("xyz", _words(turns[child].T @ direction))  # type: ignore[index]
         origin.attrib.update(  # type: ignore[union-attr]
             xyz=_words(before.T @ place),
-            rpy=_words(_angles(before.T @ zero @ turns[child])),  # type: ignore[index]
+            rpy=_words(Rotation.from_matrix(before.T @ zero @ turns[child]).as_euler("xyz")),  # type: ignore[index]
         )
     for link in robot.iter("link"):
         com = link.find("inertial/origin")
@@ -76,12 +77,6 @@ def with_frames_anyhow(arm: Arm, seed: int, off: float = 0.0) -> str:
 def _any_turn(rng: np.random.Generator) -> np.ndarray:
     q, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     return q * np.sign(np.linalg.det(q))
-
-
-def _angles(turn: np.ndarray) -> np.ndarray:
-    """Roll, pitch and yaw."""
-    pitch = np.arctan2(-turn[2, 0], np.hypot(turn[0, 0], turn[1, 0]))
-    return np.array([np.arctan2(turn[2, 1], turn[2, 2]), pitch, np.arctan2(turn[1, 0], turn[0, 0])])
 
 
 def _words(values: np.ndarray) -> str:

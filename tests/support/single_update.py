@@ -14,17 +14,9 @@ from armwright.tasks.targets import TargetArrays
 def update_once(
     arms: ArmArrays, points: Array, q: Floats, h_before: Floats, target_arrays: TargetArrays | None = None
 ) -> tuple[Floats, Floats]:
-    """Make one update of the inverse kinematics of each arm at its own target, on the CPU.
+    """Make one update of the inverse kinematics of each arm at its own point (N, 3) [m], on the CPU.
 
-    Args:
-        arms: N arms.
-        points: (N, 3) the target of each arm [m].
-        q: (N, D) joint angles [rad] or displacements [m], in the precision of the arms.
-        h_before: (N, D) limit gradients of the update before, in the same precision.
-        target_arrays: The axis or orientation of one target for all arms.
-
-    Returns:
-        (N, D) joint angles or displacements, and limit gradients.
+    q, h_before: (N, D) joint values and limit gradients of the update before, in the precision of the arms.
     """
     # Only the target's position relative to the base matters, so each arm is moved and all share the target 0.
     shifted = replace(arms, base=np.asarray(arms.base - points, dtype=arms.precision))

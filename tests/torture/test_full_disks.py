@@ -12,7 +12,7 @@ import pytest
 from armwright.exceptions import RunFolderError
 from armwright.llm.transcript import Call, Transcript
 from tests.support import command_line
-from tests.torture.short import armwright, command, is_beginning, is_resumed, is_same_run, one_line, study
+from tests.torture.short import armwright, is_resumed, is_same_run, one_line, study
 
 Tell = Callable[[str, object], None]
 
@@ -116,11 +116,3 @@ def test_no_space_for_the_kernels(tmp_path: Path, whole: Path) -> None:
     words = one_line(armwright(*study(tmp_path / "run"), environment=cache, preexec_fn=limit(50_000)))
     assert "cannot write compiled kernels: File too large" in words
     is_resumed(tmp_path / "run", whole)
-
-
-def test_output_streams_on_a_full_disk(tmp_path: Path, whole: Path) -> None:
-    """stdout and stderr on a full disk."""
-    with open("/dev/full", "w", encoding="utf-8") as full:
-        code = subprocess.run(command(study(tmp_path / "run")), stdout=full, stderr=full).returncode
-    assert code == 1
-    is_beginning(tmp_path / "run", whole)

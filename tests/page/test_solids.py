@@ -1,4 +1,4 @@
-"""Motor bodies in figures and on the page, at the places of Pinocchio."""
+"""Motor bodies and columns in figures and on the page, motors at the places of Pinocchio."""
 
 from pathlib import Path
 from typing import Any
@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pinocchio
 import pytest
-from playwright.sync_api import Browser
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from armwright.kinematics.arms.forward import motor_solids
 from armwright.page.page import write_report
-from armwright.pictures.figures import write_figures
+from armwright.pictures.arm_figures import draw_arm
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_writer import to_urdf
@@ -20,17 +20,16 @@ from armwright.study.study import optimize
 from armwright.tasks.task import Task
 from tests.support.browser import Tab
 
-SPACE = DesignSpace.model_validate(
-    {
-        "name": "bodies",
-        "joints": [2, 4],
-        "joint_types": ["R", "P", "Y", "S", "F"],
-        "mount": ["floor", "wall+x"],
-        "link": [0.1, 0.3],
-        "link_directions": ["+z", "-x"],
-        "actuators": ["XM540-W270", "AK60-6"],
-    }
-)
+CONTENT: dict[str, Any] = {
+    "name": "bodies",
+    "joints": [2, 4],
+    "joint_types": ["R", "P", "Y", "S", "F"],
+    "link": [0.1, 0.3],
+    "link_directions": ["+z", "-x"],
+    "actuators": ["XM540-W270", "AK60-6"],
+}
+SPACE = DesignSpace.model_validate({**CONTENT, "mount": ["floor", "wall+x"]})
+WITH_COLUMN = DesignSpace.model_validate({**CONTENT, "origin_z": [-0.1, 0.3], "column": {}})
 TASK = Task(name="near", targets=((0.3, 0.0, 0.3), (0.2, 0.2, 0.3)), objectives=("worst_error", "mass"))
 
 
@@ -66,21 +65,27 @@ def test_drawn_solids_are_those_of_the_exported_arm() -> None:
 
 
 @pytest.mark.slow
-def test_page_and_figures_draw_motors(tmp_path: Path, browser: Browser) -> None:
-    optimize(Problem(TASK, SPACE), proposer="none", n_init=30, n_total=30, out=tmp_path, verify=False)
-    assert "arms.png" in {path.name for path in write_figures(tmp_path)}
+def test_page_and_figures_draw_motors_and_columns(tmp_path: Path, tab: Tab) -> None:
+    """A column stands on the ground, below the base, where the arm has one."""
+    optimize(Problem(TASK, WITH_COLUMN), proposer="none", n_init=30, n_total=30, out=tmp_path, verify=False)
     write_report(tmp_path)
     history = read_run(tmp_path)[1]
-    number = history.front[0].number
-    arm, evaluation = history.member(number).arm, history.evaluation([number])
-    tab = Tab(browser, offline=True)
-    try:
-        tab.open(tmp_path / "report.html")
-        tab.ask(f"armwright.set({{ design: {number}, target: 1 }})")
-        tab.ask("armwright.drawArm()")
-        drawn = np.array(tab.ask("armwright.drawnMotors()"))
-        assert not tab.faults
-    finally:
-        tab.close()
-    solids = motor_solids(arm, evaluation.q[0, 1, : len(arm.joints)])
-    assert drawn == pytest.approx(np.array([solid.centre for _, solid in solids]), abs=1e-5)
+    tab.open(tmp_path / "report.html")
+    has_column = set()
+    for number in range(10):
+        arm, evaluation = history.member(number).arm, history.evaluation([number])
+        tab.ask(f"armwright.set({{ design: {number}, target: 1 }}); armwright.drawArm()")
+        motors = [solid.centre for _, solid in motor_solids(arm, evaluation.q[0, 1, : len(arm.joints)])]
+        assert np.array(tab.ask("armwright.drawnMotors()")) == pytest.approx(np.array(motors), abs=1e-5)
+        x, y, z = arm.base
+        column, foot = tab.ask("armwright.drawnColumn()"), [x - 0.03, y - 0.03, 0.0]
+        axes = draw_arm(history, "arm", history.member(number)).axes[0]
+        corners = [np.concatenate(one._faces) for one in axes.collections if isinstance(one, Poly3DCollection)]
+        feet = [low for low in (one.min(axis=0) for one in corners) if np.allclose(low, foot, atol=1e-6)]
+        assert (column is not None) == (arm.column is not None) == bool(feet)
+        if column is not None:
+            assert [*column["centre"], column["half"]] == pytest.approx([x, y, z / 2, z / 2], abs=1e-6)
+            assert axes.get_zlim()[0] <= 0.0
+        has_column.add(column is not None)
+    assert has_column == {True, False}
+    assert not tab.faults
