@@ -1,6 +1,6 @@
 """The problem: a design space, a task, and the objectives to minimise."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -282,6 +282,30 @@ class Problem:
         """Return the targets and surroundings of each case of the task."""
         return tuple(task_scene(self.task, targets, payloads) for targets, payloads in self.task.cases)
 
+    def cases(
+        self,
+        arms: ArmArrays,
+        near: Sequence[Array | None] = (),
+        scenes: Sequence[Scene] = (),
+        start: Array | None = None,
+    ) -> Iterator[Evaluation]:
+        """Yield the physics of N arms, such as changed designs, in each case of the task.
+
+        Args:
+            arms: N arms.
+            near: (N, B, D) postures of each case that the arms keep as far as they can, such as those of the unchanged
+                designs; empty to choose postures.
+            scenes: changed surroundings of each case; empty for the task's.
+            start: initial joint values as in `evaluate_arrays`.
+        """
+        scenes = scenes or self.scenes
+        for scene, postures in zip(scenes, near or [None] * len(scenes), strict=True):
+            yield evaluate_arrays(arms, scene, self.device, initial_q=start, near=postures)
+
+    def worst(self, evaluations: Iterable[Evaluation], measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
+        """Return the worst outcomes of the same designs in several evaluations, of which one is in memory at a time."""
+        return worst_case([self.outcomes(evaluation, measured) for evaluation in evaluations])
+
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.
 
@@ -310,7 +334,7 @@ class Problem:
         q: list[Array] = []
         for rows in self.chunks(len(matrix)):
             chunk = {name: column[rows] for name, column in measured.items()}
-            found = worst_case([self.outcomes(physics, chunk) for physics in self._variants(matrix[rows])])
+            found = self.worst(self._variants(matrix[rows]), chunk)
             values[rows], violations[rows] = found.values, found.violations
             postures += [] if found.postures is None else [found.postures]
             q += [] if found.q is None else [found.q]
@@ -324,12 +348,13 @@ class Problem:
 
     def _variants(self, matrix: Array) -> Iterator[Evaluation]:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
+        near: list[Array | None] = []
         for case in range(len(self.scenes)):
             exact = self.physics(matrix, case)
+            near.append(exact.entry_postures)
             yield exact
-            near = exact.entry_postures
-            for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
-                yield self.physics(self.arms(rows), case, near)
+        for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
+            yield from self.cases(self.arms(rows), near)
 
     @cached_property
     def _postures(self) -> int:

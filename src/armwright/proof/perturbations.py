@@ -21,7 +21,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.constraints import Constraint
-from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
+from armwright.problem.evaluation import Evaluation, Scene
 from armwright.problem.problem import Problem
 from armwright.proof.simulated_run import simulate_arm
 from armwright.robot.actuators import ActuatorRecord
@@ -158,15 +158,8 @@ def _evaluate(
 
     near: (N, B, D) postures of the N designs in each case.
     """
-    evaluations = [
-        evaluate_arrays(
-            batch.arms,
-            scene,
-            problem.device,
-            near=None if postures is None else postures[batch.owners, :, : batch.arms.dof],
-        )
-        for scene, postures in zip(batch.scenes, near, strict=True)
-    ]
+    near = [None if postures is None else postures[batch.owners, :, : batch.arms.dof] for postures in near]
+    evaluations = list(problem.cases(batch.arms, near, batch.scenes))
     violations = np.max([problem.violations(evaluation) for evaluation in evaluations], axis=0)
     for change, owner, row in zip(batch.changes, batch.owners, violations, strict=True):
         pairs = sorted(zip(row.tolist(), problem.constraints, strict=True), key=lambda pair: -pair[0])
@@ -180,15 +173,13 @@ def _evaluate(
 
 def _moved(problem: Problem, matrix: Array) -> _Batch:
     """Return the designs with one length or coordinate of the base off by ±1 mm."""
-    names = [problem.space.parameters[column].name for column in length_columns(problem.space)]
-    texts = [f"{name} {sign}{1e3 * TOLERANCE:g} mm" for name in names for sign in "-+"]
-    n = len(matrix)
-    arms = problem.arms(np.vstack(list(perturbed(problem.space, matrix))))
-    owners, changes = np.tile(np.arange(n), len(texts)), [Change(MOVED, text) for text in texts for _ in range(n)]
-    designs = problem.space.designs(matrix)
-    has = np.array([change.text.split()[0] in designs[i].params for change, i in zip(changes, owners, strict=True)])
-    rows = np.flatnonzero(has)
-    return _Batch([changes[row] for row in rows], owners[rows], arms[rows], problem.scenes)
+    space = problem.space
+    names = [space.parameters[column].name for column in length_columns(space) for _ in "-+"]
+    active = np.array([space.active(name, matrix) for name in names])  # (K, N)
+    arms = problem.arms(np.stack(list(perturbed(space, matrix)))[active])
+    which, owners = np.nonzero(active)
+    changes = [Change(MOVED, f"{names[k]} {'-+'[k % 2]}{1e3 * TOLERANCE:g} mm") for k in which.tolist()]
+    return _Batch(changes, owners, arms, problem.scenes)
 
 
 def _loaded(problem: Problem, matrix: Array) -> Iterator[_Batch]:
