@@ -13,18 +13,17 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
-from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays, task_scene
+from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.evaluators import Evaluator, Measurement
 from armwright.problem.failure import Failure
-from armwright.problem.objective import Objective
+from armwright.problem.objective import Need, Objective
 from armwright.problem.objectives import (
     ORIENTATION_ERROR,
-    ORIENTATION_QUANTITIES,
     PAPER_OBJECTIVES,
     QUANTITIES,
-    RENAMED,
     named_objectives,
 )
+from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.base_support import supported_space
@@ -154,7 +153,7 @@ class Problem:
             raise SettingsError(f"expected a tolerance or an evaluator, got both ({self.evaluator.name})")
         self._check_custom_parameters()
         for objective in self.objectives:
-            if objective in ORIENTATION_QUANTITIES and not self.task.target_arrays.oriented:
+            if "orientation" in objective.needs and not self.task.target_arrays.oriented:
                 raise SettingsError(
                     f"objective {objective.name} needs a target with an axis or an orientation; task {self.task.name} "
                     "has none"
@@ -191,7 +190,7 @@ class Problem:
             if name not in names:
                 raise TaskError(
                     f'task {self.task.name}: resolution: "{name}" is not an objective of the task '
-                    f"({', '.join(names)}).{did_you_mean(name, names, RENAMED)}"
+                    f"({', '.join(names)}).{did_you_mean(name, names)}"
                 )
 
     def _check_custom_parameters(self) -> None:
@@ -213,10 +212,14 @@ class Problem:
         """Return the worst values that count for the hypervolume, if the task states them."""
         return self.task.reference_point
 
-    def uses(self, *quantities: Objective) -> bool:
-        """Return whether any of these is an objective or bounded by a constraint."""
-        used = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
-        return any(quantity.name in used for quantity in quantities)
+    @property
+    def quantities(self) -> tuple[Objective, ...]:
+        """The objectives, and the quantities that constraints bound."""
+        return tuple(dict.fromkeys((*self.objectives, *(constraint.quantity for constraint in self.constraints))))
+
+    def uses(self, *needs: Need) -> bool:
+        """Return whether an objective or a bounded quantity depends on any of these."""
+        return any(need in quantity.needs for quantity in self.quantities for need in needs)
 
     def arm(self, design: Design) -> Arm:
         """Return the arm that a design builds, with the task's tool."""

@@ -21,8 +21,9 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.constraints import Constraint
-from armwright.problem.evaluation import Evaluation, Scene
+from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
+from armwright.problem.scene import Scene
 from armwright.proof.simulated_run import simulate_arm
 from armwright.robot.actuators import ActuatorRecord
 from armwright.robot.arm import Arm
