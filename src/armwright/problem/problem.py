@@ -38,36 +38,23 @@ NO_MEASUREMENTS: Mapping[str, Array] = {}
 
 @dataclass(frozen=True)
 class Outcome:
-    """Hold the result of evaluating one design.
+    """Hold the result of evaluating one design."""
 
-    Attributes:
-        values: the M objectives, minimised; infinite if the evaluator failed.
-        violations: of the C constraints; satisfied at <= 0.
-        failure: why the evaluator failed; None if it did not.
-        q: joint angles [rad] or strokes [m] at each target in the first case, 0 for joints that the design lacks.
-    """
-
-    values: tuple[float, ...]
-    violations: tuple[float, ...] = ()
-    failure: Failure | None = None
+    values: tuple[float, ...]  # the M objectives, minimised; infinite if the evaluator failed
+    violations: tuple[float, ...] = ()  # of the C constraints; satisfied at <= 0
+    failure: Failure | None = None  # why the evaluator failed; None if it did not
+    # Joint angles [rad] or strokes [m] at each target in the first case, 0 for joints that the design lacks
     q: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Hold the results of evaluating N designs.
+    """Hold the results of evaluating N designs."""
 
-    Attributes:
-        values: (N, M) objectives, minimised; infinite where the evaluator failed.
-        violations: (N, C) constraint violations; satisfied at <= 0.
-        failures: why the evaluator failed, by row.
-        postures: (N, B, D) at the first pose of each block of the cycle in the first case [rad] or [m]; None without
-            a cycle.
-    """
-
-    values: Array
-    violations: Array
-    failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])
+    values: Array  # (N, M) objectives, minimised; infinite where the evaluator failed
+    violations: Array  # (N, C) constraint violations; satisfied at <= 0
+    failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])  # why the evaluator failed, by row
+    # (N, B, D) at the first pose of each block of the cycle in the first case [rad] or [m]; None without a cycle
     postures: Array | None = None
     q: Array | None = None  # (N, T, J) joint angles at the targets in the first case [rad] or [m]
 
@@ -101,17 +88,6 @@ def worst_case(outcomes: Sequence[Outcomes]) -> Outcomes:
 class Problem:
     """Find the arms of a design space that serve a task best.
 
-    Attributes:
-        task: targets, cycle, tool, payloads, obstacles and constraints.
-        space: the designs to choose from.
-        tolerance: build tolerance [m]. Above 0, each objective of a design is the worst of the exact arm and of arms
-            with the base or one link off by this much.
-        device: where arms are evaluated; see `resolve_device`.
-        objectives: what is minimised; by default the task's, else the paper's, with the orientation error if a
-            target states an orientation.
-        evaluator: a custom function that measures objectives, such as a simulation.
-        constraints: the task's and those that its cycle and motor bodies imply, parsed.
-
     Examples:
         >>> import armwright as aw
         >>> problem = aw.Problem(aw.load_task("target-1"), aw.paper_space(joints=4))
@@ -122,12 +98,17 @@ class Problem:
         (1000, 2)
     """
 
-    task: Task
-    space: DesignSpace = field(default_factory=paper_space)
+    task: Task  # targets, cycle, tool, payloads, obstacles and constraints
+    space: DesignSpace = field(default_factory=paper_space)  # the designs to choose from
+    # Build tolerance [m]. Above 0, each objective of a design is the worst of the exact arm and of arms with the base
+    # or one link off by this much
     tolerance: float = 0.0
-    device: Device = "cpu"
+    device: Device = "cpu"  # where arms are evaluated; see `resolve_device`
+    # What is minimised; by default the task's, else the paper's, with the orientation error if a target states an
+    # orientation
     objectives: tuple[Objective, ...] = ()
-    evaluator: Evaluator | None = None
+    evaluator: Evaluator | None = None  # a custom function that measures objectives, such as a simulation
+    # The task's and those that its cycle and motor bodies imply, parsed
     constraints: tuple[Constraint, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:

@@ -25,15 +25,10 @@ DIGITS = 9
 
 @dataclass(frozen=True)
 class CycleModel:
-    """An arm in its task.
+    """An arm in its task."""
 
-    Attributes:
-        mjcf: The model, as XML.
-        trajectory: Its motion through the cycle.
-    """
-
-    mjcf: str
-    trajectory: Trajectory
+    mjcf: str  # the model, as XML
+    trajectory: Trajectory  # its motion through the cycle
 
 
 def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, name: str) -> Mapping[str, str]:

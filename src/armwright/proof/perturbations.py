@@ -43,79 +43,48 @@ ROUNDING = 1e-3  # of a bound; a smaller violation breaks nothing
 
 @dataclass(frozen=True)
 class Change:
-    """A change of a design.
+    """A change of a design."""
 
-    Attributes:
-        perturbation: The perturbation that it belongs to.
-        text: The change, such as `link_2 +1 mm`.
-    """
-
-    perturbation: str
-    text: str
+    perturbation: str  # the perturbation that it belongs to
+    text: str  # the change, such as `link_2 +1 mm`
 
 
 @dataclass(frozen=True)
 class Broken:
-    """A constraint that a changed design violates, or a failure in the simulator.
-
-    Attributes:
-        change: The change.
-        constraint: The constraint; the simulator's reason if it is none.
-        measured: What the constraint bounds, in its unit; None from the simulator.
-        violation: The violation of the constraint, relative to its bound; None from the simulator.
-    """
+    """A constraint that a changed design violates, or a failure in the simulator."""
 
     change: str
-    constraint: str
-    measured: float | None = None
-    violation: float | None = None
+    constraint: str  # the constraint; the simulator's reason if it is none
+    measured: float | None = None  # what the constraint bounds, in its unit; None from the simulator
+    violation: float | None = None  # the violation of the constraint, relative to its bound; None from the simulator
 
 
 @dataclass(frozen=True)
 class Perturbation:
-    """A perturbation of a design.
-
-    Attributes:
-        name: Its name.
-        changes: The number of changes that were evaluated.
-        broken: The constraints that they violate, of each change the most violated one first.
-    """
+    """A perturbation of a design."""
 
     name: str
-    changes: int
-    broken: tuple[Broken, ...]
+    changes: int  # the number of changes that were evaluated
+    broken: tuple[Broken, ...]  # the constraints that they violate, of each change the most violated one first
 
 
 @dataclass(frozen=True)
 class Survival:
-    """Survival of a design.
-
-    Attributes:
-        verdict: The result in words.
-        perturbations: The perturbations.
-        simulated: Changes that were simulated as well.
-    """
+    """Survival of a design."""
 
     verdict: str
     perturbations: tuple[Perturbation, ...]
-    simulated: tuple[str, ...]
+    simulated: tuple[str, ...]  # changes that were simulated as well
 
 
 @dataclass(frozen=True)
 class _Batch:
-    """R changed designs in a changed scene.
-
-    Attributes:
-        changes: The R changes.
-        owners: (R,) index of the design that is changed.
-        arms: The R arms.
-        scenes: The scene of each case.
-    """
+    """R changed designs in a changed scene."""
 
     changes: Sequence[Change]
-    owners: NDArray[np.intp]
+    owners: NDArray[np.intp]  # (R,) index of the design that is changed
     arms: ArmArrays
-    scenes: Sequence[Scene]
+    scenes: Sequence[Scene]  # the scene of each case
 
 
 def evaluate_survival(history: History, designs: Mapping[int, bool]) -> dict[int, Survival]:

@@ -46,22 +46,15 @@ class Demoted:
 
 @dataclass(frozen=True)
 class Recommendation:
-    """A recommended design.
+    """A recommended design."""
 
-    Attributes:
-        role: Why it is recommended: knee, or least QUANTITY.
-        design: Its number.
-        status: `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the
-            reason if the time was up or a custom evaluator measured the design.
-        demoted: The designs tried before.
-        survival: Which perturbations it survives; None without constraints, or if the time was up.
-    """
-
-    role: str
+    role: str  # why it is recommended: knee, or least QUANTITY
     design: int
+    # `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the reason if
+    # the time was up or a custom evaluator measured the design
     status: str
-    demoted: tuple[Demoted, ...] = ()
-    survival: Survival | None = None
+    demoted: tuple[Demoted, ...] = ()  # the designs tried before
+    survival: Survival | None = None  # which perturbations it survives; None without constraints, or if the time was up
 
 
 def candidates(history: History) -> dict[str, list[int]]:

@@ -56,23 +56,14 @@ COLOURS = {"obstacle": "0.55 0.55 0.58 0.5", "target": "0.84 0.16 0.16 0.6", "pa
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What an arm works with.
+    """What an arm works with."""
 
-    Attributes:
-        positions: (T, 3) of the targets [m].
-        target_arrays: How the targets are to be reached.
-        target_names: Their names.
-        obstacles: What the arm should keep away from.
-        payload: Mass of the payload [kg].
-        load_shape: How it is distributed.
-    """
-
-    positions: Array
-    target_arrays: TargetArrays
-    target_names: Sequence[str]
-    obstacles: Sequence[Obstacle]
-    payload: float
-    load_shape: LoadShape
+    positions: Array  # (T, 3) of the targets [m]
+    target_arrays: TargetArrays  # how the targets are to be reached
+    target_names: Sequence[str]  # their names
+    obstacles: Sequence[Obstacle]  # what the arm should keep away from
+    payload: float  # mass of the payload [kg]
+    load_shape: LoadShape  # how it is distributed
 
 
 def to_simulation_mjcf(

@@ -195,28 +195,16 @@ def parse_summary(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ProposerSummary:
-    """What a run's proposer did and cost, for summary.json.
-
-    Attributes:
-        name: The proposer.
-        model: The model that answered.
-        origin: What answered: `model`, `manual` (people) or `scripted` (a stand-in).
-        calls: Requests to the server; more than proposals if answers were refused.
-        call_failures: Failed calls by kind.
-        input_tokens: Tokens of all prompts.
-        output_tokens: Tokens of all answers.
-        cost_usd: Cost; None if a price is unknown.
-        call_seconds: Time of all calls together.
-        notes: Further entries of the record, such as where a replay differs from its source.
-    """
+    """What a run's proposer did and cost, for summary.json."""
 
     name: str
-    model: str | None = None
-    origin: str | None = None
-    calls: int = 0
-    call_failures: Mapping[str, int] = field(default_factory=dict[str, int])
-    input_tokens: int = 0
-    output_tokens: int = 0
-    cost_usd: float | None = None
-    call_seconds: float = 0.0
+    model: str | None = None  # the model that answered
+    origin: str | None = None  # what answered: `model`, `manual` (people) or `scripted` (a stand-in)
+    calls: int = 0  # requests to the server; more than proposals if answers were refused
+    call_failures: Mapping[str, int] = field(default_factory=dict[str, int])  # failed calls by kind
+    input_tokens: int = 0  # tokens of all prompts
+    output_tokens: int = 0  # tokens of all answers
+    cost_usd: float | None = None  # cost; None if a price is unknown
+    call_seconds: float = 0.0  # time of all calls together
+    # Further entries of the record, such as where a replay differs from its source
     notes: Mapping[str, Any] = field(default_factory=dict[str, Any])

@@ -30,22 +30,14 @@ ALLOWED_OF_REFERENCE = 0.005  # of the reference point's value; always allowed
 
 @dataclass(frozen=True)
 class Verification:
-    """Verification of N designs with M objectives.
+    """Verification of N designs with M objectives."""
 
-    Attributes:
-        exact: (N, M) objectives in float64.
-        moved: (N, M) the worst in float64 with the base or one link off by 1 mm.
-        started: (N, M) the worst in float64 from other start postures.
-        robust: (N,) True if neither `exact` nor `moved` exceeds the allowed values and violations.
-        from_any_start: (N,) True if `started` does not exceed them, either.
-        worst_case: (N, M) the worst of the search's values, `exact` and `moved`; infinite if a constraint is violated.
-    """
-
-    exact: Array
-    moved: Array
-    started: Array
-    robust: NDArray[np.bool_]
-    from_any_start: NDArray[np.bool_]
+    exact: Array  # (N, M) objectives in float64
+    moved: Array  # (N, M) the worst in float64 with the base or one link off by 1 mm
+    started: Array  # (N, M) the worst in float64 from other start postures
+    robust: NDArray[np.bool_]  # (N,) True if neither `exact` nor `moved` exceeds the allowed values and violations
+    from_any_start: NDArray[np.bool_]  # (N,) True if `started` does not exceed them, either
+    # (N, M) the worst of the search's values, `exact` and `moved`; infinite if a constraint is violated
     worst_case: Array
 
 
