@@ -28,6 +28,7 @@ from armwright.proof.simulated_run import simulate_arm
 from armwright.robot.actuators import ActuatorRecord
 from armwright.robot.arm import Arm
 from armwright.runs.history import History
+from armwright.runs.trial import Count
 from armwright.spaces.tolerance import TOLERANCE, length_columns, perturbed
 
 MOVED, SUPPLY, ASSUMED = "base or a link 1 mm off", "90 % of the voltage", "assumed values halved or doubled"
@@ -64,7 +65,7 @@ class Perturbation:
     """A perturbation of a design."""
 
     name: str
-    changes: int  # the number of changes that were evaluated
+    changes: Count  # the number of changes that were evaluated
     broken: tuple[Broken, ...]  # the constraints that they violate, of each change the most violated one first
 
 

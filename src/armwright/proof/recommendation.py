@@ -17,6 +17,7 @@ from armwright.proof.ranking import knee_first
 from armwright.proof.simulated_run import Simulator
 from armwright.proof.simulation import PASS
 from armwright.runs.history import History
+from armwright.runs.trial import Count
 
 MAX_TRIED = 10  # designs for each role
 BY_DEFAULT = (POSITION_ERROR.name, ORIENTATION_ERROR.name, TORQUE.name)  # objectives of tasks that state none
@@ -40,7 +41,7 @@ def unlimited(simulations: int, survivals: int) -> bool:
 class Demoted:
     """A design that was chosen first and failed in the simulator."""
 
-    design: int
+    design: Count
     reason: str
 
 
@@ -49,7 +50,7 @@ class Recommendation:
     """A recommended design."""
 
     role: str  # why it is recommended: knee, or least QUANTITY
-    design: int
+    design: Count
     # `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the reason if
     # the time was up or a custom evaluator measured the design
     status: str

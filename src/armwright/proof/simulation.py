@@ -4,7 +4,7 @@ Each joint is driven by the torque of the trajectory as feed-forward and by its 
 trajectory, interpolated between its rows. What damps is the friction of the joints.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -85,10 +85,6 @@ class SimulatedDesign:
     targets: tuple[Arrival, ...]  # at the end of each dwell
     joints: tuple[JointLoad, ...]  # loads of each moving joint
     contacts: tuple[Contact, ...]  # what touched
-
-    def record(self) -> dict[str, Any]:
-        """Return the content of a record of JSON."""
-        return asdict(self)
 
 
 def mujoco_version() -> str:

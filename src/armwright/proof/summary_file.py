@@ -11,6 +11,7 @@ from armwright.files import replace_surrogates
 from armwright.proof.attribution import Attribution
 from armwright.proof.front_gap import FrontGap
 from armwright.proof.proposer_bias import ProposerBias
+from armwright.proof.recommendation import Recommendation
 from armwright.runs.trial import Count
 
 
@@ -35,38 +36,6 @@ class _Verification(_Record):
     hypervolume_of_robust: float
     robust_from_any_start: Count
     hypervolume_worst_case: float
-
-
-class _Demoted(_Record):
-    design: Count
-    reason: str
-
-
-class _Broken(_Record):
-    change: str
-    constraint: str
-    measured: float | None
-    violation: float | None
-
-
-class _Perturbation(_Record):
-    name: str
-    changes: Count
-    broken: list[_Broken]
-
-
-class _Survival(_Record):
-    verdict: str
-    perturbations: list[_Perturbation]
-    simulated: list[str]
-
-
-class _Recommended(_Record):
-    role: str
-    design: Count
-    status: str
-    demoted: list[_Demoted]
-    survival: _Survival | None = None
 
 
 class _Age(_Record):
@@ -161,7 +130,7 @@ class _Summary(_Record):
     verification: _Verification | None
     feasibility: _Feasibility | None = None
     assumed: dict[str, dict[str, float]] = {}
-    recommended: list[_Recommended] = []
+    recommended: list[Recommendation] = []
 
 
 class StudySummary(_Summary):

@@ -1,28 +1,21 @@
 """Design files: initial designs of a search, from an existing arm or another run."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from pydantic import BaseModel
 
 from armwright.exceptions import DesignError
+from armwright.files import read_text
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
-from armwright.yaml_documents import read_document
+from armwright.yaml_documents import MAX_BYTES, check_document, load_document
 
 
-class DesignFile(BaseModel, frozen=True, extra="forbid"):
-    """A design in the format of designs/NNNN/design.json; only `params` is required."""
+class DesignFile(BaseModel, frozen=True):
+    """What is read of a design in the format of designs/NNNN/design.json."""
 
     params: dict[str, float | str]  # a value for each parameter of the space, by its name
-    number: Any = None
-    source: Any = None
-    reason: Any = None
-    objectives: Any = None
-    constraints: Any = None
-    masses: Any = None
-    targets: Any = None
-    verification: Any = None
 
 
 def read_design(path: str | Path, space: DesignSpace) -> Design:
@@ -31,8 +24,12 @@ def read_design(path: str | Path, space: DesignSpace) -> Design:
     Raises:
         DesignError: If it is not in the space.
     """
-    content = read_document(Path(path), DesignFile, DesignError)
+    content = load_document(read_text(Path(path), MAX_BYTES, DesignError), DesignError, str(path))
+    if not isinstance(content, dict) or "params" not in content:
+        raise DesignError(f"{path}: expected params, with a value for each parameter: {{params: {{link_1: 0.2, ...}}}}")
+    params = cast("dict[str, Any]", content)["params"]
+    checked = check_document({"params": params}, DesignFile, DesignError, str(path))
     try:
-        return space.design(content.params)
+        return space.design(checked.params)
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from error
