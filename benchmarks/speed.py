@@ -37,9 +37,10 @@ from armwright.arrays import Array
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.devices import load_kernels
 from armwright.kinematics.ik.ik import LANES, solve_postures
-from armwright.problem.evaluation import Scene, evaluate_arrays
+from armwright.problem.evaluation import evaluate_arrays
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Outcomes, Problem, worst_case
+from armwright.problem.scene import Scene
 from armwright.rotations import rotation_from_rpy
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space

@@ -24,10 +24,9 @@ A message is one line. It names the value with its unit, what is allowed, and th
 answers is escaped, so that it cannot break the line or control a terminal.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
-from types import MappingProxyType
 
 MAX_MESSAGE = 3000  # characters
 
@@ -176,16 +175,7 @@ def _cut(text: str) -> str:
     return f"{text[: MAX_MESSAGE // 2]} […] {text[-MAX_MESSAGE // 3 :]}"
 
 
-def did_you_mean(name: str, allowed: Iterable[str], renamed: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return ' Did you mean "x"?' for the closest allowed name, or '' if none is close.
-
-    Args:
-        name: The unknown name.
-        allowed: The names that would be accepted.
-        renamed: Former names and what they are called now.
-    """
-    allowed = list(allowed)
-    if renamed.get(name) in allowed:
-        return f' It is now called "{renamed[name]}".'
-    near = get_close_matches(name, allowed, n=1, cutoff=0.6)
+def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+    """Return ' Did you mean "x"?' for the closest allowed name, or '' if none is close."""
+    near = get_close_matches(name, list(allowed), n=1, cutoff=0.6)
     return f' Did you mean "{near[0]}"?' if near else ""

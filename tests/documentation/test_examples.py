@@ -16,7 +16,6 @@ from typer.testing import CliRunner
 import armwright as aw
 from armwright.cli.app import app
 from armwright.kinematics.reach.compliance import Stiffness
-from armwright.problem.drive_quantities import require_ratings
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
@@ -74,7 +73,7 @@ def test_bound_for_the_deflection_changes_the_recommended_arm(tmp_path: Path) ->
     for name in ("8-stiffness-unbounded-task.yaml", "8-stiffness-task.yaml"):
         knee, evaluation = knee_of(name, tmp_path / name)
         arms, payload = evaluation.arms, evaluation.payload
-        drives = require_ratings(arms.actuation, "deflection")
+        drives = evaluation.drives
         stiffness = Stiffness(arms.bending_stiffness, arms.torsional_stiffness, drives.joint_stiffness)
         found = [
             frame_displacement(knee.arm, q, stiffness, float(payload[t]), np.zeros(3))

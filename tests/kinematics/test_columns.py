@@ -12,7 +12,8 @@ import pytest
 from armwright.kinematics.arms.arm_arrays import Precision, stack_arms
 from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.problem.problem import Problem
-from armwright.proof.simulation_model import Surroundings, to_simulation_mjcf
+from armwright.problem.scene import Scene
+from armwright.proof.simulation_model import to_simulation_mjcf
 from armwright.robot.arm import Arm, Column, Joint, uniform_link
 from armwright.robot.collision_pairs import joined_by_column
 from armwright.robot.mjcf import to_mjcf
@@ -21,7 +22,6 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground
-from armwright.tasks.payload import POINT_LOAD
 from armwright.tasks.targets import position_targets
 from armwright.tasks.task import Task
 from tests.kinematics.test_clearance import agree
@@ -66,14 +66,14 @@ def test_column_clearance_agrees_with_coal(space: DesignSpace, precision: Precis
 @pytest.mark.parametrize("has_motors", [True, False])
 def test_contacts_in_mujoco_agree_with_the_clearance(has_motors: bool) -> None:
     """An arm whose links and motors are apart touches something if and only if that is its column."""
-    surroundings = Surroundings(np.zeros((1, 3)), position_targets(1), ("one",), (), 0.0, POINT_LOAD)
+    scene = Scene(np.zeros((1, 3)), np.zeros(1), position_targets(1))
     space = DesignSpace.model_validate({**WITH_FIXED, "motor_bodies": has_motors})
     touching = free = 0
     for design in space.sample(45, 3):
         arm = space.arm(design)
         moves = [joint.kind != "fixed" for joint in arm.joints]
         model = mujoco.MjModel.from_xml_string(
-            to_simulation_mjcf(arm, surroundings, np.zeros((1, sum(moves))), np.ones(sum(moves)))
+            to_simulation_mjcf(arm, scene, ("one",), np.zeros((1, sum(moves))), np.ones(sum(moves)))
         )
         data, arrays = mujoco.MjData(model), stack_arms([arm], "float64")
         q = postures([arm], 10, 4)

@@ -17,7 +17,8 @@ from armwright.kinematics.arms.forward import link_lines
 from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
-from armwright.proof.simulation_model import Surroundings, to_simulation_mjcf
+from armwright.problem.scene import Scene
+from armwright.proof.simulation_model import to_simulation_mjcf
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.collision_pairs import joined_by_motors
 from armwright.robot.mjcf import to_mjcf
@@ -26,7 +27,6 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground, Obstacle
-from armwright.tasks.payload import POINT_LOAD
 from armwright.tasks.targets import position_targets
 from armwright.tasks.task import Task
 from tests.kinematics.test_clearance import SHAPES, agree, apart, capsule, coal_shape, random_obstacle
@@ -251,7 +251,7 @@ def test_motor_bodies_may_not_collide() -> None:
 def test_contacts_in_mujoco_agree_with_the_clearance() -> None:
     """The motors and links that touch in the exported simulation are those of a negative clearance."""
     ground: tuple[Obstacle, ...] = (Ground(kind="ground", z=-0.3),)
-    surroundings = Surroundings(np.zeros((1, 3)), position_targets(1), ("one",), ground, 0.0, POINT_LOAD)
+    scene = Scene(np.zeros((1, 3)), np.zeros(1), position_targets(1), ground)
     space = DesignSpace.model_validate(
         {**CONTENT, "joint_types": ["R", "P", "Y", "F"], "mount": ["floor"], "origin_z": [0.2, 0.5]}
     )
@@ -260,7 +260,7 @@ def test_contacts_in_mujoco_agree_with_the_clearance() -> None:
         arm = space.arm(design)
         moves = [joint.kind != "fixed" for joint in arm.joints]
         model = mujoco.MjModel.from_xml_string(
-            to_simulation_mjcf(arm, surroundings, np.zeros((1, sum(moves))), np.ones(sum(moves)))
+            to_simulation_mjcf(arm, scene, ("one",), np.zeros((1, sum(moves))), np.ones(sum(moves)))
         )
         data = mujoco.MjData(model)
         q = postures([arm], 10, 9)

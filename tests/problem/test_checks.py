@@ -11,7 +11,7 @@ from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.checks.finding import PROVEN, SUSPECTED
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.checks.reach import longest_reach
-from armwright.problem.checks.sampling import SEED, check_by_sampling, random_designs, violations
+from armwright.problem.checks.sampling import SEED, check_by_sampling, violations
 from armwright.problem.evaluators import load_evaluator
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
@@ -82,7 +82,7 @@ def test_random_tasks_have_no_findings() -> None:
 @pytest.mark.parametrize("name", [name for name in builtin_names() if load_task(name).cycle])
 def test_samples_satisfy_each_constraint_of_builtin_tasks(name: str) -> None:
     checked = Problem(load_task(name), default_space(name))
-    found = violations(checked, random_designs(checked, 120, np.random.default_rng(SEED)))
+    found = violations(checked, checked.space.sample_matrix(120, np.random.default_rng(SEED)))
     assert (found.min(axis=0) <= 0.0).all()
 
 
@@ -172,7 +172,7 @@ def test_proven_obstacles_leave_no_feasible_design(height: float, bounds: list[s
     checked = problem([[0.3, 0.1, height]], arm, obstacles=[TABLE], constraints=bounds, objectives=["torque"])
     assert [evidence for evidence, _ in found(checked)] == [PROVEN] * is_proven
     if is_proven:
-        sampled = violations(checked, random_designs(checked, 3000, np.random.default_rng(0)))
+        sampled = violations(checked, checked.space.sample_matrix(3000, np.random.default_rng(0)))
         assert (sampled.max(axis=1) > 0.0).all()
         assert (sampled <= 0.0).any(axis=0).all()  # each alone can be satisfied
 
@@ -315,7 +315,7 @@ def test_approach_beyond_reach_is_proven() -> None:
     assert (second[0], "approach = 60 m exceeds" in second[1]) == (SUSPECTED, True)
     checked = raised(1.4)
     assert only(checked)[0] == PROVEN
-    sampled = violations(checked, random_designs(checked, 30, np.random.default_rng(0)))
+    sampled = violations(checked, checked.space.sample_matrix(30, np.random.default_rng(0)))
     names = [constraint.quantity.name for constraint in checked.constraints]
     assert (sampled[:, names.index("path_error")] > 0.0).all()
 
@@ -373,7 +373,7 @@ def test_tasks_without_constraints_are_not_sampled() -> None:
 
 def test_samples_are_those_of_the_space() -> None:
     checked = Problem(load_task("screwing"), default_space("screwing"))
-    matrix = random_designs(checked, 40, np.random.default_rng(3))
+    matrix = checked.space.sample_matrix(40, np.random.default_rng(3))
     assert (matrix == checked.space.matrix(checked.space.sample(40, seed=3))).all()
 
 

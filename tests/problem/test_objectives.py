@@ -7,15 +7,14 @@ import moocore
 import numpy as np
 import pinocchio
 import pytest
-import yaml
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError, UsageError
+from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError
 from armwright.pictures.figures import chosen_members, write_figures
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, RENAMED, named_objectives
+from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, named_objectives
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.urdf_writer import to_urdf
@@ -186,18 +185,6 @@ def test_named_objectives_match_their_formulas() -> None:
 def test_invalid_objective_names_are_refused(names: list[str], words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         named_objectives(names)
-
-
-@pytest.mark.parametrize(("old", "new"), RENAMED.items())
-def test_former_objective_names_are_reported_with_the_current_one(tmp_path: Path, old: str, new: str) -> None:
-    assert new in OBJECTIVES
-    assert new not in RENAMED, "no current name is a former name of another objective"
-    file = tmp_path / "old.yaml"
-    for key, value in (("objectives", old), ("constraints", f"{old} <= 1")):
-        file.write_text(yaml.safe_dump({"name": "old", "targets": [[0.4, 0.1, 0.3]], key: [value]}), encoding="utf-8")
-        with pytest.raises(UsageError, match=f'"{old}".*It is now called "{new}".') as refusal:
-            Problem(load_task(file))
-        assert str(refusal.value).count("now called") == 1
 
 
 def test_objectives_option_drops_a_foreign_reference_point(tmp_path: Path) -> None:

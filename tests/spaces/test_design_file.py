@@ -57,6 +57,13 @@ def test_initial_design_from_an_earlier_run(tmp_path: Path) -> None:
     assert "initial_designs:" in config
 
 
+def test_designs_of_any_run_are_read(tmp_path: Path) -> None:
+    """A task with constraints adds keys to the records of its designs."""
+    record = {"number": 3, "params": dict(GIVEN[0].params), "violations": {"mass <= 3": -0.1}, "facts": {}, "way": None}
+    (tmp_path / "design.json").write_text(json.dumps(record), encoding="utf-8")
+    assert read_design(tmp_path / "design.json", PROBLEM.space) == GIVEN[0]
+
+
 def test_files_without_a_design_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(json.dumps({"params": {**GIVEN[0].params, "link_1": 3.0}}), encoding="utf-8")

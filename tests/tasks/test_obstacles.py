@@ -14,7 +14,7 @@ from playwright.sync_api import Browser
 from armwright.exceptions import TaskError
 from armwright.page.page import write_report
 from armwright.pictures.solids import clipped
-from armwright.problem.objectives import CLEARANCE_QUANTITIES, CLEARANCES, FAR, OBJECTIVES, named_objectives
+from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES, named_objectives
 from armwright.problem.problem import Problem
 from armwright.proof.verification import verify
 from armwright.study.study import optimize
@@ -124,8 +124,8 @@ def test_paper_objectives_ignore_obstacles() -> None:
     with_, without = task_of(RECORDS), task_of([])
     designs = Problem(without).space.sample(20, 0)
     assert np.array_equal(Problem(with_).evaluate(designs).values, Problem(without).evaluate(designs).values)
-    assert not Problem(with_).uses(*CLEARANCE_QUANTITIES)
-    assert Problem(with_, objectives=(OBJECTIVES["collision"],)).uses(*CLEARANCE_QUANTITIES)
+    assert not Problem(with_).uses("clearance")
+    assert Problem(with_, objectives=(OBJECTIVES["collision"],)).uses("clearance")
 
 
 # Drawings

@@ -85,8 +85,8 @@ def test_workspace_is_computed_on_demand() -> None:
     evaluation = Problem(with_).physics(designs)
     assert np.array_equal(Problem(with_).outcomes(evaluation).values, Problem(target_1).evaluate(designs).values)
     assert "workspace_error" not in vars(evaluation)
-    assert not Problem(with_).uses(UNCOVERED_FRACTION)
-    assert Problem(task(), objectives=(UNCOVERED_FRACTION,)).uses(UNCOVERED_FRACTION)
+    assert not Problem(with_).uses("workspace")
+    assert Problem(task(), objectives=(UNCOVERED_FRACTION,)).uses("workspace")
 
 
 def test_no_workspace_means_nothing_uncovered() -> None:

@@ -6,7 +6,8 @@ from pathlib import Path
 from rich.console import Console
 
 from armwright.extras import install_command, missing_packages
-from armwright.problem.objectives import CLEARANCE_QUANTITIES, WORKSPACE_QUANTITIES
+from armwright.problem.objective import Need
+from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.task import Task
@@ -23,14 +24,16 @@ def can_draw(console: Console, wanted: bool = True) -> bool:
 def unused_parts(problem: Problem) -> list[str]:
     """Return a note for each part of the task that neither an objective nor a constraint uses."""
     task = problem.task
-    parts = (
-        ("obstacles", task.obstacles, CLEARANCE_QUANTITIES),
-        ("workspace", task.workspace, WORKSPACE_QUANTITIES),
-    )
+    parts: dict[str, tuple[Need, ...]] = {}
+    if task.obstacles:
+        parts["obstacles"] = ("clearance",)
+    if task.workspace:
+        parts["workspace"] = ("workspace", "directions")
     return [
-        f"no objective or constraint uses the task's {part}; quantities for it: {', '.join(q.name for q in quantities)}"
-        for part, given, quantities in parts
-        if given and not problem.uses(*quantities)
+        f"no objective or constraint uses the task's {part}; quantities for it: "
+        + ", ".join(name for name, quantity in QUANTITIES.items() if {*needs} & {*quantity.needs})
+        for part, needs in parts.items()
+        if not problem.uses(*needs)
     ]
 
 

@@ -10,13 +10,7 @@ from armwright.problem.constraints import Constraint
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.facts import Facts, fact_of, facts_of
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import (
-    CLEARANCE_QUANTITIES,
-    CYCLE_TIME,
-    DYNAMIC_UTILISATION,
-    PRICE,
-    SPEED_UTILISATION,
-)
+from armwright.problem.objectives import CYCLE_TIME, DYNAMIC_UTILISATION, PRICE, SPEED_UTILISATION
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
 from armwright.text import rounded
@@ -24,7 +18,7 @@ from armwright.text import rounded
 
 def known_values(quantity: Objective, evaluation: Evaluation, minimised: bool = False) -> tuple[Array, str]:
     """Return what `Objective.known` does of existing arms, whose URDFs do not tell clearances."""
-    if quantity in CLEARANCE_QUANTITIES:
+    if "clearance" in quantity.needs:
         return np.full(len(evaluation), np.nan), "a URDF states no shape that clearances are measured from"
     return quantity.known(evaluation, minimised)
 

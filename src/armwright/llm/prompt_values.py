@@ -12,15 +12,7 @@ from armwright.llm.feedback import Feedback, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.ignored_errors import stated_tolerance
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import (
-    CLEARANCE_QUANTITIES,
-    ORIENTATION_ERROR,
-    PATH_QUANTITIES,
-    POSITION_ERROR,
-    TIMED_QUANTITIES,
-    UNREACHED_TARGETS,
-    WORKSPACE_QUANTITIES,
-)
+from armwright.problem.objectives import ORIENTATION_ERROR, POSITION_ERROR, QUANTITIES, UNREACHED_TARGETS
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History
@@ -132,6 +124,7 @@ def _describe_radius(space: DesignSpace) -> str:
 
 def _task_values(problem: Problem) -> dict[str, Any]:
     task = problem.task
+    of_the_way = [q for q in QUANTITIES.values() if "motions" in q.needs and q in problem.quantities]
     return {
         "gravity": GRAVITY,
         "task": task,
@@ -140,13 +133,13 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "payload": _describe_payload(task),
         "point_masses": "actuators and payload" if task.load_shape == POINT_LOAD else "actuators",
         "obstacles": [obstacle.describe() for obstacle in task.obstacles],
-        "collisions": problem.uses(*CLEARANCE_QUANTITIES),
+        "collisions": problem.uses("clearance"),
         "oriented": task.target_arrays.oriented,
         "restarts": task.restarts,
         "cycle": task.cycle_description,
-        "cycle_times": task.cycle.describe_times() if task.cycle and problem.uses(*TIMED_QUANTITIES) else "",
-        "workspace": [region.describe() for region in task.workspace] if problem.uses(*WORKSPACE_QUANTITIES) else [],
-        "of_the_way": [quantity.symbol for quantity in PATH_QUANTITIES if problem.uses(quantity)],
+        "cycle_times": task.cycle.describe_times() if task.cycle and problem.uses("durations") else "",
+        "workspace": [r.describe() for r in task.workspace] if problem.uses("workspace", "directions") else [],
+        "of_the_way": [q.symbol for q in sorted(of_the_way, key=lambda q: "clearance" not in q.needs)],
         "n_targets": len(task.target_positions),
         "updates": UPDATES,
         "objectives": [_task_specific(objective, task) for objective in problem.objectives],

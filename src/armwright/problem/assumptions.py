@@ -5,7 +5,6 @@ A value is assumed if it is an estimate or the default of the actuator's kind (`
 
 from collections.abc import Container, Iterable, Mapping
 
-from armwright.problem.objectives import BACKLASH_ERROR, STIFFNESS_QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import UNITS, ActuatorRecord, value_of
 from armwright.robot.arm import Arm
@@ -16,6 +15,7 @@ ALONG_CYCLE = (
     *STATIC, "voltage", "rated_torque", "speed", "corner_speed", "rotor_inertia", "coulomb_friction",
     "viscous_friction", "position_gain", "current",
 )  # fmt: skip
+YIELDING = ("joint_stiffness", "backlash")  # enter only quantities that need them
 
 Assumed = Mapping[str, Mapping[str, float]]  # assumed values by actuator and name, in the units of UNITS
 
@@ -33,10 +33,7 @@ def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None, also: It
         used = {joint.actuator.name for arm in arms for joint in arm.joints if joint.actuator is not None}
         records = [record for record in records if record.name in used]
     entering = {*(STATIC if problem.task.cycle is None else ALONG_CYCLE), *also}
-    if problem.uses(*STIFFNESS_QUANTITIES):
-        entering.add("joint_stiffness")
-    if problem.uses(BACKLASH_ERROR):
-        entering.add("backlash")
+    entering |= {*YIELDING} & {rating for quantity in problem.quantities for rating in quantity.ratings}
     if problem.space.has_motor_bodies:
         entering.add("shaft_offset")
     found = {record.name: _values(record, entering) for record in records}

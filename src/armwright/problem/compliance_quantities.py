@@ -3,8 +3,6 @@
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import UnknownQuantityError
-from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.reach.compliance import (
     Stiffness,
     backlash_errors,
@@ -13,43 +11,30 @@ from armwright.kinematics.reach.compliance import (
     unit_payload,
 )
 from armwright.kinematics.reach.payload_limits import payload_limits, torques_by_payload
-from armwright.problem.drive_quantities import require_ratings
 from armwright.problem.evaluation import Evaluation
 from armwright.tasks.moments import MAX_MASS
 
 
-def require_sections(arms: ArmArrays, quantity: str) -> None:
-    """Raise UnknownQuantityError if the stiffness of a link is not known."""
-    if np.isnan(arms.bending_stiffness).any() or np.isnan(arms.torsional_stiffness).any():
-        raise UnknownQuantityError(
-            f"objective {quantity} needs the section and the material of the links; try link_section: "
-            "{tubes: [[0.03, 0.002]], material: aluminium} in the space file",
-            "no section and material of the links are stated",
-        )
-
-
 def deflection(evaluation: Evaluation) -> Array:
     """Return (N, T) how far its own weight and the payload move the tip [m]."""
-    arms, frames, stiffness = evaluation.arms, evaluation.frames, _stiffness(evaluation, "deflection")
+    arms, frames, stiffness = evaluation.arms, evaluation.frames, _stiffness(evaluation)
     own = tip_displacements(arms, frames, own_loads(arms, frames), stiffness)
     return np.linalg.norm(own + _payload_displacement(evaluation, stiffness), axis=-1)
 
 
 def payload_deflection(evaluation: Evaluation) -> Array:
     """Return (N, T) how far the payload moves the tip [m]."""
-    return np.linalg.norm(_payload_displacement(evaluation, _stiffness(evaluation, "payload_deflection")), axis=-1)
+    return np.linalg.norm(_payload_displacement(evaluation, _stiffness(evaluation)), axis=-1)
 
 
 def backlash_error(evaluation: Evaluation) -> Array:
     """Return (N, T) how far half of the backlash of all joints moves the tip at most [m]."""
-    drives = require_ratings(evaluation.arms.actuation, "backlash_error")
-    return backlash_errors(evaluation.arms, evaluation.frames, drives.backlash)
+    return backlash_errors(evaluation.arms, evaluation.frames, evaluation.drives.backlash)
 
 
 def payload_capacity(evaluation: Evaluation) -> Array:
     """Return (N, T) the largest payload that all motors hold [kg]; MAX_MASS where a cycle carries none."""
-    drives = require_ratings(evaluation.arms.actuation, "payload_capacity")
-    arms, frames = evaluation.arms, evaluation.frames
+    arms, frames, drives = evaluation.arms, evaluation.frames, evaluation.drives
     held = evaluation.payload[:, None] * torques_by_payload(arms, frames)
     peak = drives.peak / drives.safety_factor[:, None]
     limits = payload_limits(arms, frames, evaluation.joint_torques - held, peak)
@@ -64,8 +49,6 @@ def _payload_displacement(evaluation: Evaluation, stiffness: Stiffness) -> Array
     return evaluation.payload[:, None] * tip_displacements(arms, frames, unit_payload(arms, frames), stiffness)
 
 
-def _stiffness(evaluation: Evaluation, quantity: str) -> Stiffness:
+def _stiffness(evaluation: Evaluation) -> Stiffness:
     arms = evaluation.arms
-    drives = require_ratings(arms.actuation, quantity)
-    require_sections(arms, quantity)
-    return Stiffness(arms.bending_stiffness, arms.torsional_stiffness, drives.joint_stiffness)
+    return Stiffness(arms.bending_stiffness, arms.torsional_stiffness, evaluation.drives.joint_stiffness)

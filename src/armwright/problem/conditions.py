@@ -17,19 +17,12 @@ _HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.gre
 
 @dataclass(frozen=True)
 class Condition:
-    """A bound for a quantity.
-
-    Attributes:
-        name: The quantity.
-        relation: `<=`, `<`, `==`, `>` or `>=`.
-        bound: The bound.
-        unit: The unit of the bound as it was written; empty for that of the quantity.
-    """
+    """A bound for a quantity."""
 
     name: str
-    relation: str
+    relation: str  # `<=`, `<`, `==`, `>` or `>=`
     bound: float
-    unit: str = ""
+    unit: str = ""  # the unit of the bound as it was written; empty for that of the quantity
 
     def holds(self, numbers: Mapping[str, float]) -> bool:
         """Return whether these quantities satisfy the condition."""

@@ -13,7 +13,7 @@ from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import TaskError, did_you_mean
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import CLEARANCES, QUANTITIES, RENAMED
+from armwright.problem.objectives import CLEARANCES, QUANTITIES
 from armwright.tasks.cycle import Cycle
 from armwright.tasks.task import Task
 from armwright.units import NUMBER
@@ -113,7 +113,7 @@ def _read(text: str) -> Constraint:
     name, relation, number = match.groups()
     if name not in QUANTITIES:
         raise TaskError(
-            f'constraint "{text}": unknown quantity "{name}".{did_you_mean(name, QUANTITIES, RENAMED)} '
+            f'constraint "{text}": unknown quantity "{name}".{did_you_mean(name, QUANTITIES)} '
             f"Quantities: {', '.join(QUANTITIES)}"
         )
     bound = float(number) if _NUMBER.fullmatch(number) else math.nan

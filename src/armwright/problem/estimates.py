@@ -18,7 +18,7 @@ from armwright.problem.objectives import (
     VOLTAGES,
     WORST_ERROR,
 )
-from armwright.problem.problem import Outcomes, Problem, worst_case
+from armwright.problem.problem import Outcomes, Problem
 
 EXACT = (PRICE, MASS, LENGTH, JOINTS, VOLTAGES)  # quantities that an arm has without moving
 OF_REACH = (POSITION_ERROR, WORST_ERROR, UNREACHED_TARGETS)  # at least what the distance beyond reach implies
@@ -59,8 +59,8 @@ def estimates(problem: Problem, matrix: Array, near: Array) -> Outcomes:
     for first in range(0, len(matrix), AT_ONCE):
         rows = slice(first, first + AT_ONCE)
         arms = problem.arms(matrix[rows])
-        rough = [evaluate_arrays(arms, scene, problem.device, roughly_near=near[rows]) for scene in problem.scenes]
-        parts.append(worst_case([problem.outcomes(evaluation) for evaluation in rough]))
+        rough = (evaluate_arrays(arms, scene, problem.device, roughly_near=near[rows]) for scene in problem.scenes)
+        parts.append(problem.worst(rough))
     return Outcomes(np.concatenate([p.values for p in parts]), np.concatenate([p.violations for p in parts]))
 
 

@@ -3,12 +3,14 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError, TaskError, UnknownQuantityError
+from armwright.exceptions import SettingsError
+from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import ArmArrays, carrying, stack_arms
 from armwright.kinematics.arms.forward import Frames, forward_kinematics
 from armwright.kinematics.arms.jacobian import jacobian_of
@@ -21,53 +23,16 @@ from armwright.kinematics.devices import Device
 from armwright.kinematics.ik.ik import UPDATES, Postures, solve_postures
 from armwright.kinematics.ik.restarts import nearer_postures, random_starts
 from armwright.problem.dexterous_volume import dexterous_volumes
+from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
 from armwright.spaces.tool_mount import carrying_tool
 from armwright.tasks.motions import CyclePlan
 from armwright.tasks.obstacles import Obstacle
-from armwright.tasks.payload import POINT_LOAD, LoadShape
 from armwright.tasks.targets import TargetArrays, position_targets
 from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region, sample_regions
 
-NO_CYCLE = "path_error, cycle_time and other quantities of motions need a cycle in the task; try cycle: in_order"
-NO_WORKSPACE = (
-    "uncovered_fraction needs a workspace in the task; try workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
-)
-
 CYCLE_GAP = 1e-4  # [m] that bodies keep along a cycle, because drives and samples are a little off its path
-
-
-@dataclass(frozen=True)
-class Scene:
-    """The targets of a task in one case, and their surroundings.
-
-    Attributes:
-        targets: (T, 3) positions [m].
-        payload: (T,) mass carried by the tip at each target [kg].
-        target_arrays: how the targets are to be reached.
-        obstacles: what clearances are measured from; the inverse kinematics ignores them.
-        plan: the motions of the task's cycle; None if it has none.
-        workspace: boxes to cover.
-        load_shape: how the mass of the payload is distributed.
-    """
-
-    targets: Array
-    payload: Array
-    target_arrays: TargetArrays
-    obstacles: tuple[Obstacle, ...] = ()
-    plan: CyclePlan | None = None
-    workspace: tuple[Region, ...] = ()
-    load_shape: LoadShape = POINT_LOAD
-
-    def __post_init__(self) -> None:
-        """Check that the arrays are finite and belong to the same targets."""
-        targets = self.targets
-        if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
-            raise TaskError(f"targets: expected finite numbers of shape (T, 3), T >= 1, got shape {targets.shape}")
-        object.__setattr__(self, "payload", _payloads(self.payload, len(targets)))
-        if len(self.target_arrays) != len(targets):
-            raise TaskError(f"target_arrays: expected {len(targets)} targets, got {len(self.target_arrays)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,9 +66,13 @@ class Evaluation(Scene):
     @property
     def paths(self) -> CyclePaths:
         """The arms along the motions of the cycle; SettingsError if the task has none."""
-        if self.cycle_paths is None:
-            raise UnknownQuantityError(NO_CYCLE, "the task has no cycle")
-        return self.cycle_paths
+        self.require("cycle")
+        return cast("CyclePaths", self.cycle_paths)
+
+    @property
+    def drives(self) -> Actuation:
+        """The actuation of arms that have actuators."""
+        return cast("Actuation", self.arms.actuation)
 
     @property
     def entry_postures(self) -> Array | None:
@@ -121,9 +90,9 @@ class Evaluation(Scene):
         return cycle_loads(self.paths, self.torque_terms)
 
     @cached_property
-    def supply(self) -> SupplyCurrents | None:
-        """Currents along the cycle, None without actuators; SettingsError if a duration is not known."""
-        return None if self.arms.actuation is None else supply_currents(self.loads, self.arms.actuation)
+    def supply(self) -> SupplyCurrents:
+        """Currents of the actuators along the cycle; SettingsError if a duration is not known."""
+        return supply_currents(self.loads, self.drives)
 
     def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
         """Return (N, T) a measure of holding torques, the largest of a target's posture and of the motions to it.
@@ -207,8 +176,7 @@ class Evaluation(Scene):
     @cached_property
     def workspace_error(self) -> Array:
         """(N, W) distance of the tip from each point of the workspace [m]; SettingsError where there is none."""
-        if not self.workspace:
-            raise UnknownQuantityError(NO_WORKSPACE, "the task has no workspace")
+        self.require("workspace")
         points = sample_regions(self.workspace)
         reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
@@ -216,6 +184,7 @@ class Evaluation(Scene):
     @cached_property
     def dexterous_volume(self) -> Array:
         """(N,) share of the workspace with enough directions; SettingsError if no region has directions."""
+        self.require("directions")
         return dexterous_volumes(self.arms, self.workspace, self.obstacles)
 
     @property
@@ -267,13 +236,6 @@ class Evaluation(Scene):
         if self.arms.motor_bodies is not None:
             own = np.minimum(own, straight_motor_clearance(self.arms, self.device)[:, None])
         return own, clear
-
-
-def task_scene(task: Task, targets: Array, payloads: Array) -> Scene:
-    """Return the surroundings of a task with these targets (T, 3) [m] and payloads (T,) [kg]."""
-    plan = task.plan(targets) if task.cycle else None
-    held = payloads if plan is None else payloads * plan.holds_payload(len(targets))
-    return Scene(targets, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
 
 
 def evaluate(
@@ -389,11 +351,3 @@ def evaluate_arrays(
         cycle_paths=paths,
         device=device,
     )
-
-
-def _payloads(payload: ArrayLike, t: int) -> Array:
-    """Return the (T,) payloads [kg]."""
-    loads = np.asarray(payload, dtype=np.float64)
-    if loads.shape not in ((), (t,)) or not np.all((loads >= 0.0) & np.isfinite(loads)):
-        raise TaskError(f"payload: expected 1 or {t} values >= 0 kg, got {payload}")
-    return np.broadcast_to(loads, (t,)).copy()

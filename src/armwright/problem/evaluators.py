@@ -51,24 +51,16 @@ MAX_NAME_LENGTH = 40
 
 @dataclass(frozen=True)
 class Evaluator:
-    """A function that measures an arm for a task; each number is an objective, minimised.
+    """A function that measures an arm for a task; each number is an objective, minimised."""
 
-    Attributes:
-        name: `file.py:function` or `module:function`, as stored in the settings of a run.
-        measure: The function.
-        objectives: The objectives that it measures.
-        version: Part of the sha256 of its file; empty without a file.
-        place: The argument of `load_evaluator`.
-        source: Content of the file. A pickle holds it, so that other processes need no copy.
-        context: The state that its file set when it was imported, such as `numpy.seterr`; applies to its calls only.
-    """
-
-    name: str
+    name: str  # `file.py:function` or `module:function`, as stored in the settings of a run
     measure: Measure
-    objectives: tuple[Objective, ...]
-    version: str = field(default="", compare=False)
-    place: str = field(default="", compare=False)
+    objectives: tuple[Objective, ...]  # the objectives that it measures
+    version: str = field(default="", compare=False)  # part of the sha256 of its file; empty without a file
+    place: str = field(default="", compare=False)  # the argument of `load_evaluator`
+    # Content of the file. A pickle holds it, so that other processes need no copy
     source: bytes = field(default=b"", compare=False, repr=False)
+    # The state that its file set when it was imported, such as `numpy.seterr`; applies to its calls only
     context: Context | None = field(default=None, compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:

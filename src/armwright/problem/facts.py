@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array, finite_or_none
-from armwright.problem.drive_quantities import RATINGS
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import MASS, QUANTITIES
@@ -31,7 +30,7 @@ ASKED = (
     "mean_current",
 )  # fmt: skip
 FARTHEST = "The largest horizontal distance of the tip from the first joint."
-_RATINGS = sorted({rating for ratings in RATINGS.values() for rating in ratings})
+_RATINGS = sorted({rating for quantity in QUANTITIES.values() for rating in quantity.ratings})
 _SHOWN: Mapping[str, tuple[str, float]] = {  # unit in texts, and how many of it are one of the quantity's unit
     "m": (" mm", 1e3),
     "rad": ("°", math.degrees(1.0)),

@@ -15,20 +15,13 @@ _Text = Annotated[str, PlainSerializer(replace_surrogates)]
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed evaluation, which gives no objectives.
-
-    Attributes:
-        kind: What happened.
-        reason: The exception or the values, on one line.
-        error: Type of the exception, such as `ValueError`; empty without one.
-        place: Where it was raised, such as `sim.py, line 12`; empty without an exception.
-        traceback: Traceback of the evaluator's code. Run folders do not keep it.
-    """
+    """A failed evaluation, which gives no objectives."""
 
     kind: FailureKind
-    reason: _Text
-    error: _Text = ""
-    place: _Text = ""
+    reason: _Text  # the exception or the values, on one line
+    error: _Text = ""  # type of the exception, such as `ValueError`; empty without one
+    place: _Text = ""  # where it was raised, such as `sim.py, line 12`; empty without an exception
+    # Traceback of the evaluator's code. Run folders do not keep it
     traceback: Annotated[str, Field(exclude=True)] = field(default="", compare=False, repr=False)
 
     @property

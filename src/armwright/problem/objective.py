@@ -8,8 +8,17 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import UnknownQuantityError
+from armwright.kinematics.arms.actuation import Actuation
+from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.cycle.cycle_loads import check_durations
 from armwright.problem.evaluation import Evaluation
+from armwright.problem.scene import Scene
+from armwright.robot.actuators import UNITS
 
+# What a quantity depends on: `motions` if the worst of targets and motions counts, `durations` of the steps of a cycle
+Need = Literal[
+    "orientation", "clearance", "motions", "cycle", "durations", "workspace", "directions", "sections"
+]  # fmt: skip
 Over = Literal["sum", "max", "min", "rms", "arm"]
 _OVER: Mapping[Over, str] = {
     "sum": " Summed over the targets.",
@@ -18,29 +27,24 @@ _OVER: Mapping[Over, str] = {
     "rms": " The root mean square over the targets.",
     "arm": "",
 }
+KEYS = {"peak": "peak_torque", "continuous": "rated_torque", "no_load_speed": "speed"}  # of ratings in records
 
 
 @dataclass(frozen=True)
 class Objective:
-    """A quantity per arm to minimise.
-
-    Attributes:
-        description: The quantity at one target, or for `over="arm"` of the arm, for readers new to this program.
-        each: Its value per target, (N, T); for `over="arm"` of the arm itself, (N,).
-        excess: What of this value an objective minimises, if not all: of errors, what exceeds the stated tolerances.
-        over: How the values become one: their sum, maximum, minimum or root mean square.
-        label: Its name in tables and figures; by default the name in words.
-        symbol: Its name in formulas and prompts; by default E_name.
-    """
+    """A quantity per arm to minimise."""
 
     name: str
     unit: str
-    description: str
-    each: Callable[[Evaluation], Array]
-    over: Over = "sum"
-    label: str = ""
-    symbol: str = ""
+    description: str  # the quantity at one target, or for `over="arm"` of the arm, for readers new to this program
+    each: Callable[[Evaluation], Array]  # its value per target, (N, T); for `over="arm"` of the arm itself, (N,)
+    over: Over = "sum"  # how the values become one: their sum, maximum, minimum or root mean square
+    label: str = ""  # in tables and figures; by default the name in words
+    symbol: str = ""  # in formulas and prompts; by default E_name
+    # What of the value an objective minimises, if not all: of errors, what exceeds the stated tolerances
     excess: Callable[[Evaluation], Array] | None = None
+    needs: tuple[Need, ...] = ()
+    ratings: tuple[str, ...] = ()  # of `Actuation` that every actuator has to state
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", self.label or self.name.replace("_", " ").capitalize())
@@ -48,6 +52,7 @@ class Objective:
 
     def __call__(self, evaluation: Evaluation) -> Array:
         """Return one value per arm, (N,), as constraints bound it."""
+        self.check(evaluation, evaluation.arms)
         return self._total(self.each(evaluation))
 
     def minimised(self, evaluation: Evaluation) -> Array:
@@ -70,7 +75,38 @@ class Objective:
 
     def shares(self, evaluation: Evaluation) -> Array:
         """Return the shares of the targets in the minimised value, (N, T); for `over="arm"` the value itself, (N,)."""
+        self.check(evaluation, evaluation.arms)
         return (self.excess or self.each)(evaluation)
+
+    def check(self, scene: Scene, arms: ArmArrays) -> None:
+        """Raise UnknownQuantityError if the task or the arms lack what the quantity needs."""
+        if self.ratings:
+            self._check_ratings(arms.actuation)
+        if "sections" in self.needs and np.isnan([arms.bending_stiffness, arms.torsional_stiffness]).any():
+            raise UnknownQuantityError(
+                f"objective {self.name} needs the section and the material of the links; try link_section: "
+                "{tubes: [[0.03, 0.002]], material: aluminium} in the space file",
+                "no section and material of the links are stated",
+            )
+        for need in self.needs:
+            scene.require(need)
+        if "durations" in self.needs and scene.plan is not None:
+            check_durations(arms.actuation, scene.plan)
+
+    def _check_ratings(self, actuation: Actuation | None) -> None:
+        if actuation is None:
+            raise UnknownQuantityError(
+                f"objective {self.name} needs actuators: name some in the space file (actuators: [...])",
+                "no actuators are named",
+            )
+        for rating in self.ratings:
+            if np.isnan(getattr(actuation, rating)).any():
+                key = KEYS.get(rating, rating)
+                raise UnknownQuantityError(
+                    f"objective {self.name} needs the {key} of every actuator; try {key} [{UNITS[key]}] in the record "
+                    "of each in the space file, or leave out those without",
+                    f"the {key.replace('_', ' ')} of an actuator is not known",
+                )
 
     def _total(self, each: Array) -> Array:
         match self.over:

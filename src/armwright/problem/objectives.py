@@ -63,6 +63,7 @@ ORIENTATION_ERROR = Objective(
     "none",
     each=lambda e: e.target_arrays.weight * e.angle_error,
     excess=lambda e: e.target_arrays.weight * e.excess_angle,
+    needs=("orientation",),
 )
 WORST_ANGLE = Objective(
     name="worst_angle",
@@ -73,6 +74,7 @@ WORST_ANGLE = Objective(
     each=lambda e: e.angle_error,
     excess=lambda e: e.excess_angle,
     over="max",
+    needs=("orientation",),
 )
 PEAK_TORQUE = Objective(
     name="peak_torque",
@@ -81,6 +83,7 @@ PEAK_TORQUE = Objective(
     description="the largest of the joint torques' absolute values [N m] that hold the kept posture up against gravity",
     each=lambda e: e.worst_torques(lambda torques: np.abs(torques).max(axis=-1)),
     over="max",
+    needs=("motions",),
 )
 RMS_TORQUE = Objective(
     name="rms_torque",
@@ -106,13 +109,16 @@ TORQUE_UTILISATION = Objective(
     "against gravity, times the safety factor; above 1 the arm does not hold it with this factor",
     each=drives.torque_utilisation,
     over="max",
+    needs=("motions",),
+    ratings=("peak",),
 )
 PRICE = Objective(
     name="price",
     unit="USD",
     description="the price of all actuators, and of links and column if the space states one",
-    each=drives.price,
+    each=lambda e: e.drives.price + e.arms.structure_price,
     over="arm",
+    ratings=("price",),
 )
 JOINTS = Objective(
     name="joints",
@@ -134,6 +140,7 @@ COLLISION = Objective(
     description="how deep the arm in the kept posture is in an obstacle or in itself, at the worst place; 0 where it "
     f"is free, which along a cycle takes a gap of {1e3 * CYCLE_GAP:g} mm",
     each=lambda e: e.penetration,
+    needs=("clearance", "motions"),
 )
 CLEARANCE_SHORTFALL = Objective(
     name="clearance_shortfall",
@@ -143,6 +150,7 @@ CLEARANCE_SHORTFALL = Objective(
     f"itself; above {COMFORTABLE:g} it is in it",
     each=lambda e: np.maximum(0.0, COMFORTABLE - e.clearance),
     over="max",
+    needs=("clearance", "motions"),
 )
 PATH_ERROR = Objective(
     name="path_error",
@@ -153,6 +161,7 @@ PATH_ERROR = Objective(
     each=lambda e: e.largest_on_motions(e.paths.path_error),
     excess=lambda e: e.largest_on_motions(e.paths.path_error - (e.paths.plan.cycle.tolerance.path or 0.0)),
     over="max",
+    needs=("cycle",),
 )
 PATH_ANGLE = Objective(
     name="path_angle",
@@ -164,6 +173,7 @@ PATH_ANGLE = Objective(
     each=lambda e: e.largest_on_motions(e.paths.path_angle),
     excess=lambda e: e.largest_on_motions(e.paths.path_angle - (e.paths.plan.cycle.tolerance.angle or 0.0)),
     over="max",
+    needs=("cycle",),
 )
 JUMPS = Objective(
     name="jumps",
@@ -172,6 +182,7 @@ JUMPS = Objective(
     description="1 where the joints cannot move continuously on the way to the target, such as where the arm would "
     "have to flip into another posture, else 0",
     each=lambda e: e.largest_on_motions(e.paths.jumps.astype(np.float64)),
+    needs=("cycle",),
 )
 CYCLE_TIME = Objective(
     name="cycle_time",
@@ -180,6 +191,7 @@ CYCLE_TIME = Objective(
     description="the duration of the cycle, dwells included",
     each=lambda e: e.loads.cycle_time,
     over="arm",
+    needs=("cycle", "durations"),
 )
 UNCOVERED_FRACTION = Objective(
     name="uncovered_fraction",
@@ -188,6 +200,7 @@ UNCOVERED_FRACTION = Objective(
     description=f"the share of the workspace's points that the tip misses by {1e3 * REACHED:g} mm or more",
     each=lambda e: (e.workspace_error >= REACHED).mean(axis=1),
     over="arm",
+    needs=("workspace",),
 )
 UNDEXTEROUS_FRACTION = Objective(
     name="undexterous_fraction",
@@ -196,6 +209,7 @@ UNDEXTEROUS_FRACTION = Objective(
     description="the share of the workspace's points at which the tool reaches too few of the directions asked for",
     each=lambda e: 1.0 - e.dexterous_volume,
     over="arm",
+    needs=("directions",),
 )
 ANISOTROPY = Objective(
     name="anisotropy",
@@ -212,6 +226,7 @@ DYNAMIC_TORQUE = Objective(
     description="the largest absolute torque of any motor on the way to the target, gravity and inertia included",
     each=drives.dynamic_torque,
     over="max",
+    needs=("cycle", "durations"),
 )
 DYNAMIC_UTILISATION = Objective(
     name="dynamic_utilisation",
@@ -221,6 +236,8 @@ DYNAMIC_UTILISATION = Objective(
     "its torque-speed limit on the way to the target; above 1 it cannot",
     each=drives.dynamic_utilisation,
     over="max",
+    needs=("cycle", "durations"),
+    ratings=("peak", "corner_speed", "no_load_speed"),
 )
 SPEED_UTILISATION = Objective(
     name="speed_utilisation",
@@ -229,6 +246,8 @@ SPEED_UTILISATION = Objective(
     description="the largest share of any actuator's no-load speed on the way to the target; above 1 it cannot",
     each=drives.speed_utilisation,
     over="max",
+    needs=("cycle", "durations"),
+    ratings=("no_load_speed",),
 )
 THERMAL_UTILISATION = Objective(
     name="thermal_utilisation",
@@ -238,22 +257,28 @@ THERMAL_UTILISATION = Objective(
     "over the cycle with its dwells, times the safety factor; above 1 it overheats",
     each=drives.thermal_utilisation,
     over="arm",
+    needs=("cycle", "durations"),
+    ratings=("continuous",),
 )
 PEAK_CURRENT = Objective(
     name="peak_current",
     unit="A",
     symbol="I_peak",
     description="the largest current that all actuators together draw from the supply along the cycle",
-    each=drives.peak_current,
+    each=lambda e: e.supply.peak,
     over="arm",
+    needs=("cycle", "durations"),
+    ratings=("peak", "voltage", "current"),
 )
 MEAN_CURRENT = Objective(
     name="mean_current",
     unit="A",
     symbol="I_mean",
     description="the mean current that all actuators together draw from the supply over the cycle with its dwells",
-    each=drives.mean_current,
+    each=lambda e: e.supply.mean,
     over="arm",
+    needs=("cycle", "durations"),
+    ratings=("peak", "voltage", "current"),
 )
 DEFLECTION = Objective(
     name="deflection",
@@ -262,6 +287,8 @@ DEFLECTION = Objective(
     "twist and joints yield",
     each=compliance.deflection,
     over="max",
+    needs=("sections",),
+    ratings=("joint_stiffness",),
 )
 PAYLOAD_DEFLECTION = Objective(
     name="payload_deflection",
@@ -271,6 +298,8 @@ PAYLOAD_DEFLECTION = Objective(
     "yield",
     each=compliance.payload_deflection,
     over="max",
+    needs=("sections",),
+    ratings=("joint_stiffness",),
 )
 BACKLASH_ERROR = Objective(
     name="backlash_error",
@@ -279,6 +308,7 @@ BACKLASH_ERROR = Objective(
     description="how far half of the backlash of all actuators together moves the tip in the kept posture at most",
     each=compliance.backlash_error,
     over="max",
+    ratings=("backlash",),
 )
 PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)
 _ALL = (
@@ -289,17 +319,6 @@ _ALL = (
     BACKLASH_ERROR,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
-RENAMED = {
-    "missed": "unreached_targets",
-    "unreached": "uncovered_fraction",
-    "clumsiness": "anisotropy",
-    "closeness": "clearance_shortfall",
-    "joint_jump": "jumps",
-    "max_joint_step": "jumps",
-    "torque_use": "torque_utilisation",
-    "dynamic_use": "dynamic_utilisation",
-    "speed_use": "speed_utilisation",
-}
 
 
 def _clearance(name: str, description: str, each: Callable[[Evaluation], Array]) -> Objective:
@@ -310,6 +329,7 @@ def _clearance(name: str, description: str, each: Callable[[Evaluation], Array])
         description=f"{description}; below 0 it is in it, and {FAR:g} where there is nothing near",
         each=lambda e: np.minimum(each(e), FAR),
         over="min",
+        needs=("clearance", "motions"),
     )
 
 
@@ -334,6 +354,7 @@ PAYLOAD_CAPACITY = Objective(
     description="the largest payload that all actuators hold in the kept posture, with the safety factor",
     each=compliance.payload_capacity,
     over="min",
+    ratings=("peak",),
 )
 DEXTEROUS_VOLUME = Objective(
     name="dexterous_volume",
@@ -343,6 +364,7 @@ DEXTEROUS_VOLUME = Objective(
     "asked for",
     each=lambda e: e.dexterous_volume,
     over="arm",
+    needs=("directions",),
 )
 VOLTAGES = Objective(
     name="voltages",
@@ -350,21 +372,11 @@ VOLTAGES = Objective(
     description="the number of different supply voltages of the actuators",
     each=drives.voltages,
     over="arm",
+    ratings=("voltage",),
 )
 # More of these is better, so constraints can bound them, but they are no objectives.
 BENEFITS = (*CLEARANCES, MANIPULABILITY, PAYLOAD_CAPACITY, DEXTEROUS_VOLUME)
 QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*BENEFITS, VOLTAGES)}}
-
-# Quantities by what they depend on.
-ORIENTATION_QUANTITIES = (ORIENTATION_ERROR, WORST_ANGLE)
-CLEARANCE_QUANTITIES = (COLLISION, CLEARANCE_SHORTFALL, *CLEARANCES)
-PATH_QUANTITIES = (*CLEARANCE_QUANTITIES, PEAK_TORQUE, TORQUE_UTILISATION)  # the worst of targets and motions counts
-TIMED_QUANTITIES = (
-    CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION, PEAK_CURRENT, MEAN_CURRENT,
-)  # fmt: skip
-WORKSPACE_QUANTITIES = (UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION, DEXTEROUS_VOLUME)
-STIFFNESS_QUANTITIES = (DEFLECTION, PAYLOAD_DEFLECTION)
-MOTION_QUANTITIES = (PATH_ERROR, PATH_ANGLE, JUMPS, *TIMED_QUANTITIES)  # that need a cycle
 
 
 def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> tuple[Objective, ...]:
@@ -377,7 +389,7 @@ def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> 
     for name in names:
         if name not in known:
             raise SettingsError(
-                f'unknown objective "{name}".{did_you_mean(name, known, RENAMED)} Objectives: {", ".join(known)}'
+                f'unknown objective "{name}".{did_you_mean(name, known)} Objectives: {", ".join(known)}'
             )
     if not 1 <= len(names) <= MAX_OBJECTIVES or len(set(names)) < len(names):
         raise SettingsError(

@@ -15,21 +15,13 @@ FRACTIONS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)  # of the reach
 
 @dataclass(frozen=True)
 class ReachLine:
-    """An arm with its tip at a distance from its base axis.
+    """An arm with its tip at a distance from its base axis."""
 
-    Attributes:
-        fraction: The share of the horizontal reach.
-        distance: The horizontal distance from the first joint.
-        payload: What the actuators hold there in every posture that was found.
-        deflection: How far weight and the payload of the task move the tip there at most.
-        backlash_error: How far half of the backlash moves the tip there at most.
-    """
-
-    fraction: float
-    distance: float
-    payload: float | None
-    deflection: float | None
-    backlash_error: float | None
+    fraction: float  # the share of the horizontal reach
+    distance: float  # the horizontal distance from the first joint
+    payload: float | None  # what the actuators hold there in every posture that was found
+    deflection: float | None  # how far weight and the payload of the task move the tip there at most
+    backlash_error: float | None  # how far half of the backlash moves the tip there at most
 
 
 def reach_lines(arm: Arm, payload: float) -> tuple[ReachLine, ...]:

@@ -1,6 +1,6 @@
 """The problem: a design space, a task, and the objectives to minimise."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,18 +13,17 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
-from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays, task_scene
+from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.evaluators import Evaluator, Measurement
 from armwright.problem.failure import Failure
-from armwright.problem.objective import Objective
+from armwright.problem.objective import Need, Objective
 from armwright.problem.objectives import (
     ORIENTATION_ERROR,
-    ORIENTATION_QUANTITIES,
     PAPER_OBJECTIVES,
     QUANTITIES,
-    RENAMED,
     named_objectives,
 )
+from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.base_support import supported_space
@@ -39,36 +38,23 @@ NO_MEASUREMENTS: Mapping[str, Array] = {}
 
 @dataclass(frozen=True)
 class Outcome:
-    """Hold the result of evaluating one design.
+    """Hold the result of evaluating one design."""
 
-    Attributes:
-        values: the M objectives, minimised; infinite if the evaluator failed.
-        violations: of the C constraints; satisfied at <= 0.
-        failure: why the evaluator failed; None if it did not.
-        q: joint angles [rad] or strokes [m] at each target in the first case, 0 for joints that the design lacks.
-    """
-
-    values: tuple[float, ...]
-    violations: tuple[float, ...] = ()
-    failure: Failure | None = None
+    values: tuple[float, ...]  # the M objectives, minimised; infinite if the evaluator failed
+    violations: tuple[float, ...] = ()  # of the C constraints; satisfied at <= 0
+    failure: Failure | None = None  # why the evaluator failed; None if it did not
+    # Joint angles [rad] or strokes [m] at each target in the first case, 0 for joints that the design lacks
     q: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Hold the results of evaluating N designs.
+    """Hold the results of evaluating N designs."""
 
-    Attributes:
-        values: (N, M) objectives, minimised; infinite where the evaluator failed.
-        violations: (N, C) constraint violations; satisfied at <= 0.
-        failures: why the evaluator failed, by row.
-        postures: (N, B, D) at the first pose of each block of the cycle in the first case [rad] or [m]; None without
-            a cycle.
-    """
-
-    values: Array
-    violations: Array
-    failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])
+    values: Array  # (N, M) objectives, minimised; infinite where the evaluator failed
+    violations: Array  # (N, C) constraint violations; satisfied at <= 0
+    failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])  # why the evaluator failed, by row
+    # (N, B, D) at the first pose of each block of the cycle in the first case [rad] or [m]; None without a cycle
     postures: Array | None = None
     q: Array | None = None  # (N, T, J) joint angles at the targets in the first case [rad] or [m]
 
@@ -102,17 +88,6 @@ def worst_case(outcomes: Sequence[Outcomes]) -> Outcomes:
 class Problem:
     """Find the arms of a design space that serve a task best.
 
-    Attributes:
-        task: targets, cycle, tool, payloads, obstacles and constraints.
-        space: the designs to choose from.
-        tolerance: build tolerance [m]. Above 0, each objective of a design is the worst of the exact arm and of arms
-            with the base or one link off by this much.
-        device: where arms are evaluated; see `resolve_device`.
-        objectives: what is minimised; by default the task's, else the paper's, with the orientation error if a
-            target states an orientation.
-        evaluator: a custom function that measures objectives, such as a simulation.
-        constraints: the task's and those that its cycle and motor bodies imply, parsed.
-
     Examples:
         >>> import armwright as aw
         >>> problem = aw.Problem(aw.load_task("target-1"), aw.paper_space(joints=4))
@@ -123,12 +98,17 @@ class Problem:
         (1000, 2)
     """
 
-    task: Task
-    space: DesignSpace = field(default_factory=paper_space)
+    task: Task  # targets, cycle, tool, payloads, obstacles and constraints
+    space: DesignSpace = field(default_factory=paper_space)  # the designs to choose from
+    # Build tolerance [m]. Above 0, each objective of a design is the worst of the exact arm and of arms with the base
+    # or one link off by this much
     tolerance: float = 0.0
-    device: Device = "cpu"
+    device: Device = "cpu"  # where arms are evaluated; see `resolve_device`
+    # What is minimised; by default the task's, else the paper's, with the orientation error if a target states an
+    # orientation
     objectives: tuple[Objective, ...] = ()
-    evaluator: Evaluator | None = None
+    evaluator: Evaluator | None = None  # a custom function that measures objectives, such as a simulation
+    # The task's and those that its cycle and motor bodies imply, parsed
     constraints: tuple[Constraint, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
@@ -154,7 +134,7 @@ class Problem:
             raise SettingsError(f"expected a tolerance or an evaluator, got both ({self.evaluator.name})")
         self._check_custom_parameters()
         for objective in self.objectives:
-            if objective in ORIENTATION_QUANTITIES and not self.task.target_arrays.oriented:
+            if "orientation" in objective.needs and not self.task.target_arrays.oriented:
                 raise SettingsError(
                     f"objective {objective.name} needs a target with an axis or an orientation; task {self.task.name} "
                     "has none"
@@ -191,7 +171,7 @@ class Problem:
             if name not in names:
                 raise TaskError(
                     f'task {self.task.name}: resolution: "{name}" is not an objective of the task '
-                    f"({', '.join(names)}).{did_you_mean(name, names, RENAMED)}"
+                    f"({', '.join(names)}).{did_you_mean(name, names)}"
                 )
 
     def _check_custom_parameters(self) -> None:
@@ -213,10 +193,14 @@ class Problem:
         """Return the worst values that count for the hypervolume, if the task states them."""
         return self.task.reference_point
 
-    def uses(self, *quantities: Objective) -> bool:
-        """Return whether any of these is an objective or bounded by a constraint."""
-        used = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
-        return any(quantity.name in used for quantity in quantities)
+    @property
+    def quantities(self) -> tuple[Objective, ...]:
+        """The objectives, and the quantities that constraints bound."""
+        return tuple(dict.fromkeys((*self.objectives, *(constraint.quantity for constraint in self.constraints))))
+
+    def uses(self, *needs: Need) -> bool:
+        """Return whether an objective or a bounded quantity depends on any of these."""
+        return any(need in quantity.needs for quantity in self.quantities for need in needs)
 
     def arm(self, design: Design) -> Arm:
         """Return the arm that a design builds, with the task's tool."""
@@ -282,6 +266,30 @@ class Problem:
         """Return the targets and surroundings of each case of the task."""
         return tuple(task_scene(self.task, targets, payloads) for targets, payloads in self.task.cases)
 
+    def cases(
+        self,
+        arms: ArmArrays,
+        near: Sequence[Array | None] = (),
+        scenes: Sequence[Scene] = (),
+        start: Array | None = None,
+    ) -> Iterator[Evaluation]:
+        """Yield the physics of N arms, such as changed designs, in each case of the task.
+
+        Args:
+            arms: N arms.
+            near: (N, B, D) postures of each case that the arms keep as far as they can, such as those of the unchanged
+                designs; empty to choose postures.
+            scenes: changed surroundings of each case; empty for the task's.
+            start: initial joint values as in `evaluate_arrays`.
+        """
+        scenes = scenes or self.scenes
+        for scene, postures in zip(scenes, near or [None] * len(scenes), strict=True):
+            yield evaluate_arrays(arms, scene, self.device, initial_q=start, near=postures)
+
+    def worst(self, evaluations: Iterable[Evaluation], measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
+        """Return the worst outcomes of the same designs in several evaluations, of which one is in memory at a time."""
+        return worst_case([self.outcomes(evaluation, measured) for evaluation in evaluations])
+
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.
 
@@ -310,7 +318,7 @@ class Problem:
         q: list[Array] = []
         for rows in self.chunks(len(matrix)):
             chunk = {name: column[rows] for name, column in measured.items()}
-            found = worst_case([self.outcomes(physics, chunk) for physics in self._variants(matrix[rows])])
+            found = self.worst(self._variants(matrix[rows]), chunk)
             values[rows], violations[rows] = found.values, found.violations
             postures += [] if found.postures is None else [found.postures]
             q += [] if found.q is None else [found.q]
@@ -324,12 +332,13 @@ class Problem:
 
     def _variants(self, matrix: Array) -> Iterator[Evaluation]:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
+        near: list[Array | None] = []
         for case in range(len(self.scenes)):
             exact = self.physics(matrix, case)
+            near.append(exact.entry_postures)
             yield exact
-            near = exact.entry_postures
-            for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
-                yield self.physics(self.arms(rows), case, near)
+        for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
+            yield from self.cases(self.arms(rows), near)
 
     @cached_property
     def _postures(self) -> int:

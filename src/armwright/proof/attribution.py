@@ -13,17 +13,11 @@ from armwright.runs.trial import Count
 
 @dataclass(frozen=True)
 class Attribution:
-    """The contribution of the trials of one source.
+    """The contribution of the trials of one source."""
 
-    Attributes:
-        trials: Number of trials.
-        front: Number of trials on the final front.
-        hypervolume_gained: Sum of `hypervolume_gains`; None without a reference point.
-    """
-
-    trials: Count
-    front: Count
-    hypervolume_gained: float | None
+    trials: Count  # number of trials
+    front: Count  # number of trials on the final front
+    hypervolume_gained: float | None  # sum of `hypervolume_gains`; None without a reference point
 
 
 def attribution_by_source(history: History) -> dict[str, Attribution]:

@@ -13,7 +13,7 @@ from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.cycle.trajectory import Trajectory, sample_trajectory
 from armwright.problem.evaluation import Evaluation, evaluate
 from armwright.problem.problem import Problem
-from armwright.proof.simulation_model import Surroundings, to_simulation_mjcf
+from armwright.proof.simulation_model import to_simulation_mjcf
 from armwright.robot.arm import Arm
 from armwright.spaces.tool_mount import carrying_tool
 from armwright.tasks.task import Task
@@ -25,15 +25,10 @@ DIGITS = 9
 
 @dataclass(frozen=True)
 class CycleModel:
-    """An arm in its task.
+    """An arm in its task."""
 
-    Attributes:
-        mjcf: The model, as XML.
-        trajectory: Its motion through the cycle.
-    """
-
-    mjcf: str
-    trajectory: Trajectory
+    mjcf: str  # the model, as XML
+    trajectory: Trajectory  # its motion through the cycle
 
 
 def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, name: str) -> Mapping[str, str]:
@@ -101,15 +96,8 @@ def task_model(
         peak_torques: (D,) largest torques of the moving joints [N m] or [N].
         name: Name of the model.
     """
-    surroundings = Surroundings(
-        positions=evaluation.targets,
-        target_arrays=evaluation.target_arrays,
-        target_names=target_names,
-        obstacles=evaluation.obstacles,
-        payload=float(evaluation.payload.max()),
-        load_shape=evaluation.load_shape,
-    )
-    return to_simulation_mjcf(arm, surroundings, evaluation.q[row][:, _moving(arm)], peak_torques, name)
+    postures = evaluation.q[row][:, _moving(arm)]
+    return to_simulation_mjcf(arm, evaluation, target_names, postures, peak_torques, name)
 
 
 def peak_torques(arm: Arm, evaluation: Evaluation, row: int) -> Array:

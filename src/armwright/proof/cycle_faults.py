@@ -36,19 +36,12 @@ _SHOWN: Mapping[str, tuple[str, str, float]] = {
 
 @dataclass(frozen=True)
 class Extreme:
-    """The worst value of a quantity along a cycle.
+    """The worst value of a quantity along a cycle."""
 
-    Attributes:
-        value: The value [m], [rad] or [m³].
-        step: The number of the step, from 1.
-        motion: Which of the step's motions it is, such as "line in"; empty if the step has only one.
-        share: The share of this motion at which it occurs, 0 to 1.
-    """
-
-    value: float
-    step: int
-    motion: str
-    share: float
+    value: float  # the value [m], [rad] or [m³]
+    step: int  # the number of the step, from 1
+    motion: str  # which of the step's motions it is, such as "line in"; empty if the step has only one
+    share: float  # the share of this motion at which it occurs, 0 to 1
 
     @property
     def place(self) -> str:

@@ -28,19 +28,12 @@ VOLUME_LINE = "# hypervolume: "  # the beginning of the line of a file that stat
 
 @dataclass(frozen=True)
 class KnownFront:
-    """A front, of which some designs are kept.
+    """A front, of which some designs are kept."""
 
-    Attributes:
-        designs: The kept designs, by increasing first objective.
-        values: (K, M) their values.
-        reference_point: (M,) the task's.
-        volume: Hypervolume of the whole front within it.
-    """
-
-    designs: tuple[Design, ...]
-    values: Array
-    reference_point: tuple[float, ...]
-    volume: float
+    designs: tuple[Design, ...]  # the kept designs, by increasing first objective
+    values: Array  # (K, M) their values
+    reference_point: tuple[float, ...]  # (M,) the task's
+    volume: float  # hypervolume of the whole front within it
 
     def hypervolume(self, reference_point: Sequence[float]) -> float:
         """Return the hypervolume: of the whole front within the task's reference point, else of the kept designs."""
@@ -50,17 +43,11 @@ class KnownFront:
 
 @dataclass(frozen=True)
 class FrontGap:
-    """A front compared with the best known one, within the same reference point.
+    """A front compared with the best known one, within the same reference point."""
 
-    Attributes:
-        hypervolume: Hypervolume of the best known front.
-        share: Hypervolume of the front divided by it; above 1 if the front is better.
-        gain: What the front adds to the best known hypervolume at least, relative; 0 if it is less than 0.05 %.
-    """
-
-    hypervolume: float
-    share: float
-    gain: float
+    hypervolume: float  # hypervolume of the best known front
+    share: float  # hypervolume of the front divided by it; above 1 if the front is better
+    gain: float  # what the front adds to the best known hypervolume at least, relative; 0 if it is less than 0.05 %
 
 
 def known_front(problem: Problem) -> KnownFront | None:

@@ -21,16 +21,12 @@ MAX_CONFLICT = 4  # constraints that are named together
 
 @dataclass
 class ViolationTally:
-    """Evaluated designs, grouped by the constraints that they satisfy.
+    """Evaluated designs, grouped by the constraints that they satisfy."""
 
-    Attributes:
-        n_constraints: Number C of constraints.
-        counts: Number of designs of each group, whose key has bit i set for a satisfied constraint i.
-        nearest: (C,) violations of the design of each group with the smallest total.
-    """
-
-    n_constraints: int
+    n_constraints: int  # number C of constraints
+    # Number of designs of each group, whose key has bit i set for a satisfied constraint i
     counts: dict[int, int] = field(default_factory=dict[int, int])
+    # (C,) violations of the design of each group with the smallest total
     nearest: dict[int, Array] = field(default_factory=dict[int, Array])
 
     @classmethod

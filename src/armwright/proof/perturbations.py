@@ -21,12 +21,14 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.constraints import Constraint
-from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
+from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
+from armwright.problem.scene import Scene
 from armwright.proof.simulated_run import simulate_arm
 from armwright.robot.actuators import ActuatorRecord
 from armwright.robot.arm import Arm
 from armwright.runs.history import History
+from armwright.runs.trial import Count
 from armwright.spaces.tolerance import TOLERANCE, length_columns, perturbed
 
 MOVED, SUPPLY, ASSUMED = "base or a link 1 mm off", "90 % of the voltage", "assumed values halved or doubled"
@@ -42,79 +44,48 @@ ROUNDING = 1e-3  # of a bound; a smaller violation breaks nothing
 
 @dataclass(frozen=True)
 class Change:
-    """A change of a design.
+    """A change of a design."""
 
-    Attributes:
-        perturbation: The perturbation that it belongs to.
-        text: The change, such as `link_2 +1 mm`.
-    """
-
-    perturbation: str
-    text: str
+    perturbation: str  # the perturbation that it belongs to
+    text: str  # the change, such as `link_2 +1 mm`
 
 
 @dataclass(frozen=True)
 class Broken:
-    """A constraint that a changed design violates, or a failure in the simulator.
-
-    Attributes:
-        change: The change.
-        constraint: The constraint; the simulator's reason if it is none.
-        measured: What the constraint bounds, in its unit; None from the simulator.
-        violation: The violation of the constraint, relative to its bound; None from the simulator.
-    """
+    """A constraint that a changed design violates, or a failure in the simulator."""
 
     change: str
-    constraint: str
-    measured: float | None = None
-    violation: float | None = None
+    constraint: str  # the constraint; the simulator's reason if it is none
+    measured: float | None = None  # what the constraint bounds, in its unit; None from the simulator
+    violation: float | None = None  # the violation of the constraint, relative to its bound; None from the simulator
 
 
 @dataclass(frozen=True)
 class Perturbation:
-    """A perturbation of a design.
-
-    Attributes:
-        name: Its name.
-        changes: The number of changes that were evaluated.
-        broken: The constraints that they violate, of each change the most violated one first.
-    """
+    """A perturbation of a design."""
 
     name: str
-    changes: int
-    broken: tuple[Broken, ...]
+    changes: Count  # the number of changes that were evaluated
+    broken: tuple[Broken, ...]  # the constraints that they violate, of each change the most violated one first
 
 
 @dataclass(frozen=True)
 class Survival:
-    """Survival of a design.
-
-    Attributes:
-        verdict: The result in words.
-        perturbations: The perturbations.
-        simulated: Changes that were simulated as well.
-    """
+    """Survival of a design."""
 
     verdict: str
     perturbations: tuple[Perturbation, ...]
-    simulated: tuple[str, ...]
+    simulated: tuple[str, ...]  # changes that were simulated as well
 
 
 @dataclass(frozen=True)
 class _Batch:
-    """R changed designs in a changed scene.
-
-    Attributes:
-        changes: The R changes.
-        owners: (R,) index of the design that is changed.
-        arms: The R arms.
-        scenes: The scene of each case.
-    """
+    """R changed designs in a changed scene."""
 
     changes: Sequence[Change]
-    owners: NDArray[np.intp]
+    owners: NDArray[np.intp]  # (R,) index of the design that is changed
     arms: ArmArrays
-    scenes: Sequence[Scene]
+    scenes: Sequence[Scene]  # the scene of each case
 
 
 def evaluate_survival(history: History, designs: Mapping[int, bool]) -> dict[int, Survival]:
@@ -155,15 +126,8 @@ def _evaluate(
 
     near: (N, B, D) postures of the N designs in each case.
     """
-    evaluations = [
-        evaluate_arrays(
-            batch.arms,
-            scene,
-            problem.device,
-            near=None if postures is None else postures[batch.owners, :, : batch.arms.dof],
-        )
-        for scene, postures in zip(batch.scenes, near, strict=True)
-    ]
+    near = [None if postures is None else postures[batch.owners, :, : batch.arms.dof] for postures in near]
+    evaluations = list(problem.cases(batch.arms, near, batch.scenes))
     violations = np.max([problem.violations(evaluation) for evaluation in evaluations], axis=0)
     for change, owner, row in zip(batch.changes, batch.owners, violations, strict=True):
         pairs = sorted(zip(row.tolist(), problem.constraints, strict=True), key=lambda pair: -pair[0])
@@ -177,15 +141,13 @@ def _evaluate(
 
 def _moved(problem: Problem, matrix: Array) -> _Batch:
     """Return the designs with one length or coordinate of the base off by ±1 mm."""
-    names = [problem.space.parameters[column].name for column in length_columns(problem.space)]
-    texts = [f"{name} {sign}{1e3 * TOLERANCE:g} mm" for name in names for sign in "-+"]
-    n = len(matrix)
-    arms = problem.arms(np.vstack(list(perturbed(problem.space, matrix))))
-    owners, changes = np.tile(np.arange(n), len(texts)), [Change(MOVED, text) for text in texts for _ in range(n)]
-    designs = problem.space.designs(matrix)
-    has = np.array([change.text.split()[0] in designs[i].params for change, i in zip(changes, owners, strict=True)])
-    rows = np.flatnonzero(has)
-    return _Batch([changes[row] for row in rows], owners[rows], arms[rows], problem.scenes)
+    space = problem.space
+    names = [space.parameters[column].name for column in length_columns(space) for _ in "-+"]
+    active = np.array([space.active(name, matrix) for name in names])  # (K, N)
+    arms = problem.arms(np.stack(list(perturbed(space, matrix)))[active])
+    which, owners = np.nonzero(active)
+    changes = [Change(MOVED, f"{names[k]} {'-+'[k % 2]}{1e3 * TOLERANCE:g} mm") for k in which.tolist()]
+    return _Batch(changes, owners, arms, problem.scenes)
 
 
 def _loaded(problem: Problem, matrix: Array) -> Iterator[_Batch]:

@@ -15,29 +15,19 @@ EXACT = 1e-9  # [m]; a length this near to a round one is round
 
 @dataclass(frozen=True)
 class SourceBias:
-    """Shares of the designs of one source, 0 to 1.
+    """Shares of the designs of one source, 0 to 1."""
 
-    Attributes:
-        lengths_5_cm: All link lengths are multiples of 0.05 m, within 1e-9 m.
-        lengths_1_cm: All link lengths are multiples of 0.01 m, within 1e-9 m.
-        base_on_symmetry_plane: The base is within 1e-6 m of a symmetry plane of the targets; None if they have none.
-        equal_neighbours: Share of pairs of consecutive joints with the same type; None if there are no pairs.
-    """
-
-    lengths_5_cm: float
-    lengths_1_cm: float
+    lengths_5_cm: float  # all link lengths are multiples of 0.05 m, within 1e-9 m
+    lengths_1_cm: float  # all link lengths are multiples of 0.01 m, within 1e-9 m
+    # The base is within 1e-6 m of a symmetry plane of the targets; None if they have none
     base_on_symmetry_plane: float | None
+    # Share of pairs of consecutive joints with the same type; None if there are no pairs
     equal_neighbours: float | None
 
 
 @dataclass(frozen=True)
 class ProposerBias:
-    """The bias of a proposer's designs and of the black box's; None without designs.
-
-    Attributes:
-        proposer: Bias of the proposer's designs.
-        black_box: Bias of the black box's designs.
-    """
+    """The bias of a proposer's designs and of the black box's; None without designs."""
 
     proposer: SourceBias | None
     black_box: SourceBias | None

@@ -17,6 +17,7 @@ from armwright.proof.ranking import knee_first
 from armwright.proof.simulated_run import Simulator
 from armwright.proof.simulation import PASS
 from armwright.runs.history import History
+from armwright.runs.trial import Count
 
 MAX_TRIED = 10  # designs for each role
 BY_DEFAULT = (POSITION_ERROR.name, ORIENTATION_ERROR.name, TORQUE.name)  # objectives of tasks that state none
@@ -40,28 +41,21 @@ def unlimited(simulations: int, survivals: int) -> bool:
 class Demoted:
     """A design that was chosen first and failed in the simulator."""
 
-    design: int
+    design: Count
     reason: str
 
 
 @dataclass(frozen=True)
 class Recommendation:
-    """A recommended design.
+    """A recommended design."""
 
-    Attributes:
-        role: Why it is recommended: knee, or least QUANTITY.
-        design: Its number.
-        status: `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the
-            reason if the time was up or a custom evaluator measured the design.
-        demoted: The designs tried before.
-        survival: Which perturbations it survives; None without constraints, or if the time was up.
-    """
-
-    role: str
-    design: int
+    role: str  # why it is recommended: knee, or least QUANTITY
+    design: Count
+    # `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the reason if
+    # the time was up or a custom evaluator measured the design
     status: str
-    demoted: tuple[Demoted, ...] = ()
-    survival: Survival | None = None
+    demoted: tuple[Demoted, ...] = ()  # the designs tried before
+    survival: Survival | None = None  # which perturbations it survives; None without constraints, or if the time was up
 
 
 def candidates(history: History) -> dict[str, list[int]]:

@@ -169,19 +169,8 @@ def _value(name: str, fact: Fact) -> float:
 
 def _units(history: History) -> dict[str, str]:
     """Return the unit of each quantity by name."""
-    problem = history.problem
-    return {
-        **{name: quantity.unit for name, quantity in QUANTITIES.items()},
-        **{
-            parameter.name: parameter.unit
-            for parameter in problem.space.parameters
-            if isinstance(parameter, FloatParameter)
-        },
-        "length": "m",
-        "mass": "kg",
-        **{constraint.quantity.name: constraint.quantity.unit for constraint in problem.constraints},
-        **{objective.name: objective.unit for objective in problem.objectives},
-    }
+    reals = (p for p in history.problem.space.parameters if isinstance(p, FloatParameter))
+    return {one.name: one.unit for one in (*QUANTITIES.values(), *reals, *history.problem.objectives)}
 
 
 def _check_name(name: str, known: Sequence[str]) -> None:

@@ -14,21 +14,13 @@ from armwright.runs.history import History
 
 @dataclass(frozen=True)
 class SimulatedMember:
-    """A simulated design of a history.
-
-    Attributes:
-        result: The verdict.
-        drive: How it moved.
-        trajectory: How it should move.
-        limits: What its model states.
-        files: Content of its model and trajectory, by name.
-    """
+    """A simulated design of a history."""
 
     result: SimulatedDesign
-    drive: Drive
-    trajectory: Trajectory
-    limits: Limits
-    files: dict[str, str]
+    drive: Drive  # how it moved
+    trajectory: Trajectory  # how it should move
+    limits: Limits  # what its model states
+    files: dict[str, str]  # content of its model and trajectory, by name
 
 
 class Simulator:

@@ -4,7 +4,7 @@ Each joint is driven by the torque of the trajectory as feed-forward and by its 
 trajectory, interpolated between its rows. What damps is the friction of the joints.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -24,21 +24,13 @@ PASS, FAIL = "pass", "fail"
 
 @dataclass(frozen=True)
 class Arrival:
-    """The tip at the end of a dwell.
+    """The tip at the end of a dwell."""
 
-    Attributes:
-        step: Number of the step, counted from 1.
-        target: Name of the target.
-        tip_error: Distance from the target [m].
-        angle_error: Angle of the tool from the target's axis or orientation [rad]; 0 without either.
-        droop: Distance from the target without feed-forward [m].
-    """
-
-    step: int
-    target: str
-    tip_error: float
-    angle_error: float
-    droop: float = float("nan")
+    step: int  # number of the step, counted from 1
+    target: str  # name of the target
+    tip_error: float  # distance from the target [m]
+    angle_error: float  # angle of the tool from the target's axis or orientation [rad]; 0 without either
+    droop: float = float("nan")  # distance from the target without feed-forward [m]
 
 
 @dataclass(frozen=True)
@@ -68,56 +60,30 @@ class Contact:
 
 @dataclass(frozen=True)
 class Drive:
-    """A simulated cycle of R rows; S substeps of D joints.
+    """A simulated cycle of R rows; S substeps of D joints."""
 
-    Attributes:
-        q: (R, D) joint values at the rows [rad] or [m].
-        qd: (R, D) speeds at the rows.
-        tau: (S, D) torques of the drives [N m], or forces [N].
-        speed: (S, D) speeds at the substeps.
-        tip: (R, 3) position of the tip [m].
-        arrivals: At the end of each dwell.
-        contacts: What touched, by the first time.
-        stable: False if MuJoCo reported values that are not finite.
-    """
-
-    q: Array
-    qd: Array
-    tau: Array
-    speed: Array
-    tip: Array
-    arrivals: tuple[Arrival, ...]
-    contacts: tuple[Contact, ...]
-    stable: bool
+    q: Array  # (R, D) joint values at the rows [rad] or [m]
+    qd: Array  # (R, D) speeds at the rows
+    tau: Array  # (S, D) torques of the drives [N m], or forces [N]
+    speed: Array  # (S, D) speeds at the substeps
+    tip: Array  # (R, 3) position of the tip [m]
+    arrivals: tuple[Arrival, ...]  # at the end of each dwell
+    contacts: tuple[Contact, ...]  # what touched, by the first time
+    stable: bool  # false if MuJoCo reported values that are not finite
 
 
 @dataclass(frozen=True)
 class SimulatedDesign:
-    """The verdict on a design: passed without reasons, and what was measured.
-
-    Attributes:
-        design: Its number.
-        verdict: pass or fail.
-        reasons: Why it failed.
-        cycle_time: Duration of the trajectory [s].
-        energy: Mechanical work of the drives, without what they brake [J].
-        targets: At the end of each dwell.
-        joints: Loads of each moving joint.
-        contacts: What touched.
-    """
+    """The verdict on a design: passed without reasons, and what was measured."""
 
     design: int
-    verdict: str
-    reasons: tuple[str, ...]
-    cycle_time: float
-    energy: float
-    targets: tuple[Arrival, ...]
-    joints: tuple[JointLoad, ...]
-    contacts: tuple[Contact, ...]
-
-    def record(self) -> dict[str, Any]:
-        """Return the content of a record of JSON."""
-        return asdict(self)
+    verdict: str  # pass or fail
+    reasons: tuple[str, ...]  # why it failed
+    cycle_time: float  # duration of the trajectory [s]
+    energy: float  # mechanical work of the drives, without what they brake [J]
+    targets: tuple[Arrival, ...]  # at the end of each dwell
+    joints: tuple[JointLoad, ...]  # loads of each moving joint
+    contacts: tuple[Contact, ...]  # what touched
 
 
 def mujoco_version() -> str:
@@ -239,17 +205,11 @@ def angle_between(first: Array, second: Array, n_angular: int) -> float:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a model states: names and torque limits of its joints, tolerances of its targets [m], [rad].
+    """What a model states: names and torque limits of its joints, tolerances of its targets [m], [rad]."""
 
-    Attributes:
-        joints: Names of the D joints.
-        torque: (D,) limits [N m], or forces [N]; infinite without.
-        tolerances: Of the position [m] and the angle [rad], by target.
-    """
-
-    joints: tuple[str, ...]
-    torque: Array
-    tolerances: dict[str, tuple[float, float]]
+    joints: tuple[str, ...]  # names of the D joints
+    torque: Array  # (D,) limits [N m], or forces [N]; infinite without
+    tolerances: dict[str, tuple[float, float]]  # of the position [m] and the angle [rad], by target
 
 
 def read_limits(model_xml: str) -> Limits:

@@ -6,6 +6,7 @@ designs/NNNN/simulation.csv  the joints and the tip of a design as they moved
 
 import io
 from collections.abc import Iterable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ def write_simulated(folder: RunFolder, member: SimulatedMember) -> None:
 
 def simulation_record(members: Iterable[SimulatedMember]) -> dict[str, Any]:
     """Return the content of simulation.json, which `armwright simulate --json` prints."""
-    designs = [member.result.record() for member in members]
+    designs = [asdict(member.result) for member in members]
     return {
         "mujoco": mujoco_version(),
         "timestep": TIMESTEP,

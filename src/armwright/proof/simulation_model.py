@@ -6,13 +6,13 @@ distances, and touch exactly what it counts.
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import accumulate
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.problem.scene import Scene
 from armwright.robot.arm import GRAVITY, Arm, Joint
 from armwright.robot.collision_pairs import joined_by_column, joined_by_motors
 from armwright.robot.link_geometry import (
@@ -36,8 +36,6 @@ from armwright.robot.mjcf import (
     joint_attributes,
 )
 from armwright.tasks.obstacles import Obstacle
-from armwright.tasks.payload import LoadShape
-from armwright.tasks.targets import TargetArrays
 
 TIMESTEP = 0.001  # [s]
 NOTHING = 1e-9  # mass [kg] and moments of inertia [kg m²] of a payload that is not carried
@@ -54,29 +52,8 @@ TOUCHES_NOTHING = {"contype": "0", "conaffinity": "0"}
 COLOURS = {"obstacle": "0.55 0.55 0.58 0.5", "target": "0.84 0.16 0.16 0.6", "payload": "0.95 0.77 0.06 0.7"}
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """What an arm works with.
-
-    Attributes:
-        positions: (T, 3) of the targets [m].
-        target_arrays: How the targets are to be reached.
-        target_names: Their names.
-        obstacles: What the arm should keep away from.
-        payload: Mass of the payload [kg].
-        load_shape: How it is distributed.
-    """
-
-    positions: Array
-    target_arrays: TargetArrays
-    target_names: Sequence[str]
-    obstacles: Sequence[Obstacle]
-    payload: float
-    load_shape: LoadShape
-
-
 def to_simulation_mjcf(
-    arm: Arm, surroundings: Surroundings, postures: Array, peak_torques: Array, name: str = "arm"
+    arm: Arm, scene: Scene, target_names: Sequence[str], postures: Array, peak_torques: Array, name: str = "arm"
 ) -> str:
     """Return the MJCF of an arm in its surroundings.
 
@@ -88,7 +65,8 @@ def to_simulation_mjcf(
 
     Args:
         arm: The arm.
-        surroundings: What it works with.
+        scene: Its surroundings.
+        target_names: Names of the targets.
         postures: (T, D) values of the moving joints at the targets [rad] or [m].
         peak_torques: (D,) largest torques of the moving joints, for the gains of joints without actuators.
         name: Name of the model.
@@ -101,8 +79,8 @@ def to_simulation_mjcf(
         SubElement(option, "flag", filterparent="disable")
     SubElement(SubElement(root, "default"), "geom", {**TOUCHES_NOTHING, "mass": "0"})
     world = add_scene(root, arm)
-    _add_obstacles(world, surroundings.obstacles)
-    _add_targets(world, surroundings, arm)
+    _add_obstacles(world, scene.obstacles)
+    _add_targets(world, scene, target_names, arm)
     body = SubElement(world, "body", name="base", pos=numbers(arm.base))
     if arm.column is not None:
         add_column(body, arm.column, {"name": "column", **TOUCHES_LINKS})
@@ -119,11 +97,11 @@ def to_simulation_mjcf(
             _add_link(body, segment)
     add_tip(body, arm)
     add_tool(body, arm)
-    _add_payload(body, arm, surroundings)
+    _add_payload(body, arm, scene)
     _add_exclusions(root, arm, motor_names)
     _add_actuators(root, arm, peak_torques)
     frames = SubElement(root, "keyframe")
-    for target, q in zip(surroundings.target_names, postures.tolist(), strict=True):
+    for target, q in zip(target_names, postures.tolist(), strict=True):
         SubElement(frames, "key", name=target, qpos=numbers(q), ctrl=numbers([*q, *np.zeros(len(q))]))
     return to_xml(root)
 
@@ -178,11 +156,11 @@ def _add_obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
         SubElement(world, "geom", {"name": f"obstacle_{label}", **geom, **place, **bits, "rgba": COLOURS["obstacle"]})
 
 
-def _add_targets(world: Element, surroundings: Surroundings, arm: Arm) -> None:
-    arrays = surroundings.target_arrays
+def _add_targets(world: Element, scene: Scene, target_names: Sequence[str], arm: Arm) -> None:
+    arrays = scene.target_arrays
     size = number(arm.links[-1].radius / 2.0)
-    for t, name in enumerate(surroundings.target_names):
-        site = {"name": f"target_{name}", "pos": numbers(surroundings.positions[t].tolist()), "size": size}
+    for t, name in enumerate(target_names):
+        site = {"name": f"target_{name}", "pos": numbers(scene.targets[t].tolist()), "size": size}
         axes = numbers(arrays.rotation[t][:, :2].T.ravel().tolist())
         allowed = (float(arrays.tolerance[t]), float(arrays.angle_tolerance[t]), float(arrays.n_angular[t]))
         SubElement(world, "site", {**site, "xyaxes": axes, "user": numbers(allowed), "rgba": COLOURS["target"]})
@@ -233,8 +211,8 @@ def _add_motor(body: Element, name: str, segment: Segment, arm: Arm) -> None:
     SubElement(body, "geom", {"name": name, **shape, "material": f"joint_{segment.joint.axis}", **bits})
 
 
-def _add_payload(body: Element, arm: Arm, surroundings: Surroundings) -> None:
-    mass, shape = surroundings.payload, surroundings.load_shape
+def _add_payload(body: Element, arm: Arm, scene: Scene) -> None:
+    mass, shape = float(scene.payload.max()), scene.load_shape
     payload = SubElement(body, "body", name="payload", pos=numbers(tip_position(arm)), euler=numbers(tip_rpy(arm)))
     moments = [mass * value for value in shape.gyration] if mass > 0.0 else [NOTHING] * 3
     inertial = {"pos": numbers(shape.center), "mass": number(mass or NOTHING), "diaginertia": numbers(moments)}

@@ -11,6 +11,7 @@ from armwright.files import replace_surrogates
 from armwright.proof.attribution import Attribution
 from armwright.proof.front_gap import FrontGap
 from armwright.proof.proposer_bias import ProposerBias
+from armwright.proof.recommendation import Recommendation
 from armwright.runs.trial import Count
 
 
@@ -35,38 +36,6 @@ class _Verification(_Record):
     hypervolume_of_robust: float
     robust_from_any_start: Count
     hypervolume_worst_case: float
-
-
-class _Demoted(_Record):
-    design: Count
-    reason: str
-
-
-class _Broken(_Record):
-    change: str
-    constraint: str
-    measured: float | None
-    violation: float | None
-
-
-class _Perturbation(_Record):
-    name: str
-    changes: Count
-    broken: list[_Broken]
-
-
-class _Survival(_Record):
-    verdict: str
-    perturbations: list[_Perturbation]
-    simulated: list[str]
-
-
-class _Recommended(_Record):
-    role: str
-    design: Count
-    status: str
-    demoted: list[_Demoted]
-    survival: _Survival | None = None
 
 
 class _Age(_Record):
@@ -161,7 +130,7 @@ class _Summary(_Record):
     verification: _Verification | None
     feasibility: _Feasibility | None = None
     assumed: dict[str, dict[str, float]] = {}
-    recommended: list[_Recommended] = []
+    recommended: list[Recommendation] = []
 
 
 class StudySummary(_Summary):
@@ -195,28 +164,16 @@ def parse_summary(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ProposerSummary:
-    """What a run's proposer did and cost, for summary.json.
-
-    Attributes:
-        name: The proposer.
-        model: The model that answered.
-        origin: What answered: `model`, `manual` (people) or `scripted` (a stand-in).
-        calls: Requests to the server; more than proposals if answers were refused.
-        call_failures: Failed calls by kind.
-        input_tokens: Tokens of all prompts.
-        output_tokens: Tokens of all answers.
-        cost_usd: Cost; None if a price is unknown.
-        call_seconds: Time of all calls together.
-        notes: Further entries of the record, such as where a replay differs from its source.
-    """
+    """What a run's proposer did and cost, for summary.json."""
 
     name: str
-    model: str | None = None
-    origin: str | None = None
-    calls: int = 0
-    call_failures: Mapping[str, int] = field(default_factory=dict[str, int])
-    input_tokens: int = 0
-    output_tokens: int = 0
-    cost_usd: float | None = None
-    call_seconds: float = 0.0
+    model: str | None = None  # the model that answered
+    origin: str | None = None  # what answered: `model`, `manual` (people) or `scripted` (a stand-in)
+    calls: int = 0  # requests to the server; more than proposals if answers were refused
+    call_failures: Mapping[str, int] = field(default_factory=dict[str, int])  # failed calls by kind
+    input_tokens: int = 0  # tokens of all prompts
+    output_tokens: int = 0  # tokens of all answers
+    cost_usd: float | None = None  # cost; None if a price is unknown
+    call_seconds: float = 0.0  # time of all calls together
+    # Further entries of the record, such as where a replay differs from its source
     notes: Mapping[str, Any] = field(default_factory=dict[str, Any])

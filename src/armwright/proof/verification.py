@@ -9,14 +9,14 @@ nothing to show: its postures are chosen from many starts.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.pareto import masked_objectives
-from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.problem import Outcomes, Problem, worst_case
 from armwright.runs.history import History
 from armwright.spaces.parameters import Design
@@ -30,22 +30,14 @@ ALLOWED_OF_REFERENCE = 0.005  # of the reference point's value; always allowed
 
 @dataclass(frozen=True)
 class Verification:
-    """Verification of N designs with M objectives.
+    """Verification of N designs with M objectives."""
 
-    Attributes:
-        exact: (N, M) objectives in float64.
-        moved: (N, M) the worst in float64 with the base or one link off by 1 mm.
-        started: (N, M) the worst in float64 from other start postures.
-        robust: (N,) True if neither `exact` nor `moved` exceeds the allowed values and violations.
-        from_any_start: (N,) True if `started` does not exceed them, either.
-        worst_case: (N, M) the worst of the search's values, `exact` and `moved`; infinite if a constraint is violated.
-    """
-
-    exact: Array
-    moved: Array
-    started: Array
-    robust: NDArray[np.bool_]
-    from_any_start: NDArray[np.bool_]
+    exact: Array  # (N, M) objectives in float64
+    moved: Array  # (N, M) the worst in float64 with the base or one link off by 1 mm
+    started: Array  # (N, M) the worst in float64 from other start postures
+    robust: NDArray[np.bool_]  # (N,) True if neither `exact` nor `moved` exceeds the allowed values and violations
+    from_any_start: NDArray[np.bool_]  # (N,) True if `started` does not exceed them, either
+    # (N, M) the worst of the search's values, `exact` and `moved`; infinite if a constraint is violated
     worst_case: Array
 
 
@@ -69,13 +61,15 @@ def verify(
         values: (N, M) objectives that the search found.
         reference_point: (M,) scale of the allowed differences.
     """
+    problem = replace(problem, device="cpu")
     matrix = problem.space.matrix(designs)
-    evaluations = _evaluate(problem, matrix)
-    exact = _outcomes(problem, evaluations)
+    arms = problem.arms(matrix, "float64")
+    evaluations = list(problem.cases(arms))
+    exact = problem.worst(evaluations)
     near = [evaluation.entry_postures for evaluation in evaluations]
-    copies = perturbed(problem.space, matrix)
-    moved = worst_case([_outcomes(problem, _evaluate(problem, rows, near=near)) for rows in copies])
-    started = exact if _visits_all(problem) else _started(problem, matrix)
+    copies = (problem.arms(rows, "float64") for rows in perturbed(problem.space, matrix))
+    moved = worst_case([problem.worst(problem.cases(copy, near)) for copy in copies])
+    started = exact if _visits_all(problem) else _started(problem, arms)
     allowed = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
     built = worst_case([exact, moved])
     robust = _within(built, allowed)
@@ -95,30 +89,8 @@ def _visits_all(problem: Problem) -> bool:
     return all(plan is not None and len(set(plan.targets)) == len(problem.task.targets) for plan in plans)
 
 
-def _started(problem: Problem, matrix: Array) -> Outcomes:
+def _started(problem: Problem, arms: ArmArrays) -> Outcomes:
     """Return the worst from other start postures."""
-    shape = STARTS, len(problem.task.targets), problem.arms(matrix).dof
+    shape = STARTS, len(problem.task.targets), arms.dof
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
-    return worst_case([_outcomes(problem, _evaluate(problem, matrix, start)) for start in starts])
-
-
-def _evaluate(
-    problem: Problem, matrix: Array, start: Array | None = None, near: Sequence[Array | None] = ()
-) -> list[Evaluation]:
-    """Evaluate designs in float64 in all cases of the task.
-
-    Args:
-        problem: The problem.
-        matrix: (N, P) designs.
-        start: (T, D) start posture [rad]; None for the straight one.
-        near: Postures of similar arms in each case, which the designs keep (`evaluate_arrays`).
-    """
-    arrays, near = problem.arms(matrix, "float64"), near or [None] * len(problem.scenes)
-    return [
-        evaluate_arrays(arrays, scene, initial_q=start, near=postures)
-        for scene, postures in zip(problem.scenes, near, strict=True)
-    ]
-
-
-def _outcomes(problem: Problem, evaluations: Sequence[Evaluation]) -> Outcomes:
-    return worst_case([problem.outcomes(evaluation) for evaluation in evaluations])
+    return worst_case([problem.worst(problem.cases(arms, start=start)) for start in starts])

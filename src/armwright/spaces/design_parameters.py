@@ -28,17 +28,12 @@ GRID_KINDS = ("origin", "link", "stroke", "limit")
 
 @dataclass(frozen=True)
 class ConditionalParameter:
-    """A parameter and the condition under which it is active.
-
-    Attributes:
-        parameter: The parameter.
-        module: The module, counted from 1, that the arm must have; None if the parameter is always active.
-        types: The types that this module may have; None for any.
-    """
+    """A parameter and the condition under which it is active."""
 
     parameter: Parameter
+    # The module, counted from 1, that the arm must have; None if the parameter is always active
     module: int | None = None
-    types: frozenset[str] | None = None
+    types: frozenset[str] | None = None  # the types that this module may have; None for any
 
     @property
     def name(self) -> str:

@@ -194,10 +194,13 @@ class DesignSpace(SpaceSchema, frozen=True):
 
     def sample(self, n: int, seed: int) -> list[Design]:
         """Return `n` designs, uniform in every parameter."""
-        rng = np.random.default_rng(seed)
+        return self.designs(self.sample_matrix(n, np.random.default_rng(seed)))
+
+    def sample_matrix(self, n: int, rng: np.random.Generator) -> Array:
+        """Return the (n, P) matrix of designs that are uniform in every parameter."""
         parameters = self.parameters
         rows = [[parameter.sample(rng) for parameter in parameters] for _ in range(n)]
-        return self.designs(np.array(rows, dtype=np.float64).reshape(n, len(parameters)))
+        return self.normalised(np.array(rows, dtype=np.float64).reshape(n, len(parameters)))
 
     def arm(self, design: Design, tool: Tool = NO_TOOL) -> Arm:
         """Return the arm that a design builds, with a tool at its end.

@@ -19,15 +19,10 @@ Mount = Literal["floor", "ceiling", "wall+x", "wall-x", "wall+y", "wall-y"]
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """Joints at one position, followed by a link.
+    """Joints at one position, followed by a link."""
 
-    Attributes:
-        joints: Kind and local axis of each joint. The link follows the last one.
-        description: A description for readers who do not know this program.
-    """
-
-    joints: tuple[tuple[JointKind, Axis], ...]
-    description: str
+    joints: tuple[tuple[JointKind, Axis], ...]  # kind and local axis of each joint. The link follows the last one
+    description: str  # A description for readers who do not know this program
 
     @property
     def is_revolute(self) -> bool:

@@ -14,25 +14,15 @@ MAX_TUBES = 20
 
 @dataclass(frozen=True, slots=True)
 class LinkTube:
-    """A tube as a link has it.
+    """A tube as a link has it."""
 
-    Attributes:
-        name: The choice of a parameter: `30x2`.
-        radius: The outer radius [m].
-        wall: Wall thickness [m]; None without a material.
-        mass_per_metre: [kg/m]; 0 without a material, which leaves the mass to another key.
-        bending_stiffness: EI [N m²]; None without a material.
-        torsional_stiffness: GJ [N m²]; None without a material.
-        price_per_metre: [USD/m].
-    """
-
-    name: str
-    radius: float
-    wall: float | None = None
-    mass_per_metre: float = 0.0
-    bending_stiffness: float | None = None
-    torsional_stiffness: float | None = None
-    price_per_metre: float = 0.0
+    name: str  # the choice of a parameter: `30x2`
+    radius: float  # the outer radius [m]
+    wall: float | None = None  # wall thickness [m]; None without a material
+    mass_per_metre: float = 0.0  # [kg/m]; 0 without a material, which leaves the mass to another key
+    bending_stiffness: float | None = None  # EI [N m²]; None without a material
+    torsional_stiffness: float | None = None  # GJ [N m²]; None without a material
+    price_per_metre: float = 0.0  # [USD/m]
 
     def link(
         self, offset: Vector, mass: float, length: float, end_mass: float = 0.0, end_shift: Vector = (0.0, 0.0, 0.0)

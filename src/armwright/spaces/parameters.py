@@ -20,25 +20,15 @@ GRID_DIGITS = 12  # decimals of a value on a grid
 
 @dataclass(frozen=True, slots=True)
 class FloatParameter:
-    """A numeric parameter.
-
-    Attributes:
-        name: Its name.
-        low: The lower bound, in `unit`.
-        high: The upper bound.
-        unit: The unit.
-        step: The step of its grid, which starts at `low`; 0 for none.
-        log: Whether it is drawn on a logarithmic scale; its values are above 0.
-        integer: Whether its values are whole numbers, as `int`; its step is one, too.
-    """
+    """A numeric parameter."""
 
     name: str
-    low: float
+    low: float  # the lower bound, in `unit`
     high: float
     unit: str
-    step: float = 0.0
-    log: bool = False
-    integer: bool = False
+    step: float = 0.0  # the step of its grid, which starts at `low`; 0 for none
+    log: bool = False  # whether it is drawn on a logarithmic scale; its values are above 0
+    integer: bool = False  # whether its values are whole numbers, as `int`; its step is one, too
 
     def __post_init__(self) -> None:
         """Replace -0.0 by 0.0: numpy sorts -0.0 below 0.0."""

@@ -1,5 +1,6 @@
 """Bases so low that the motor of the first joint is inside the ground."""
 
+from collections.abc import Iterator
 from itertools import product
 
 from armwright.problem.checks.finding import PROVEN, Finding
@@ -12,7 +13,7 @@ from armwright.spaces.parameters import CategoricalParameter
 from armwright.tasks.obstacles import Ground
 
 
-def check_base_motor(problem: Problem) -> list[Finding]:
+def check_base_motor(problem: Problem) -> Iterator[Finding]:
     """Find a ground that the motor of the first joint of every floor-mounted arm is in.
 
     This motor is at rest and may touch the ground, but not be inside.
@@ -20,23 +21,20 @@ def check_base_motor(problem: Problem) -> list[Finding]:
     grounds = [obstacle for obstacle in problem.task.obstacles if isinstance(obstacle, Ground)]
     space = problem.space
     if not (grounds and space.has_motor_bodies and space.mount == ("floor",)) or required_clearance(problem) < 0.0:
-        return []
+        return
     bodies = _first_bodies(problem)
     highest, ground = float(base_box(space)[1][2]), max(grounds, key=lambda one: one.z)
     if not bodies:
-        return []
+        return
     name, depth = min(((name, body.size[2] / 2 - body.centre[2]) for name, body in bodies), key=lambda one: one[1])
     needed = ground.z + depth
-    if highest + ROUNDING * (1.0 + abs(highest)) >= needed:
-        return []
-    return [
-        Finding(
+    if highest + ROUNDING * (1.0 + abs(highest)) < needed:
+        yield Finding(
             f"origin_z: the base is at most at {highest:g} m, but the motor of the first joint reaches at least "
             f"{1e3 * depth:.3g} mm below it ({name}), into an obstacle: {ground.describe()}; allow bases from "
             f"{needed:.3g} m up, or leave the motors out with motor_bodies: false",
             PROVEN,
         )
-    ]
 
 
 def _first_bodies(problem: Problem) -> list[tuple[str, MotorBody]]:

@@ -5,7 +5,7 @@ if every number of modules violates at least one.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import cast
 
@@ -46,28 +46,24 @@ class Interval:
 NOTHING = Interval(0.0, 0.0)
 
 
-def check_constraints(problem: Problem) -> list[Finding]:
+def check_constraints(problem: Problem) -> Iterator[Finding]:
     """Find constraints that no design satisfies, alone or together."""
     fixed, by_size = _intervals_of_task(problem), intervals_by_modules(problem)
-    findings: list[Finding] = []
     for constraint in problem.constraints:
         name = constraint.quantity.name
         interval = None if name in by_size[problem.space.max_joints] else fixed.get(name)
         if interval is not None and interval.excludes(constraint):
-            findings.append(Finding(_describe(constraint, interval), PROVEN))
+            yield Finding(_describe(constraint, interval), PROVEN)
     violated = {
         n: [c for c in problem.constraints if c.quantity.name in known and known[c.quantity.name].excludes(c)]
         for n, known in by_size.items()
     }
     if not all(violated.values()):
-        return findings
+        return
     always = [c for c in problem.constraints if all(c in broken for broken in violated.values())]
     for constraint in always:
-        each = [known[constraint.quantity.name] for known in by_size.values()]
-        interval = Interval(min(i.low for i in each), max(i.high for i in each))
-        findings.append(
-            Finding(f"{_describe(constraint, interval)} in this space; loosen it, or widen the space", PROVEN)
-        )
+        interval = _hull([known[constraint.quantity.name] for known in by_size.values()])
+        yield Finding(f"{_describe(constraint, interval)} in this space; loosen it, or widen the space", PROVEN)
     if not always:
         together = [
             f'"{c.description}"' for c in problem.constraints if any(c in broken for broken in violated.values())
@@ -76,10 +72,7 @@ def check_constraints(problem: Problem) -> list[Finding]:
             f"with {n} modules, {_limit(broken[0], by_size[n][broken[0].quantity.name])}"
             for n, broken in violated.items()
         ]
-        findings.append(
-            Finding(f"constraints: no design satisfies {' and '.join(together)} together: {'; '.join(why)}", PROVEN)
-        )
-    return findings
+        yield Finding(f"constraints: no design satisfies {' and '.join(together)} together: {'; '.join(why)}", PROVEN)
 
 
 def intervals_by_modules(problem: Problem) -> dict[int, dict[str, Interval]]:

@@ -1,21 +1,20 @@
 """Custom parameters that nothing reads: they do not change the arm, and no built-in objective depends on them."""
 
+from collections.abc import Iterator
+
 from armwright.exceptions import SettingsError
 from armwright.problem.checks.finding import SUSPECTED, Finding
 from armwright.problem.problem import Problem
 
 
-def check_custom_parameters(problem: Problem) -> list[Finding]:
+def check_custom_parameters(problem: Problem) -> Iterator[Finding]:
     """Find custom parameters of a problem without an evaluator."""
     names = _unread(problem)
-    if not names:
-        return []
-    return [
-        Finding(
+    if names:
+        yield Finding(
             f"parameters {', '.join(names)}: only an evaluator reads them; try armwright optimize --evaluator",
             SUSPECTED,
         )
-    ]
 
 
 def refuse_unread_parameters(problem: Problem) -> None:

@@ -12,15 +12,10 @@ MAX_LISTED = 8  # numbers of targets in a message
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault of a task or a design space.
+    """A fault of a task or a design space."""
 
-    Attributes:
-        message: What is wrong and how to repair it, on one line.
-        evidence: PROVEN, SUSPECTED, or the samples that support it, such as "none of 4,000 samples".
-    """
-
-    message: str
-    evidence: str
+    message: str  # what is wrong and how to repair it, on one line
+    evidence: str  # PROVEN, SUSPECTED, or the samples that support it, such as "none of 4,000 samples"
 
     @property
     def is_proven(self) -> bool:

@@ -1,5 +1,7 @@
 """Error objectives that constraints keep within the tolerances, so that a search cannot improve them."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from armwright.problem.checks.finding import SUSPECTED, Finding
@@ -10,23 +12,19 @@ from armwright.problem.objectives import CYCLE_TIME, DYNAMIC_TORQUE, MASS, PEAK_
 from armwright.problem.problem import Problem
 
 
-def check_idle_objectives(problem: Problem) -> list[Finding]:
+def check_idle_objectives(problem: Problem) -> Iterator[Finding]:
     """Find objectives whose errors the constraints keep within the tolerances."""
-    findings: list[Finding] = []
     for constraint in problem.constraints:
         bounded = [objective for objective in problem.objectives if _is_bounded(problem, objective, constraint)]
         for ignored, why in ((True, "below which they count as 0"), (False, "and postures are found more exactly")):
             names = [objective.name for objective in bounded if _is_ignored(problem, objective) == ignored]
             if names:
-                findings.append(
-                    Finding(
-                        f"{' and '.join(names)}: {'0' if ignored else 'next to 0'} for every feasible design, as "
-                        f'"{constraint.description}" keeps errors within the {"stated " if ignored else ""}tolerances, '
-                        f"{why}; try {_others(problem)}",
-                        SUSPECTED,
-                    )
+                yield Finding(
+                    f"{' and '.join(names)}: {'0' if ignored else 'next to 0'} for every feasible design, as "
+                    f'"{constraint.description}" keeps errors within the {"stated " if ignored else ""}tolerances, '
+                    f"{why}; try {_others(problem)}",
+                    SUSPECTED,
                 )
-    return findings
 
 
 def _is_bounded(problem: Problem, objective: Objective, constraint: Constraint) -> bool:

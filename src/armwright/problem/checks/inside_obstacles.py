@@ -1,6 +1,7 @@
 """Targets inside obstacles, or too close to them."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +14,14 @@ from armwright.problem.problem import Problem
 from armwright.tasks.obstacles import Obstacle
 
 
-def check_obstacles(problem: Problem) -> list[Finding]:
+def check_obstacles(problem: Problem) -> Iterator[Finding]:
     """Find targets in obstacles.
 
     The end of the last link is within the tool's length of the tip, and the tip of an arm that reaches a target is
     within its tolerance. Clearances ignore the tool. If the constraints demand both to reach a target and a clearance
     that the end of the last link cannot have there, it is proven that no design is feasible.
     """
-    task, findings = problem.task, list[Finding]()
+    task = problem.task
     error, clearance = allowed_errors(problem), required_clearance(problem)
     slack = ROUNDING * (1.0 + np.abs(task.target_positions).max())
     # A first link stands on what it is mounted on, and is measured from above its foot.
@@ -32,8 +33,7 @@ def check_obstacles(problem: Problem) -> list[Finding]:
         inside = (distance < -task.target_arrays.tolerance) & ~impossible
         for found, evidence in ((impossible, PROVEN), (inside, SUSPECTED)):
             if found.any():
-                findings.append(_finding(problem, obstacle, distance, found, evidence))
-    return findings
+                yield _finding(problem, obstacle, distance, found, evidence)
 
 
 def required_clearance(problem: Problem) -> float:

@@ -19,10 +19,10 @@ HUGE_SOLID = 100.0  # times the reach
 WIDE_ANGLE = math.radians(90.0)  # [rad] of a tolerance
 
 
-def check_magnitudes(problem: Problem) -> list[Finding]:
+def check_magnitudes(problem: Problem) -> Iterator[Finding]:
     """Find numbers that are probably in another unit, or mistyped."""
-    found = (*_coordinates(problem), *_tolerances(problem), *_lengths(problem), *_sizes(problem))
-    return [Finding(message, SUSPECTED) for message in found]
+    for messages in (_coordinates, _tolerances, _lengths, _sizes):
+        yield from (Finding(message, SUSPECTED) for message in messages(problem))
 
 
 def _coordinates(problem: Problem) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """Targets beyond the longest arm of a space."""
 
 import math
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +18,7 @@ ROUNDING = 1e-5  # of a distance relative to the reach, from single precision
 MILLIMETRES = 1e-3  # [m]
 
 
-def check_reach(problem: Problem) -> list[Finding]:
+def check_reach(problem: Problem) -> Iterator[Finding]:
     """Find targets that no arm reaches from any base.
 
     It may miss a target by as much as the constraints allow, or without such constraints by the target's tolerance.
@@ -27,7 +28,8 @@ def check_reach(problem: Problem) -> list[Finding]:
     reach, distance = longest_reach(problem), distance_to_bases(problem.space, positions)
     beyond = np.flatnonzero(distance - error > reach * (1.0 + ROUNDING))
     if not len(beyond):
-        return _check_approaches(problem, reach)
+        yield from _check_approaches(problem, reach)
+        return
     worst = beyond[np.argmax(distance[beyond])]
     who = describe_targets([task.target_names[i] for i in beyond], len(positions))
     point = describe_point(positions[worst])
@@ -36,33 +38,29 @@ def check_reach(problem: Problem) -> list[Finding]:
         if len(beyond) == 1
         else f"are out of reach: the farthest, {point}, is {distance[worst]:.3g} m from the nearest allowed base"
     )
-    return [
-        Finding(
-            f"{who} {where}, but the longest arm with its tool reaches {reach:.3g} m; {_remedy(problem, beyond)}",
-            PROVEN,
-        )
-    ]
+    yield Finding(
+        f"{who} {where}, but the longest arm with its tool reaches {reach:.3g} m; {_remedy(problem, beyond)}",
+        PROVEN,
+    )
 
 
-def _check_approaches(problem: Problem, reach: float) -> list[Finding]:
-    """Find points of approach that no arm reaches as nearly as path_error has to be."""
+def _check_approaches(problem: Problem, reach: float) -> Iterator[Finding]:
+    """Find a point of approach that no arm reaches as nearly as path_error has to be."""
     plan, n_targets = problem.scenes[0].plan, len(problem.task.targets)
     bounds = [c.bound for c in problem.constraints if (c.quantity.name, c.relation) == ("path_error", "<=")]
     if plan is None or not bounds:
-        return []
+        return
     distance = distance_to_bases(problem.space, plan.poses.position)
     for motion in plan.motions:
         if motion.end >= n_targets > motion.start and distance[motion.end] - bounds[0] > reach * (1.0 + ROUNDING):
             name, point = problem.task.target_names[motion.start], describe_point(plan.poses.position[motion.end])
-            return [
-                Finding(
-                    f"cycle: the approach of target {name} begins at {point}, {distance[motion.end]:.3g} m from the "
-                    f"nearest allowed base, but the longest arm with its tool reaches {reach:.3g} m; shorten approach, "
-                    f"{plan.cycle.approach:g} m",
-                    PROVEN,
-                )
-            ]
-    return []
+            yield Finding(
+                f"cycle: the approach of target {name} begins at {point}, {distance[motion.end]:.3g} m from the "
+                f"nearest allowed base, but the longest arm with its tool reaches {reach:.3g} m; shorten approach, "
+                f"{plan.cycle.approach:g} m",
+                PROVEN,
+            )
+            return
 
 
 def longest_reach(problem: Problem) -> float:

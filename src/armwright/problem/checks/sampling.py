@@ -36,10 +36,10 @@ def check_by_sampling(
     if not problem.constraints:
         return [], 0
     rng = np.random.default_rng(SEED)
-    best = violations(problem, random_designs(problem, FIRST, rng)).min(axis=0)
+    best = violations(problem, problem.space.sample_matrix(FIRST, rng)).min(axis=0)
     n, size, started = FIRST, FIRST, clock()
     while n < MAX_SAMPLES:
-        best = np.minimum(best, violations(problem, random_designs(problem, size, rng)).min(axis=0))
+        best = np.minimum(best, violations(problem, problem.space.sample_matrix(size, rng)).min(axis=0))
         n += size
         spent = max(1e-9, clock() - started)
         rate = (n - FIRST) / spent
@@ -59,13 +59,6 @@ def check_by_sampling(
         for constraint, value in zip(problem.constraints, best.tolist(), strict=True)
         if value > 0.0
     ], n
-
-
-def random_designs(problem: Problem, n: int, rng: np.random.Generator) -> Array:
-    """Return the (n, P) matrix of designs that are uniform in every parameter."""
-    parameters = problem.space.parameters
-    rows = [[parameter.sample(rng) for parameter in parameters] for _ in range(n)]
-    return problem.space.normalised(np.array(rows, dtype=np.float64))
 
 
 def violations(problem: Problem, matrix: Array) -> Array:

@@ -1,5 +1,7 @@
 """Payloads that the motors or the links of a space can hardly hold."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from armwright.problem.checks.finding import SUSPECTED, Finding
@@ -11,15 +13,15 @@ from armwright.spaces.joint_modules import MODULES
 HEAVY = 100.0  # times the heaviest arm
 
 
-def check_strength(problem: Problem) -> list[Finding]:
+def check_strength(problem: Problem) -> Iterator[Finding]:
     """Find payloads that the strongest motor cannot hold at half reach, or that dwarf the arm itself."""
     payload = float(problem.task.payloads.max())
-    if payload == 0.0:
-        return []
-    return [*_at_half_reach(problem, payload), *_of_toys(problem, payload)]
+    if payload > 0.0:
+        yield from _at_half_reach(problem, payload)
+        yield from _of_toys(problem, payload)
 
 
-def _at_half_reach(problem: Problem, payload: float) -> list[Finding]:
+def _at_half_reach(problem: Problem, payload: float) -> Iterator[Finding]:
     """Compare the payload [kg] with what the strongest motor holds about a horizontal axis at half reach.
 
     Half reach is half of what the targets require of any base, at most half of the longest arm. Axes that are all
@@ -29,21 +31,18 @@ def _at_half_reach(problem: Problem, payload: float) -> list[Finding]:
     turns = any(MODULES[letter].is_revolute for letter in space.joint_types)
     lever = min(longest_reach(problem), _needed_reach(problem)) / 2
     if not actuators or not turns or lever <= 0.0:
-        return []
+        return
     strongest = max(actuators, key=lambda actuator: actuator.peak_torque)
     allowed = strongest.peak_torque / space.safety_factor
     needed = GRAVITY * (payload + problem.task.tool.mass) * lever
-    if needed <= allowed:
-        return []
-    return [
-        Finding(
+    if needed > allowed:
+        yield Finding(
             f"payload: {payload:g} kg take {needed:.3g} N m about a horizontal axis at {lever:.3g} m, half of the "
             f"reach that the targets require; the strongest motor, {strongest.name}, has {strongest.peak_torque:g} "
             f"N m, with the safety factor {allowed:.3g} N m; name stronger actuators, or check that the payload is in "
             "kilograms",
             SUSPECTED,
         )
-    ]
 
 
 def _needed_reach(problem: Problem) -> float:
@@ -58,19 +57,16 @@ def _needed_reach(problem: Problem) -> float:
     return max(spread, float(np.linalg.norm(carried - np.clip(carried, low, high), axis=1).max()))
 
 
-def _of_toys(problem: Problem, payload: float) -> list[Finding]:
+def _of_toys(problem: Problem, payload: float) -> Iterator[Finding]:
     """Compare the payload [kg] with the mass of the heaviest arm."""
     space = problem.space
     heaviest_motor = max((record.mass for record in space.actuators), default=0.0)
     heaviest = space.max_joints * (space.heaviest_link + heaviest_motor + space.bracket_mass)
-    if payload <= HEAVY * heaviest or heaviest == 0.0:
-        return []
-    toy = "; the links are a toy" if space.is_toy else ""
-    return [
-        Finding(
+    if payload > HEAVY * heaviest > 0.0:
+        toy = "; the links are a toy" if space.is_toy else ""
+        yield Finding(
             f"payload: {payload:g} kg are {payload / heaviest:,.0f} times the mass of the heaviest arm of the space, "
             f"{heaviest:.3g} kg{toy}; state mass and actuators of a real arm in the space, or check that the payload "
             "is in kilograms",
             SUSPECTED,
         )
-    ]

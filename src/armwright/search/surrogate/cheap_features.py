@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.exceptions import ArmwrightError, SettingsError
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import CLEARANCE_QUANTITIES, JOINTS, QUANTITIES
+from armwright.problem.objectives import JOINTS, QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
 from armwright.search.surrogate.custom_inputs import CustomInputs
@@ -188,10 +188,10 @@ class CheapFeatures:
     def _quantities(self) -> tuple[Objective, ...]:
         """Return the quantities that the task allows; clearances only if they matter, because they take long."""
         problem = self._problem
-        without = () if problem.task.obstacles or problem.uses(*CLEARANCE_QUANTITIES) else CLEARANCE_QUANTITIES
+        clearances = bool(problem.task.obstacles) or problem.uses("clearance")
+        asked = [q for q in QUANTITIES.values() if q != JOINTS and (clearances or "clearance" not in q.needs)]
         evaluation = problem.physics(self._probes[:8])
-        left_out = {JOINTS.name, *(quantity.name for quantity in without)}
-        return tuple(q for q in QUANTITIES.values() if q.name not in left_out and _is_defined(q, evaluation))
+        return tuple(quantity for quantity in asked if _is_defined(quantity, evaluation))
 
 
 def _checked_features(function: FeatureFunction, designs: Sequence[Design]) -> Array:
