@@ -252,17 +252,6 @@ def test_arm_name_with_markup_is_escaped_on_the_page(run: Path, tmp_path: Path, 
     (run / EXISTING_ARMS).unlink()
 
 
-def test_front_figure_without_existing_arms_and_with_a_damaged_file(run: Path, history: History) -> None:
-    (run / EXISTING_ARMS).unlink(missing_ok=True)
-    assert read_existing_arms(run, 2) == ()
-    (run / EXISTING_ARMS).write_text('[{"name": "x"}]', encoding="utf-8")
-    with pytest.raises(RunFolderError, match=r"existing_arms.json is damaged; remove it"):
-        write_figures(run)
-    (run / EXISTING_ARMS).unlink()
-    (axes,) = draw_front(history).axes
-    assert "existing arm" not in [text.get_text() for text in axes.figure.legends[0].get_texts()]
-
-
 @pytest.mark.slow
 def test_unknown_price_and_effort_are_not_compared(tmp_path: Path) -> None:
     space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]

@@ -198,67 +198,6 @@ def test_penetration_depth_adds_axis_and_radius() -> None:
     assert clearances(stack_arms([square]), folded)[0][0, 0] == pytest.approx(-0.04, abs=1e-6)
 
 
-def test_clearance_is_infinite_without_anything_to_hit() -> None:
-    own, clear = clearances(stack_arms(moving_arms(5, 2, 0)), np.zeros((5, 4, 2)))
-    assert own.shape == clear.shape == (5, 4)
-    assert np.all(np.isinf(own))
-    assert np.all(np.isinf(clear))
-    assert np.all(np.isfinite(clearances(stack_arms(moving_arms(5, 3, 0)), np.zeros((5, 4, 3)))[0]))
-
-
-def test_clearance_is_invariant_to_rigid_motion() -> None:
-    rng = np.random.default_rng(2)
-    turn, shift = 1.1, (0.3, -0.2, 0.4)
-    c, s = np.cos(turn), np.sin(turn)
-    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-    def moved(point: Sequence[float]) -> tuple[float, float, float]:
-        x, y, z = (rotation @ point + shift).tolist()
-        return x, y, z
-
-    arms = moving_arms(50, 5, 6)  # whose first joint turns the whole arm as the world is turned
-    arms = [replace(arm, joints=(Joint("revolute", "z", -6.0, 6.0), *arm.joints[1:])) for arm in arms]
-    q = random_postures(arms, 4, 7)
-    boxes = [
-        Box(kind="box", center=tuple(rng.uniform(-1, 1, 3)), size=(0.3, 0.2, 0.1), yaw=float(rng.uniform(-2, 2)))
-        for _ in range(3)
-    ]
-    bars = [
-        Cylinder(kind="cylinder", center=tuple(at), radius=0.05, height=0.5, axis=tuple(axis))
-        for at, axis in zip(rng.uniform(-1, 1, (3, 3)), rng.normal(size=(3, 3)), strict=True)
-    ]
-    ground = Ground(kind="ground", z=-0.5)
-    there = [
-        *(box.model_copy(update={"center": moved(box.center), "yaw": box.yaw + turn}) for box in boxes),
-        *(
-            bar.model_copy(update={"center": moved(bar.center), "axis": tuple(rotation @ np.array(bar.axis))})
-            for bar in bars
-        ),
-        Ground(kind="ground", z=-0.5 + shift[2]),
-    ]
-    before = clearances(stack_arms(arms, "float64"), q, [*boxes, *bars, ground])
-    elsewhere = [replace(arm, base=moved(arm.base)) for arm in arms]
-    after = clearances(stack_arms(elsewhere, "float64"), q + turn * np.eye(5)[0], there)
-    assert np.array(after) == pytest.approx(np.array(before), abs=1e-9)
-
-
-def test_thicker_links_have_less_clearance() -> None:
-    arms = [
-        Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", axis, -3, 3) for axis in ("x", "y", "x", "y", "x")), links)
-        for links in (tuple(uniform_link((0.0, 0.0, 0.3), 1.0, 0.01) for _ in range(5)) for _ in range(100))
-    ]
-    arrays, q = stack_arms(arms), random_postures(arms, 5, 1)
-    obstacles = [random_obstacle(np.random.default_rng(3), kind) for kind in SHAPES]
-    thin = clearances(arrays, q, obstacles)
-    thick = clearances(replace(arrays, radius=arrays.radius + np.float32(0.02)), q, obstacles)
-    assert thick[0] == pytest.approx(thin[0] - 0.04, abs=1e-6), "all of them are far apart along the arm"
-    # The first link begins to count farther from its foot, so another place of it may be the nearest.
-    later = arrays.radius + np.array([0.0, 0.02, 0.02, 0.02, 0.02], dtype=np.float32)
-    rest = clearances(replace(arrays, radius=later), q, obstacles)[1]
-    assert np.all((rest <= thin[1]) & (rest >= thin[1] - 0.02 - 1e-6))
-    assert np.mean(rest < thin[1] - 0.019) > 0.5
-
-
 def test_links_of_no_radius_are_ignored() -> None:
     """Links of radius 0 count as if the arm ended before them."""
     arms = stack_arms(moving_arms(30, 6, 2))

@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 
 from armwright.kinematics.arms.arm_arrays import Precision, stack_arms
-from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
+from armwright.kinematics.contact.clearance import clearances
 from armwright.problem.problem import Problem
 from armwright.proof.simulation_model import Surroundings, to_simulation_mjcf
 from armwright.robot.arm import Arm, Column, Joint, uniform_link
 from armwright.robot.collision_pairs import joined_by_column
-from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
-from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.obstacles import Ground
@@ -126,12 +124,6 @@ def test_parts_at_rest_do_not_count() -> None:
     assert joined_by_column(arm) == ([1], [0])
 
 
-def test_column_does_not_change_the_room_between_motors() -> None:
-    designs = SPACE.sample(50, 8)
-    arms = stack_designs(SPACE, SPACE.matrix(designs))
-    assert np.array_equal(straight_motor_clearance(arms), straight_motor_clearance(replace(arms, columns=None)))
-
-
 def test_column_implies_that_nothing_collides() -> None:
     task = Task(name="low", targets=((0.02, 0.0, 0.3),))
     content = {"joints": 2, "joint_types": ["P"], "link": [0.1, 0.4], "joint_range": [-3.1, 3.1]}
@@ -148,18 +140,3 @@ def test_column_implies_that_nothing_collides() -> None:
     assert [constraint.description for constraint in problem.constraints] == ["self_clearance >= 0.01"]
     folded = space.clipped((0.0, 0.0, 0.5), "PP", (0.1, 0.3))  # its tip is inside the column at the target
     assert problem.evaluate([folded]).violations[0, 0] > 0.01
-
-
-def test_column_does_not_change_dynamics_in_mujoco() -> None:
-    for design in SPACE.sample(6, 10):
-        arm = SPACE.arm(design)
-        for export in (to_urdf, to_mjcf):
-            forces = []
-            for exported in (arm, replace(arm, column=None)):
-                model = mujoco.MjModel.from_xml_string(export(exported))
-                model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-                data = mujoco.MjData(model)
-                data.qpos[:], data.qvel[:], data.qacc[:] = np.random.default_rng(11).uniform(-1.0, 1.0, (3, model.nv))
-                mujoco.mj_inverse(model, data)
-                forces.append(data.qfrc_inverse.copy())
-            assert forces[0] == pytest.approx(forces[1], rel=1e-9, abs=1e-9)

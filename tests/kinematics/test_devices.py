@@ -98,10 +98,6 @@ def test_unavailable_devices_are_refused(monkeypatch: pytest.MonkeyPatch) -> Non
         asking.evaluate(asking.space.matrix(designs))
 
 
-def test_problem_resolves_auto_device_once() -> None:
-    assert Problem(load_task("target-1"), device="auto").device in ("cpu", "cuda")  # type: ignore[arg-type]
-
-
 COMPILE_FOR_CUDA = """
 import sys
 import warp as wp

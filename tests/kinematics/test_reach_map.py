@@ -147,17 +147,6 @@ def test_usable_poses_keep_links_above_the_ground() -> None:
         assert min(tip[2, 3], wrist[2]) > 0.02 - ROUNDING, "the link's radius"
 
 
-@pytest.mark.slow
-def test_usable_poses_hold_the_payload() -> None:
-    strong, weak = (wrist_arm(0.4, 0.3, 0.1, Actuator("motor", 0.1, torque, 5.0)) for torque in (1e3, 9.0))
-    options: dict[str, Any] = {"spacing": 0.3, "n_directions": 12}
-    found = aw.reach_map(strong, payload=1.0, **options)
-    assert np.array_equal(found.usable.reached, found.bare.reached)
-    shares = [aw.reach_map(weak, payload=payload, **options).usable for payload in (0.0, 0.5, 1.0)]
-    assert shares[0].volume > shares[1].volume > shares[2].volume > 0.0
-    assert not aw.reach_map(weak, payload=1e3, **options).usable.reached[:, 0].all()
-
-
 def test_held_payloads_agree_with_pinocchio() -> None:
     arm = wrist_arm(0.4, 0.3, 0.1, Actuator("motor", 0.0, 9.0, 5.0))
     found = aw.reach_map(arm, payload=0.5, spacing=0.25, n_directions=12)
@@ -175,13 +164,9 @@ def test_held_payloads_agree_with_pinocchio() -> None:
     [
         ({"axis": (0, 0, 0)}, "axis: expected a direction x, y, z"),
         ({"half_angle": 4.0}, "half_angle = 4.0: expected 0 to π rad"),
-        ({"n_directions": 0}, "n_directions = 0: expected 1 to 1000"),
         ({"spacing": 0.0}, "spacing = 0.0: expected more than 0 m"),
         ({"spacing": 0.001}, "try a larger spacing than 0.001 m"),
         ({"box": [(0, 0, 1), (1, 1, 0)]}, "box: expected .* with low <= high"),
-        ({"payload": -1.0}, "payload = -1.0: expected 0 to 10000 kg"),
-        ({"clearance": -0.1}, "clearance = -0.1: expected 0 m or more"),
-        ({"tolerance": 0.0}, "expected tolerance > 0 m"),
     ],
 )
 def test_arguments_out_of_range_are_refused(options: dict[str, Any], message: str) -> None:

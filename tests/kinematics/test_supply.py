@@ -1,6 +1,5 @@
 """Currents from the supply, by hand and by the balance of energy."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -77,15 +76,6 @@ def test_dwells_count_by_their_time_with_the_holding_torque() -> None:
     assert heavy.peak[0] == pytest.approx(CURRENT)
 
 
-def test_slides_draw_what_their_motors_draw() -> None:
-    travel = 0.01
-    motor = supply_currents(constant([20.0], [3.0], [10.0], dwell=1.0), drives_of(DRIVE))
-    slide = supply_currents(
-        constant([20.0 / travel], [3.0 * travel], [10.0 / travel], dwell=1.0), drives_of(DRIVE, travel=travel)
-    )
-    assert (slide.peak[0], slide.mean[0]) == pytest.approx((motor.peak[0], motor.mean[0]))
-
-
 def loads(found: Case) -> tuple[CycleLoads, Actuation]:
     assert found.arrays.actuation is not None
     return cycle_loads(found.paths, torque_terms(found.paths, found.task.payloads.max())), found.arrays.actuation
@@ -113,16 +103,3 @@ def test_energy_is_balanced_over_a_closed_cycle(dof: int, kind: str) -> None:
     windings += np.einsum("m,nmd->n", of_cycle.dwells, VOLTAGE * CURRENT * share)
     drawn = VOLTAGE * supply_currents(of_cycle, drives).mean * of_cycle.cycle_time
     assert drawn[closed] == pytest.approx((friction + braked + windings)[closed], rel=0.02)
-
-
-@pytest.mark.parametrize(("dof", "kind"), [(4, "axis"), (6, "orientation")])
-def test_currents_scale_with_ratings(dof: int, kind: str) -> None:
-    of_cycle, drives = loads(random_case(dof, kind, seed=7, drive=DRIVE, time=1.5, dwell=0.3))
-    found = supply_currents(of_cycle, drives)
-    assert (found.mean > 0.0).all()
-    assert (found.mean <= found.peak).all()
-    halved = supply_currents(of_cycle, replace(drives, voltage=2.0 * drives.voltage, current=drives.current / 2.0))
-    assert 2.0 * halved.peak == pytest.approx(found.peak)
-    assert 2.0 * halved.mean == pytest.approx(found.mean)
-    safe = supply_currents(of_cycle, replace(drives, safety_factor=3.0 * drives.safety_factor))
-    assert np.array_equal(safe.peak, found.peak)

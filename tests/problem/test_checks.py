@@ -327,6 +327,12 @@ def test_approach_beyond_reach_is_proven() -> None:
     ("keys", "text"),
     [
         ({"objectives": ["price"]}, "objective price needs actuators"),
+        ({"objectives": ["backlash_error"]}, "objective backlash_error needs actuators"),
+        ({"constraints": ["payload_capacity >= 0.1"]}, "objective payload_capacity needs actuators"),
+        (
+            {"constraints": ["deflection <= 0.1"], "of": space(actuators=MOTORS)},
+            "deflection needs the section and the material of the links; try link_section: ",
+        ),
         ({"constraints": ["thermal_utilisation <= 1"]}, "objective thermal_utilisation needs actuators"),
         ({"objectives": ["path_error"]}, "need a cycle"),
         ({"objectives": ["uncovered_fraction"]}, "needs a workspace"),

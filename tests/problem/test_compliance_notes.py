@@ -46,7 +46,7 @@ def test_designs_can_be_picked_by_quantities_that_the_run_did_not_evaluate(run: 
     assert [member.number for member in picked] == sorted(
         (number for number in numbers if errors[number] <= bound), key=errors.__getitem__
     )
-    with pytest.raises(SettingsError, match="deflection needs the section and the material of the links"):
+    with pytest.raises(SettingsError, match="deflection is not known: no section and material of the links are stated"):
         pick(history, [read_condition("deflection <= 0.001")])
     with pytest.raises(SettingsError, match=r'unknown quantity "backlash_eror".*Did you mean "backlash_error"'):
         pick(history, [read_condition("backlash_eror <= 0.001")])

@@ -5,18 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armwright.exceptions import SettingsError
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.reach.compliance import Stiffness, backlash_errors
-from armwright.problem.checks.requirements import check_requirements
 from armwright.problem.estimates import lower_bounds
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import named_actuator
 from armwright.robot.arm import Arm
-from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.moments import MAX_MASS
 from armwright.tasks.task import Task
 from tests.support.arms import moving_arms
@@ -112,14 +110,6 @@ def test_backlash_error_reads_the_backlash_of_the_actuators() -> None:
         assert BACKLASH_ERROR.each(evaluation)[i] == pytest.approx(backlash_errors(arms, frames, backlash)[0])
 
 
-def test_slides_play_by_their_travel_and_yield_by_its_square() -> None:
-    space = SPACE.model_copy(update={"joint_types": ("S",), "travel": 0.02, "actuators": SPACE.actuators[:1]})
-    actuation = Problem(Task.model_validate(TASK), space).physics(space.sample(3, 0)).arms.actuation
-    assert actuation is not None
-    assert actuation.backlash == pytest.approx(0.02 * MOTOR.backlash)
-    assert actuation.joint_stiffness == pytest.approx(MOTOR.joint_stiffness / 0.02**2)
-
-
 def test_targets_without_the_payload_of_a_cycle_do_not_limit_it() -> None:
     places = {"above": [0.5, 0.3, 0.1], "near": [0.2, 0.1, 0.1], "beside": [0.2, -0.1, 0.1]}
     steps = [{"to": "above"}, {"to": "near", "do": "pick"}, {"to": "beside", "do": "place"}]
@@ -128,21 +118,3 @@ def test_targets_without_the_payload_of_a_cycle_do_not_limit_it() -> None:
     limits = PAYLOAD_CAPACITY.each(task.physics(SPACE.sample(20, 2)))
     assert (limits[:, 0] == MAX_MASS).all()
     assert (limits[:, 1:] < MAX_MASS).any()
-
-
-@pytest.mark.parametrize("quantity", ["deflection", "payload_deflection"])
-def test_deflection_reports_missing_sections(quantity: str) -> None:
-    unknown = problem(objectives=["mass"], constraints=[f"{quantity} <= 0.001"])
-    message = f"{quantity} needs the section and the material of the links; try link_section: "
-    with pytest.raises(SettingsError, match=message):
-        unknown.evaluate(SPACE.sample(1, 0))
-    with pytest.raises(SettingsError, match=message):
-        check_requirements(unknown)
-
-
-@pytest.mark.parametrize("quantity", ["deflection", "payload_deflection", "backlash_error", "payload_capacity"])
-def test_quantities_report_missing_actuators(quantity: str) -> None:
-    relation = ">=" if quantity == "payload_capacity" else "<="
-    task = Task.model_validate(TASK | {"constraints": [f"{quantity} {relation} 0.1"]})
-    with pytest.raises(SettingsError, match=f"objective {quantity} needs actuators"):
-        check_requirements(Problem(task, paper_space()))

@@ -49,44 +49,39 @@ def bounds(problem: Problem) -> list[str]:
 # Implied constraints
 
 
-def test_cycle_implies_constraints() -> None:
-    assert bounds(Problem(task(), BARE)) == IMPLIED
-    assert bounds(Problem(task(), DRIVEN)) == [*IMPLIED, *DRIVES]
-    assert bounds(Problem(task(cycle={"tolerance": {"path": 0.005, "angle": 0.1}}), BARE))[1:3] == [
-        "path_error <= 0.005",
-        "path_angle <= 0.1",
-    ]
+STILL = {"cycle": None}
+LINES = {"cycle": {"steps": [{"to": n, "by": "line"} for n in (1, 2, 3)]}, "targets": [t["position"] for t in TARGETS]}
+WIDE = {"cycle": {"tolerance": {"path": 0.005, "angle": 0.1}}}
 
 
-def test_points_have_no_angle_along_their_path() -> None:
-    points = [target["position"] for target in TARGETS]
-    assert bounds(
-        Problem(task(cycle={"steps": [{"to": n, "by": "line"} for n in (1, 2, 3)]}, targets=points), BARE)
-    ) == [c for c in IMPLIED if "angle" not in c]
+@pytest.mark.parametrize(
+    ("more", "space", "expected"),
+    [
+        ({}, BARE, IMPLIED),
+        ({}, DRIVEN, [*IMPLIED, *DRIVES]),
+        (WIDE, BARE, [IMPLIED[0], "path_error <= 0.005", "path_angle <= 0.1", *IMPLIED[3:]]),
+        (LINES, BARE, [c for c in IMPLIED if "angle" not in c]),
+        (STILL, BARE, []),
+        (STILL, DRIVEN, ["collision <= 0"]),
+    ],
+)
+def test_cycle_and_motors_imply_constraints(more: dict[str, Any], space: DesignSpace, expected: list[str]) -> None:
+    asked = task(**more) if more is not STILL else task().model_copy(update=STILL)
+    assert bounds(Problem(asked, space)) == expected
 
 
-def test_tasks_without_a_cycle_imply_only_that_motors_do_not_collide() -> None:
-    still = task(cycle=None).model_copy(update={"cycle": None})
-    assert bounds(Problem(still, BARE)) == []
-    assert bounds(Problem(still, DRIVEN)) == ["collision <= 0"]
-
-
-@pytest.mark.parametrize("implied", [*IMPLIED, *DRIVES])
-def test_a_bound_of_the_task_replaces_the_implied_one(implied: str) -> None:
-    own = f"{implied.split()[0]} <= 3"
-    assert bounds(Problem(task(constraints=[own]), DRIVEN)) == [own, *(c for c in [*IMPLIED, *DRIVES] if c != implied)]
-
-
-@pytest.mark.parametrize("quantity", ["clearance", "self_clearance", "obstacle_clearance"])
-def test_bounds_of_clearances_replace_the_bound_of_collisions(quantity: str) -> None:
-    own = f"{quantity} >= 0.01"
-    assert bounds(Problem(task(constraints=[own]), BARE)) == [own, *(c for c in IMPLIED if "collision" not in c)]
-
-
-def test_bounds_of_other_quantities_replace_nothing() -> None:
-    assert bounds(Problem(task(constraints=["mass <= 3", "path_error >= 0"]), BARE))[2:] == [
-        c for c in IMPLIED if "path_error" not in c
-    ]
+@pytest.mark.parametrize(
+    ("own", "replaced"),
+    [
+        *((f"{implied.split()[0]} <= 3", implied) for implied in [*IMPLIED, *DRIVES]),
+        *((f"{quantity} >= 0.01", "collision <= 0") for quantity in ("clearance", "self_clearance")),
+        ("obstacle_clearance >= 0.01", "collision <= 0"),
+        ("mass <= 3", None),
+    ],
+)
+def test_a_bound_of_the_task_replaces_the_implied_one(own: str, replaced: str | None) -> None:
+    implied = [c for c in [*IMPLIED, *DRIVES] if c != replaced]
+    assert bounds(Problem(task(constraints=[own]), DRIVEN)) == [own, *implied]
 
 
 # Quantities of motions

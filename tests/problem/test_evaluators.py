@@ -199,20 +199,6 @@ def test_numpy_settings_of_a_file_hold_in_its_evaluator_only(in_folder: Path) ->
     assert np.geterr() == before
 
 
-def test_working_folder_is_restored_after_an_evaluation(in_folder: Path) -> None:
-    """A run folder is still found if a solver changes the working folder."""
-
-    @aw.evaluator("reach [m]", "joints_used")
-    def elsewhere(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
-        os.chdir("/")
-        return measured.measure(arm, task)  # type: ignore[return-value]
-
-    problem = aw.Problem(TASK, SPACE, evaluator=elsewhere)
-    aw.optimize(problem, proposer="none", n_init=2, n_total=2, out="run")
-    assert (in_folder / "run" / "summary.json").is_file()
-    assert Path.cwd() == in_folder
-
-
 def test_what_a_task_states_of_its_objectives_does_not_apply_to_an_evaluator(tmp_path: Path) -> None:
     task = TASK.model_copy(update={"objectives": ("position_error", "torque"), "resolution": (("torque", 0.1),)})
     problem = aw.Problem(task, SPACE, evaluator=aw.evaluator("energy [J]")(lambda arm, task: arm.length))

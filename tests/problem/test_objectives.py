@@ -5,27 +5,21 @@ from pathlib import Path
 
 import moocore
 import numpy as np
-import pinocchio
 import pytest
 import yaml
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError, UsageError
+from armwright.exceptions import RunFolderError, SettingsError, TaskError, UsageError
 from armwright.pictures.figures import chosen_members, write_figures
-from armwright.problem.evaluation import evaluate
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, RENAMED, named_objectives
 from armwright.problem.problem import Problem
-from armwright.robot.arm import Arm, Joint, Link
-from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
-from armwright.spaces.design_space import paper_space
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
-from tests.support.arms import general_arms
 
 SPREAD = Objective(
     name="spread",
@@ -124,12 +118,6 @@ def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path, proble
     assert (tmp_path / "run" / "trials.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",".join(names))
 
 
-def test_changed_objectives_are_refused(tmp_path: Path) -> None:
-    short(three(OPEN), 3, tmp_path / "run")
-    with pytest.raises(RunConflictError, match="objectives: "):
-        short(Problem(OPEN), 3, tmp_path / "run")
-
-
 @pytest.mark.parametrize(("objectives", "point"), [(ONE, (5.0, 5.0)), (THREE, (5.0, 5.0)), (PAPER_OBJECTIVES, (5.0,))])
 def test_reference_point_for_other_objectives_is_refused(
     objectives: tuple[Objective, ...], point: tuple[float, ...]
@@ -210,37 +198,3 @@ def test_objectives_option_drops_a_foreign_reference_point(tmp_path: Path) -> No
 
 
 # What the tip carries
-
-
-@pytest.mark.parametrize("dof", [1, 3, 4, 6, 8])
-def test_torques_with_a_payload_agree_with_pinocchio(dof: int) -> None:
-    """A payload is a point mass at the tip, in the URDF a fixed link without length."""
-    targets, payload = np.random.default_rng(dof).uniform(-0.8, 0.8, (3, 3)), np.array([0.0, 0.7, 2.5])
-    arms = general_arms(20, dof, 3)
-    evaluation = evaluate(arms, targets, payload=payload)
-    for row, arm in enumerate(arms):
-        for t, kg in enumerate(payload):
-            carried = Link(offset=(0.0, 0.0, 0.0), mass=float(kg), com=(0.0, 0.0, 0.0), radius=0.01)
-            loaded = Arm(arm.base, (*arm.joints, Joint("fixed", "x")), (*arm.links, carried))
-            model = pinocchio.buildModelFromXML(to_urdf(loaded))
-            q = evaluation.q[row, t][[joint.kind != "fixed" for joint in arm.joints]]
-            torque = pinocchio.computeGeneralizedGravity(model, model.createData(), q)
-            ours = evaluation.joint_torques[row, t][[joint.kind != "fixed" for joint in arm.joints]]
-            load = 9.81 * (sum(link.mass for link in arm.links) + kg) * arm.reach
-            assert ours == pytest.approx(torque, abs=1e-5 * load)
-
-
-def test_payload_changes_only_torques() -> None:
-    designs = paper_space().sample(50, 2)
-    bare, loaded = (Problem(LOADED.model_copy(update={"payload": kg})).physics(designs) for kg in (0.0, 1.0))
-    assert np.array_equal(bare.q, loaded.q)
-    assert np.array_equal(bare.position_error, loaded.position_error)
-    doubled = Problem(LOADED.model_copy(update={"payload": 2.0})).physics(designs)
-    gain = loaded.joint_torques - bare.joint_torques
-    assert doubled.joint_torques - bare.joint_torques == pytest.approx(2.0 * gain, abs=1e-4 * np.abs(gain).max())
-
-
-@pytest.mark.parametrize("payload", [-1.0, (1.0, 2.0), 2e4, float("nan")])
-def test_invalid_payload_is_refused(payload: object) -> None:
-    with pytest.raises(ValueError, match="payload"):
-        Task.model_validate({"name": "x", "targets": [[0.1, 0.2, 0.3]], "payload": payload})

@@ -149,13 +149,6 @@ def solve(arms: Chains, targets: Array, updates: int = UPDATES, start: Array | N
     return Solution(q=kept, reached=tip(arms, kept), error=least, torque=gravity_torque(arms, kept))
 
 
-def potential_energy(arms: Chains, q: Array) -> Array:
-    """(N, T) V(q) = Σ m g z [J]."""
-    rotation, place, _ = frames(arms, q)
-    com = place + np.einsum("...jab,...jb->...ja", rotation, np.broadcast_to(arms.com, place.shape))
-    return GRAVITY * (arms.mass * com[..., 2]).sum(axis=-1)
-
-
 def gravity_torque(arms: Chains, q: Array) -> Array:
     """(N, T, D) +dV/dq [N m]: Σ over the links of J_comᵀ (m g ẑ); it holds the posture, gravity exerts minus it."""
     rotation, place, _ = frames(arms, q)

@@ -6,6 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial import distance
+from scipy.spatial.transform import Rotation
 
 from armwright.tasks.catalogue import builtin_names, load_task, random_task
 from armwright.tasks.symmetry import centre, distance_to_planes, symmetry_planes
@@ -16,14 +17,7 @@ ROTATIONS = arrays(float, (4,), elements=st.floats(-1.0, 1.0)).filter(lambda q: 
 
 
 def rotation(quaternion: np.ndarray) -> np.ndarray:
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return Rotation.from_quat(quaternion).as_matrix()
 
 
 def has(normals: np.ndarray, normal: np.ndarray) -> bool:
