@@ -42,9 +42,6 @@ def through(arm: Arm, *targets: Any, obstacles: Any = (), candidates: int = 4, *
     return find_paths(stack_arms([arm], "float64"), plan, task.obstacles, candidates)
 
 
-# Properties of random arms and cycles
-
-
 def test_cases_have_arms_that_follow_their_cycle_and_arms_that_do_not() -> None:
     good = np.array([tolerated(case(*key).paths) for key in CASES])
     assert 8 <= good.sum() <= good.size - 8
@@ -109,6 +106,18 @@ def test_errors_along_lines_equal_those_of_pinocchio(dof: int, kind: str) -> Non
                 assert (other.max(axis=0) <= 1.5 * np.array(errors) + 1e-6).all()
 
 
+def test_long_joint_motions_are_sampled_finely_and_never_jump() -> None:
+    steps = [{"to": number} for number in (1, 2, 3)]
+    paths = through(planar(0.3, 0.25), [0.4, 0.1, 0.0], [-0.4, -0.1, 0.0], [0.4, -0.1, 0.0], steps=steps, closed=True)
+    motions = paths.of_arm(0)[1]
+    assert max(np.abs(path.q[0, -1] - path.q[0, 0]).max() for path in motions) > 16 * MAX_STEP
+    assert not paths.jumps.any()
+    for path in motions:
+        share = path.share[:, None]
+        assert path.q[0] == pytest.approx((1 - share) * path.q[0, 0] + share * path.q[0, -1], abs=1e-12)
+        assert path.largest_steps.max() <= MAX_STEP + 1e-9
+
+
 def test_more_samples_converge_to_one_path() -> None:
     """The postures of redundant arms depend on the samples too, by less with each doubling."""
     for dof, kind in ((5, "position"), (6, "position"), (6, "axis"), (7, "position")):
@@ -124,9 +133,6 @@ def test_more_samples_converge_to_one_path() -> None:
         change = [np.abs(b - a).max() for a, b in pairwise(ends)]
         assert change[2] <= 0.7 * change[0] + 1e-6
         assert change[2] < 0.02
-
-
-# Closed forms, and paths that no arm can follow
 
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.3), (0.3, 0.2)])
@@ -187,9 +193,6 @@ def test_path_between_samples_is_a_cubic_spline(samples: int) -> None:
     for row in range(3):
         alone = MotionPath(path.motion, path.q[[row]])
         assert all(np.array_equal(alone.at(at, order)[0], path.at(at, order)[row]) for order in range(3))
-
-
-# Candidates
 
 
 @pytest.mark.parametrize("closed", [True, False])

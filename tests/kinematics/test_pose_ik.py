@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.evaluation import evaluate
 from armwright.robot.arm import Arm, Joint, MountedTool, uniform_link
 from armwright.robot.urdf_writer import to_urdf
@@ -19,8 +18,8 @@ from tests.support import reference_kinematics as reference
 from tests.support import reference_poses
 from tests.support.arms import general_arms, paper_arms
 from tests.support.exported_arms import peer_of
-from tests.support.reference_kinematics import Array
-from tests.support.single_update import update_once
+from tests.support.moving_joints import solve_postures, update_once
+from tests.support.reference_kinematics import Array, random_states
 
 KINDS = pytest.mark.parametrize("rows", [2, 3])
 DOWN = (0.0, 0.0, -1.0)
@@ -47,9 +46,6 @@ def tools(arms: list[Arm]) -> tuple[Array, Array]:
     return np.array([arm.tool.axis for arm in arms]), np.array([arm.tool.side for arm in arms])
 
 
-# The reference against Pinocchio
-
-
 @pytest.mark.parametrize("dof", range(1, 9))
 def test_reference_agrees_with_pinocchio(dof: int) -> None:
     """The tool's frame and the angular Jacobian of 20 general arms."""
@@ -64,60 +60,37 @@ def test_reference_agrees_with_pinocchio(dof: int) -> None:
         assert np.abs(peer.tip(q[i, 0])[:3, :3] - frames[i]).max() < 1e-9
 
 
-# Single updates
-
-
 @KINDS
 @pytest.mark.parametrize("dof", [1, 2, 4, 5, 6, 7, 8])
 @pytest.mark.fast_cases(3)
 def test_single_updates_in_float64_agree_with_the_reference(dof: int, rows: int) -> None:
     """Within 1e-8 rad, without exception, and 1 + H within 1e-12 of itself: arms with fewer joints than rows, too."""
     arms = tooled_arms(200, dof, 5)
-    moving = [j for j, joint in enumerate(arms[0].joints) if joint.kind != "fixed"]
     chains, arrays = reference.chains(arms), stack_arms(arms, "float64")
-    q, h_before, points = states(chains, dof)
+    q, h_before, points = random_states(chains, dof)
     asked = target_arrays([rows], dof)
-    wide_q, wide_h = np.zeros((2, *arrays.lower.shape))
-    wide_q[:, moving], wide_h[:, moving] = q[:, 0], h_before[:, 0]
-    after, gradient = update_once(arrays, points[:, 0], wide_q, wide_h, asked)
+    after, gradient = update_once(arrays, points[:, 0], q[:, 0], h_before[:, 0], asked)
     expected, expected_h = reference_poses.update(chains, points, asked, *tools(arms), q, h_before)
-    assert np.abs(after[:, moving] - expected[:, 0]).max() < 1e-8
-    assert np.abs((gradient[:, moving] - expected_h[:, 0]) / (1.0 + expected_h[:, 0])).max() < 1e-12
-
-
-def states(chains: reference.Chains, seed: int) -> tuple[Array, Array, Array]:
-    rng = np.random.default_rng(seed)
-    q = rng.uniform(chains.lower, chains.upper)
-    factor = np.where(rng.random(q.shape) < 0.5, rng.uniform(0.0, 0.9, q.shape), rng.uniform(1.1, 3.0, q.shape))
-    points = chains.base + rng.uniform(-1.0, 1.0, (*q.shape[:2], 3))
-    return q, reference.limit_gradient(chains, q) * factor, points
-
-
-# Whole solves
+    assert np.abs(after - expected[:, 0]).max() < 1e-8
+    assert np.abs((gradient - expected_h[:, 0]) / (1.0 + expected_h[:, 0])).max() < 1e-12
 
 
 @pytest.mark.parametrize("dof", [3, 6, 7])
 def test_mixed_target_kinds_agree_with_the_reference(dof: int) -> None:
     """Points, axes and orientations in one kernel, 8 updates from a posture of their own: as the reference's."""
     arms = tooled_arms(200, dof, 7)
-    moving = [j for j, joint in enumerate(arms[0].joints) if joint.kind != "fixed"]
     chains, arrays = reference.chains(arms), stack_arms(arms, "float64")
     asked, points = target_arrays([2, 0, 3, 0, 2, 3], dof), np.random.default_rng(dof).uniform(-0.5, 0.5, (6, 3))
     asked = replace(asked, angle_tolerance=np.array([0.02, 0.02, 0.1, 0.02, 0.5, 0.01]))
     inside = np.random.default_rng(1).uniform(0.3, 0.7, (200, 6, dof))
     start = chains.lower + inside * (chains.upper - chains.lower)
-    wide = np.zeros((200, 6, arrays.dof))
-    wide[..., moving] = start
-    ours = solve_postures(arrays, points, 8, initial_q=wide, target_arrays=asked, precision="float64")
+    ours = solve_postures(arrays, points, 8, initial_q=start, target_arrays=asked, precision="float64")
     q, distance, angle = reference_poses.solve(chains, points, asked, *tools(arms), 8, start)
-    agree = np.abs(ours.q[..., moving] - q).max(axis=-1) < 1e-6
+    agree = np.abs(ours.q - q).max(axis=-1) < 1e-6
     assert agree.mean() > 0.995
     assert np.abs(np.linalg.norm(ours.reached - points, axis=-1) - distance)[agree].max() < 1e-6
     assert np.abs(ours.angle - angle)[agree].max() < 1e-6
     assert np.all(ours.angle[:, [1, 3]] == 0.0)
-
-
-# Properties
 
 
 @KINDS

@@ -15,8 +15,8 @@ from armwright.kinematics.reach.reachable_poses import PoseSearch, Tolerances, s
 from armwright.robot.arm import Actuator, Arm, Joint, MountedTool, uniform_link
 from armwright.rotations import cone_directions
 from armwright.tasks.obstacles import Ground
-from tests.support.arms import moving_arms, paper_arms
-from tests.support.exported_arms import moving, odd_arms, peer_of
+from tests.support.arms import paper_arms
+from tests.support.exported_arms import peer_of
 from tests.support.robots import robot
 
 ROUNDING = 1e-5  # [m] or [rad] of float32 kinematics
@@ -37,23 +37,6 @@ def wrist_arm(upper: float, fore: float, hand: float, actuator: Actuator | None 
     lengths = (0.0, upper, fore, 0.0, 0.0, hand)
     links = tuple(uniform_link((0.0, 0.0, length), 0.5 if length else 0.0, 0.02) for length in lengths)
     return Arm((0.0, 0.0, 0.0), joints, links)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("arm", [*paper_arms(1, 6, 3), *moving_arms(1, 7, 1), odd_arms(3, 6, 2)[2]])
-def test_postures_are_at_their_poses_by_pinocchio(arm: Arm) -> None:
-    found = aw.reach_map(arm, spacing=arm.reach / 8, n_directions=12, axis=(1, 0, -1), half_angle=1.0)
-    peer, own = peer_of(arm), [number - 1 for number, _ in moving(arm)]
-    assert found.bare.reached.any()
-    assert np.array_equal(np.isnan(found.bare.q).any(axis=-1), ~found.bare.reached)
-    for point, direction in np.argwhere(found.bare.reached)[::17]:
-        q = found.bare.q[point, direction]
-        for index in own:
-            assert arm.joints[index].lower <= q[index] <= arm.joints[index].upper
-        tip = peer.tip(q[own])
-        assert np.linalg.norm(tip[:3, 3] - found.points[point]) < 1e-3 + ROUNDING
-        assert np.linalg.norm(np.cross(tip[:3, 2], found.directions[direction])) < 1e-3 + ROUNDING
-        assert tip[:3, 2] @ found.directions[direction] > 0.0
 
 
 def test_postures_of_a_urdf_are_those_of_its_joints() -> None:
@@ -127,9 +110,6 @@ def test_directions_fill_their_cone_evenly() -> None:
     assert cone_directions((0.0, 2.0, 0.0), 1.0, 1).tolist() == [[0.0, 1.0, 0.0]]
 
 
-# Conditions
-
-
 def test_usable_poses_keep_links_above_the_ground() -> None:
     arm = wrist_arm(0.4, 0.3, 0.1)
     arm = replace(arm, base=(0.0, 0.0, 0.2))
@@ -154,9 +134,6 @@ def test_held_payloads_agree_with_pinocchio() -> None:
     peer = peer_of(loaded)
     for point, direction in np.argwhere(found.usable.reached)[::5]:
         assert np.abs(peer.gravity(found.usable.q[point, direction])).max() <= 9.0 + 1e-3
-
-
-# Faults
 
 
 @pytest.mark.parametrize(

@@ -57,16 +57,6 @@ def test_at_rest_at_the_peak_torque_a_drive_draws_its_current(name: str) -> None
     assert found.mean[0] == pytest.approx(current)
 
 
-def test_motion_adds_mechanical_power_and_braking_returns_none() -> None:
-    loss = CURRENT * 0.5**2
-    half = PEAK / 2.0
-    for speed, power in ((4.0, half * 4.0), (-4.0, 0.0)):
-        found = supply_currents(constant([half], [speed], [0.0]), drives_of(DRIVE))
-        assert found.peak[0] == pytest.approx(power / VOLTAGE + loss)
-    both = supply_currents(constant([half, half], [4.0, -4.0], [0.0, 0.0]), drives_of(DRIVE, DRIVE))
-    assert both.peak[0] == pytest.approx(half * 4.0 / VOLTAGE + 2.0 * loss)
-
-
 def test_dwells_count_by_their_time_with_the_holding_torque() -> None:
     found = supply_currents(constant([30.0], [2.0], [15.0], time=3.0, dwell=1.0), drives_of(DRIVE))
     moving, resting = 60.0 / VOLTAGE + CURRENT * 0.25, CURRENT * 0.0625

@@ -23,7 +23,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         {"name": "two", "targets": [[0.3, 0.1, 0.2], [0.2, -0.2, 0.1]], "objectives": ["worst_error", "mass"]}
     )
     space = DesignSpace.model_validate({"actuators": ["XM540-W270", "XM430-W350"], "origin_z": [0.0, 0.0]})
-    aw.optimize(aw.Problem(task, space), proposer="none", n_init=10, n_total=10, verify=False, out=folder)
+    aw.optimize(
+        aw.Problem(task, space), proposer="none", sampler="random", n_init=10, n_total=10, verify=False, out=folder
+    )
     return folder
 
 

@@ -8,7 +8,6 @@ import pytest
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.reach.compliance import Stiffness, backlash_errors
-from armwright.problem.estimates import lower_bounds
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
 from armwright.problem.problem import Problem
@@ -87,16 +86,6 @@ def test_designs_of_a_batch_yield_like_single_arms_to_the_bit() -> None:
         evaluation = evaluate([tubes.arm(design)], TARGETS, payload=0.2)
         assert outcomes.values[i].tolist() == [DEFLECTION(evaluation)[0], BACKLASH_ERROR(evaluation)[0]]
         assert outcomes.violations[i].tolist() == [constraint(evaluation)[0] for constraint in tubes.constraints]
-
-
-def test_bounds_of_screening_hold_for_deflection() -> None:
-    bounds = ["payload_deflection <= 0.001", "payload_capacity >= 0.5"]
-    task = Task.model_validate(TASK | {"objectives": ["deflection", "mass"], "constraints": bounds})
-    tubes = Problem(task, TUBES)
-    matrix = TUBES.matrix(TUBES.sample(60, 7))
-    found, outcomes = lower_bounds(tubes, matrix), tubes.evaluate(matrix)
-    assert (found.values <= outcomes.values).all()
-    assert (found.violations <= outcomes.violations).all()
 
 
 def test_backlash_error_reads_the_backlash_of_the_actuators() -> None:

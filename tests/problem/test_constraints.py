@@ -170,7 +170,7 @@ def test_constrained_front_agrees_with_optuna_and_hypervolume_with_moocore(
 
 
 def test_unconstrained_task_records_no_violations(tmp_path: Path) -> None:
-    run = optimize(Problem(task()), proposer="none", n_total=3, out=tmp_path / "run")
+    run = optimize(Problem(task()), proposer="none", sampler="random", n_total=3, out=tmp_path / "run")
     assert all("violations" not in line for line in lines(tmp_path / "run"))
     assert "feasibility" not in run.summary
     assert run.history.masked_objectives is run.history.values
@@ -191,7 +191,7 @@ def test_black_boxes_prefer_feasible_designs(sampler: str) -> None:
 
 def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
-    run = optimize(problem, proposer="rules", n_total=40, seed=1, out=tmp_path / "run")
+    run = optimize(problem, proposer="rules", sampler="nsga2", n_total=40, seed=1, out=tmp_path / "run")
     broken = problem.evaluate([trial.design for trial in run.trials]).violations
     assert np.array_equal(run.history.violations, broken)
     feasible = np.all(broken <= 0.0, axis=1)
@@ -226,13 +226,15 @@ def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
 
 
 def test_changed_constraints_are_refused(tmp_path: Path) -> None:
-    optimize(Problem(task(*BOUNDS)), proposer="none", n_total=2, out=tmp_path / "run")
+    optimize(Problem(task(*BOUNDS)), proposer="none", sampler="random", n_total=2, out=tmp_path / "run")
     with pytest.raises(RunConflictError, match=r"constraints: .*worst_error <= 0.4"):
-        optimize(Problem(task("worst_error <= 0.3")), proposer="none", n_total=2, out=tmp_path / "run")
+        optimize(
+            Problem(task("worst_error <= 0.3")), proposer="none", sampler="random", n_total=2, out=tmp_path / "run"
+        )
 
 
 def test_trial_without_violations_is_damaged(tmp_path: Path) -> None:
-    optimize(Problem(task(*BOUNDS)), proposer="none", n_total=2, out=tmp_path / "run")
+    optimize(Problem(task(*BOUNDS)), proposer="none", sampler="random", n_total=2, out=tmp_path / "run")
     file = tmp_path / "run" / "trials.jsonl"
     first = json.loads(file.read_text(encoding="utf-8").splitlines()[0])
     del first["violations"]
@@ -243,7 +245,7 @@ def test_trial_without_violations_is_damaged(tmp_path: Path) -> None:
 
 def test_run_without_a_feasible_design_reports_the_nearest(tmp_path: Path) -> None:
     problem = Problem(task(*IMPOSSIBLE))
-    run = optimize(problem, proposer="rules", n_total=6, seed=1, out=tmp_path / "run")
+    run = optimize(problem, proposer="rules", sampler="random", n_total=6, seed=1, out=tmp_path / "run")
     assert run.front == []
     assert run.hypervolume.tolist() == [0.0] * 6
     broken = problem.evaluate([trial.design for trial in run.trials]).violations
@@ -264,7 +266,7 @@ def test_reference_point_comes_from_feasible_designs() -> None:
     assert found_reference_point(values, np.ones((4, 1))) == default_reference_point(values)
     assert found_reference_point(values, np.empty((4, 0))) == default_reference_point(values)
     open_ = task("length >= 0.2", reference_point=None)
-    run = optimize(Problem(open_), proposer="none", n_total=2, seed=0)
+    run = optimize(Problem(open_), proposer="none", sampler="random", n_total=2, seed=0)
     assert run.history.reference_point == run.history.found_reference_point()
 
 

@@ -46,9 +46,6 @@ def bounds(problem: Problem) -> list[str]:
     return [constraint.description for constraint in problem.constraints]
 
 
-# Implied constraints
-
-
 STILL = {"cycle": None}
 LINES = {"cycle": {"steps": [{"to": n, "by": "line"} for n in (1, 2, 3)]}, "targets": [t["position"] for t in TARGETS]}
 WIDE = {"cycle": {"tolerance": {"path": 0.005, "angle": 0.1}}}
@@ -84,9 +81,6 @@ def test_a_bound_of_the_task_replaces_the_implied_one(own: str, replaced: str | 
     assert bounds(Problem(task(constraints=[own]), DRIVEN)) == [own, *implied]
 
 
-# Quantities of motions
-
-
 @pytest.mark.parametrize("name", [q.name for q in MOTION_QUANTITIES])
 def test_quantities_of_motions_need_a_cycle(name: str) -> None:
     still = task().model_copy(update={"cycle": None})
@@ -111,9 +105,6 @@ def test_quantities_of_time_need_durations_or_drives() -> None:
     assert Problem(task(objectives=["cycle_time"]), BARE).evaluate(designs).values == pytest.approx(6.0)
 
 
-# What the cycle decides at targets
-
-
 def test_postures_at_targets_are_those_of_the_cycle_whatever_the_restarts() -> None:
     plain, restarted = (Problem(task(restarts=n), BARE) for n in (0, 4))
     designs = BARE.sample(N, 1)
@@ -130,18 +121,6 @@ def test_payload_counts_only_where_the_cycle_carries_it() -> None:
     assert not np.allclose(loaded.joint_torques[:, :2], empty.joint_torques[:, :2])
     carried = Problem(task(cycle={"steps": [{"to": n} for n in (1, 2)]}, payload=0.5), BARE)
     assert carried.scenes[0].payload.tolist() == [0.5, 0.5, 0.5]  # throughout, and at a target that it leaves out
-
-
-def test_payload_factors_count_as_heavier_payloads() -> None:
-    designs = DRIVEN.sample(N, 2)
-    names = ("dynamic_torque", "thermal_utilisation", "peak_torque")
-    both, once, twice = (
-        Problem(task(objectives=names, **more), DRIVEN).evaluate(designs)
-        for more in ({"payload_factors": [2.0]}, {}, {"payload": 0.4})
-    )
-    assert np.array_equal(both.values, np.maximum(once.values, twice.values))
-    assert np.array_equal(both.violations, np.maximum(once.violations, twice.violations))
-    assert (twice.values > once.values).any()
 
 
 def test_target_noise_shifts_the_whole_cycle() -> None:
@@ -176,9 +155,6 @@ def test_feasible_designs_exist_and_stay_within_what_is_implied() -> None:
     assert not physics.paths.jumps[feasible].any()
     assert not physics.unreached[feasible].any()
     assert physics.clearance[feasible].min() >= 0.0
-
-
-# Build tolerance
 
 
 def test_robust_values_are_the_worst_of_copies_that_keep_the_postures_of_the_arm() -> None:

@@ -126,10 +126,3 @@ def test_objectives_that_suit_the_task_are_suggested() -> None:
         second = Problem(task(HERE, THERE, **keys, objectives=names), space)  # type: ignore[arg-type]
         assert check_instantly(second) == []
         assert second.evaluate(space.sample(3, 0)).values.shape == (3, 2)
-
-
-def test_descriptions_name_the_objectives() -> None:
-    stated = problem({"position": HERE, "tolerance": 0.002}, objectives=["position_error", "worst_error", "torque"])
-    text = "errors below the stated tolerances count as 0 in position_error and worst_error"
-    assert describe_ignored_errors(stated) == text
-    assert describe_ignored_errors(problem(HERE)) == ""

@@ -57,7 +57,7 @@ def bounded(*point: float) -> Task:
 
 
 def short(problem: Problem, n_total: int, out: Path | None = None) -> StudyResult:
-    return optimize(problem, proposer="rules", n_init=5, n_step=3, n_total=n_total, out=out)
+    return optimize(problem, proposer="rules", sampler="tpe", n_init=5, n_step=3, n_total=n_total, out=out)
 
 
 @pytest.mark.parametrize(
@@ -95,8 +95,8 @@ def test_runs_of_one_and_three_objectives_complete_and_resume(tmp_path: Path, pr
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("problem", [one(OPEN), three(OPEN)])
-def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path, problem: Problem) -> None:
+def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path) -> None:
+    problem = three(OPEN)
     run = short(problem, 12, tmp_path / "run")
     config, history = read_run(tmp_path / "run")
     names = [objective.name for objective in problem.objectives]
@@ -105,16 +105,11 @@ def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path, proble
     assert [member.values for member in history.front] == [member.values for member in run.front]
     assert history.hypervolume == pytest.approx(run.hypervolume)
     drawn = {path.stem for path in write_figures(tmp_path / "run")}
-    assert {"hypervolume", "arms"} <= drawn
-    assert ("front" in drawn) == (len(names) > 1)
+    assert {"hypervolume", "arms", "front"} <= drawn
     titles = [title for title, _ in chosen_members(history)]
     assert all("position error" in title or "spread" in title or "nee" in title for title in titles)
-    designs = problem.space.sample(3, 0)
-    if SPREAD in problem.objectives:
-        with pytest.raises(RunFolderError, match="the custom objective"):
-            history.problem.evaluate(designs)
-    else:
-        assert np.array_equal(history.problem.evaluate(designs).values, problem.evaluate(designs).values)
+    with pytest.raises(RunFolderError, match="the custom objective"):
+        history.problem.evaluate(problem.space.sample(3, 0))
     assert (tmp_path / "run" / "trials.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",".join(names))
 
 

@@ -6,11 +6,8 @@ import pytest
 
 from armwright.cli.notes import space_note, unused_parts
 from armwright.cli.options import load_problem
-from armwright.page.repeat_command import repeat_command
 from armwright.problem.checks.instant import check_instantly
-from armwright.runs.config import FrontMethod
 from armwright.spaces.design_space import builtin_spaces, default_space, load_space, paper_space
-from armwright.study.settings import run_config
 from armwright.tasks.catalogue import builtin_names
 
 OWN = sorted(set(builtin_spaces()) & set(builtin_names()))
@@ -30,13 +27,6 @@ def test_commands_take_the_space_of_the_task_and_say_so() -> None:
     plain = load_problem("target-1", None)
     assert plain.space == paper_space()
     assert not space_note(plain)
-
-
-def test_repeated_command_leaves_out_the_space_of_the_task() -> None:
-    config = run_config(load_problem("desk-sorting", None), FrontMethod(), 0)
-    assert "--space" not in repeat_command(config, Path("run"))
-    config = config.model_copy(update={"space": paper_space()})
-    assert "--space paper" in repeat_command(config, Path("run"))
 
 
 @pytest.mark.parametrize("name", OWN)

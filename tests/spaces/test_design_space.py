@@ -9,17 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError, SpaceError
-from armwright.llm.prompt import design_prompt
-from armwright.problem.problem import Problem
 from armwright.robot.tubes import MATERIALS
-from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace, load_space, paper_space
 from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.link_section import LinkSection
 from armwright.spaces.parameters import Design, FloatParameter
-from armwright.study.front.front_run import find_front
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 
 GOOD = paper_space().sample(1, 0)[0].params
 
@@ -130,6 +124,8 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
         ("column: {}\nmount: wall+x", "column: expected mount: floor, got wall+x"),
         ("base_on: table\nmount: [floor, ceiling]", "base_on: expected mount: floor, got floor, ceiling"),
         ("origin_x: [-1.0e308, 1]", "exceeds ±1000"),
+        ("- a\n- list", "keys and values"),
+        ("joints: 4\njoints: 5", "duplicate key"),
     ],
 )
 def test_invalid_space_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
@@ -180,18 +176,6 @@ def test_restrict_fixes_or_narrows_parameters(tmp_path: Path) -> None:
     assert DesignSpace.model_validate_json(space.model_dump_json()) == space
     moved = space.clipped((0.0, 0.0, 0.7), "RYPY", (0.3, 0.3, 0.3, 0.3))
     assert (moved.joints, moved.origin[2], moved.links[0]) == ("YRPY", 0.0, 0.2)
-
-
-def test_restricted_space_is_respected_by_a_run(tmp_path: Path) -> None:
-    space = DesignSpace.model_validate({"restrict": RESTRICTED})
-    problem = Problem(load_task("target-1"), space)
-    run = optimize(problem, proposer="rules", n_init=4, n_step=2, n_total=12, out=tmp_path / "run")
-    assert {trial.design.joints[0] for trial in run.trials} == {"Y"}
-    assert read_run(tmp_path / "run")[0].space == space
-    found = find_front(problem, evaluations=1500)
-    assert {member.design.joints[0] for member in found.front} == {"Y"}
-    prompt = design_prompt(run.history, 0)
-    assert "origin_z = 0 (fixed); joint_1 = Y; joint_2 is one of R, P; 0.1 <= link_1 <= 0.2." in prompt
 
 
 @pytest.mark.parametrize(

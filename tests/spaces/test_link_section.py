@@ -12,7 +12,7 @@ from armwright.llm.answer import Answer, read_answer, read_text, written_answer
 from armwright.llm.answer_format import design_in_lines
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt
-from armwright.robot.tubes import MATERIALS, Tube
+from armwright.robot.tubes import MATERIALS
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import CategoricalParameter
 from armwright.tasks.catalogue import load_task
@@ -38,12 +38,6 @@ def test_tubes_match_the_table_of_the_standard(outer_mm: float, wall_mm: float, 
     assert tube.mass_per_metre == pytest.approx(kg, rel=3e-3)
     assert tube.bending_stiffness == pytest.approx(steel.youngs * moment * 1e-8, rel=3e-3)
     assert tube.torsional_stiffness == pytest.approx(steel.shear * 2.0 * moment * 1e-8, rel=3e-3)
-
-
-def test_solid_bar_is_a_tube_with_a_wall_of_its_radius() -> None:
-    bar = Tube(0.03, 0.015)
-    assert bar.second_moment == pytest.approx(math.pi * 0.03**4 / 64)
-    assert bar.mass_per_metre(1000.0) == pytest.approx(1000.0 * math.pi * 0.015**2)
 
 
 def test_section_without_a_material_keeps_the_paper() -> None:

@@ -37,9 +37,6 @@ def steps(*entries: Any, **more: Any) -> dict[str, Any]:
     return {**more, "steps": [entry if isinstance(entry, dict) else {"to": entry} for entry in entries]}
 
 
-# Syntax
-
-
 @pytest.mark.parametrize("target", [NAMED[0], {"name": "gate", "position": POINTS[0]}])
 def test_cycle_round_trips_through_values_and_yaml(target: Any) -> None:
     last = {"to": 3, "by": "line"}
@@ -52,17 +49,6 @@ def test_cycle_round_trips_through_values_and_yaml(target: Any) -> None:
     assert again == read
     assert again.plan(again.target_positions).motions == read.plan(read.target_positions).motions
     assert again.target_names == read.target_names
-
-
-def test_cycle_is_described_on_one_line() -> None:
-    cycle = steps({"to": "bin", "do": "pick"}, {"to": "tray", "do": "place", "by": "line"}, 3, approach=0.05)
-    assert task(cycle).cycle_description == (
-        "bin (pick), by a line to tray (place), by a joint motion to 3, by a joint motion back to bin; "
-        "lines of 50 mm before and after pick and place"
-    )
-
-
-# Payload
 
 
 @pytest.mark.parametrize(
@@ -80,9 +66,6 @@ def test_payload_is_carried_between_pick_and_place(actions: Any, closed: bool, c
     cycle = task(steps(*({"to": n, "do": do} for n, do in enumerate(actions, start=1)), closed=closed)).cycle
     assert cycle is not None
     assert cycle.carried() == carried
-
-
-# Errors
 
 
 PICK, PLACE = {"to": 1, "do": "pick"}, {"to": 2, "do": "place"}
@@ -155,9 +138,6 @@ def test_a_direction_may_be_added_at_the_same_place() -> None:
     assert len(plan(steps(1, 2, closed=False), targets).motions) == 1
     with pytest.raises(TaskError, match="step 1: the tool is already there"):
         plan(steps(1, 2), targets)
-
-
-# Motions
 
 
 def test_motions_of_a_cycle_with_approach() -> None:

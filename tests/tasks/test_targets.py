@@ -93,9 +93,6 @@ def test_mistakes_are_reported(target: str, words: str) -> None:
         task(f"name: a\ntargets:\n  - [0, 0, 1]\n  - {target}\n")
 
 
-# Objectives
-
-
 def test_orientation_counts_only_for_oriented_targets() -> None:
     assert [o.name for o in Problem(task()).objectives] == ["position_error", "torque", "orientation_error"]
     with pytest.raises(SettingsError, match=r"orientation_error needs a target with an axis .* task a has none"):
@@ -133,9 +130,6 @@ def test_verification_uses_the_same_targets() -> None:
     verified = verify(problem, designs, values, (1.0, 10.0, 3.0))
     assert np.median(np.abs(verified.exact - values)) < 1e-3
     assert (verified.exact[:, 2] > 0.0).all()
-
-
-# Why a target is missed
 
 
 def test_reasons_of_missed_targets() -> None:

@@ -13,7 +13,6 @@ from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.rotations import cone_directions
 from armwright.spaces.design_space import paper_space
-from armwright.tasks.catalogue import load_task
 from armwright.tasks.obstacles import Box
 from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region, sample_regions
@@ -32,9 +31,6 @@ def task(**more: Any) -> Task:
     )
 
 
-# The points
-
-
 def test_workspace_points_lie_in_their_region() -> None:
     one, flat, spot = (
         region(points=50),
@@ -47,9 +43,6 @@ def test_workspace_points_lie_in_their_region() -> None:
     assert np.all((points[50:250] >= flat.low) & (points[50:250] <= flat.high))
     assert np.all(points[250:] == 0.0)
     assert np.array_equal(sample_regions((region(points=10),)), points[:10]), "more points keep those that are there"
-
-
-# What is reached
 
 
 def test_two_link_arm_reaches_a_spherical_shell() -> None:
@@ -78,20 +71,6 @@ def test_workspace_points_are_solved_like_targets() -> None:
     assert problem.evaluate(designs).values[:, 0] == pytest.approx((as_targets.position_error >= 1e-3).mean(axis=1))
 
 
-def test_workspace_is_computed_on_demand() -> None:
-    designs = paper_space().sample(10, 0)
-    target_1 = load_task("target-1")
-    with_ = target_1.model_copy(update={"workspace": task().workspace})
-    evaluation = Problem(with_).physics(designs)
-    assert np.array_equal(Problem(with_).outcomes(evaluation).values, Problem(target_1).evaluate(designs).values)
-    assert "workspace_error" not in vars(evaluation)
-    assert not Problem(with_).uses(UNCOVERED_FRACTION)
-    assert Problem(task(), objectives=(UNCOVERED_FRACTION,)).uses(UNCOVERED_FRACTION)
-
-
-# From the file on
-
-
 def test_default_targets_are_the_workspace_corners() -> None:
     found = task(workspace=[CUBE, {"low": (1, 0, 0), "high": (2, 1, 0), "points": 9}])
     assert len(found.targets) == 8 + 2, "corners that both have count once"
@@ -117,9 +96,6 @@ def test_invalid_workspaces_are_refused_in_one_line(written: str) -> None:
     with pytest.raises(TaskError, match=FAULTS[written]) as refused:
         parse_document(text, Task, TaskError, "it.yaml")
     assert "\n" not in str(refused.value)
-
-
-# Directions of the tool
 
 
 CONE: dict[str, Any] = {"axis": (0, 0, 1), "half_angle": 0.6, "count": 9, "share": 0.5}
