@@ -1,14 +1,10 @@
 """Assumed values of actuators in the results of a run."""
 
-import json
-from pathlib import Path
 from typing import Any
-
-import pytest
 
 import armwright as aw
 from armwright.problem.assumptions import assumed_values
-from armwright.robot.actuators import named_actuator, value_of
+from armwright.robot.actuators import named_actuator
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests.proof.test_simulation import DESK, SPACE, Desk
@@ -46,20 +42,3 @@ def test_only_actuators_in_use_count() -> None:
     }})  # fmt: skip
     assert set(assumed_values(desk.problem)) == {"XM540-W270", "XM430-W350"}
     assert set(assumed_values(desk.problem, [desk.arm])) == {"XM540-W270"}
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished run whose only trial is the desk arm."""
-    desk = Desk(objectives=["peak_torque", "length"])
-    folder = tmp_path_factory.mktemp("runs") / "desk"
-    options = {"proposer": "none", "sampler": "random", "n_init": 1, "n_total": 1, "verify": False}
-    aw.optimize(desk.problem, initial_designs=[desk.design], out=folder, **options)  # type: ignore[arg-type]
-    return folder
-
-
-def test_files_state_assumed_values(run: Path) -> None:
-    record = named_actuator("XM540-W270").completed()
-    expected = {"XM540-W270": {name: value_of(record, name) for name in SERVO}}
-    for file in (run / "summary.json", run / "designs" / "0000" / "design.json"):
-        assert json.loads(file.read_text(encoding="utf-8"))["assumed"] == expected
