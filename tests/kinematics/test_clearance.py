@@ -11,14 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from armwright.kinematics.arms.arm_arrays import Precision, stack_arms
-from armwright.kinematics.arms.forward import link_lines
 from armwright.kinematics.contact.clearance import clearances
-from armwright.problem.evaluation import evaluate
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.design_space import paper_space
 from armwright.tasks.obstacles import Box, Cylinder, Ground, Obstacle, Sphere
-from armwright.tasks.tool import Tool
 from tests.support.arms import moving_arms
 
 Array = NDArray[np.float64]
@@ -246,31 +243,6 @@ def test_first_link_may_stand_on_an_obstacle_at_its_base() -> None:
     arm = replace(planar((0.2, 0.3)), base=(0.0, 0.0, 0.0))
     out = clearances(stack_arms([arm]), np.array([[[np.pi / 2, 0.0]]]), wall)[1][0, 0]
     assert out == pytest.approx(0.2 - 0.015), "straight out of a wall"
-
-
-def test_prismatic_and_fixed_joints_place_their_links() -> None:
-    content = {"joints": [2, 5], "joint_types": ["P", "O", "F", "X", "S"], "link_directions": ["+z", "+x"]}
-    space = DesignSpace.model_validate({**content, "mount": ["ceiling"]})
-    designs = [d for d in space.sample(60, 4) if d.joints[0] == "P"]
-    arms = [space.arm(design, Tool(tip=(0.1, 0.0, 0.0))) for design in designs]
-    targets = np.random.default_rng(0).uniform(-0.5, 0.5, (4, 3))
-    ball = Sphere(kind="sphere", center=(0.2, 0.1, 0.3), radius=0.05)
-    evaluation = evaluate(arms, targets, obstacles=[ball])
-    for i, arm in enumerate(arms):
-        for t in range(len(targets)):
-            lines = link_lines(arm, evaluation.q[i, t, : len(arm.joints)])[1:-1]  # without the foot and the tool
-            apart = [segment_distance(np.array(ball.center), *line) - 0.015 - 0.05 for line in lines]
-            first, end = link_lines(arm, evaluation.q[i, t, : len(arm.joints)])[0]
-            beyond = first + (end - first) * min(1.0, 0.03 / np.linalg.norm(end - first))
-            if np.linalg.norm(end - first) > 0.03:
-                apart.append(segment_distance(np.array(ball.center), beyond, end) - 0.015 - 0.05)
-            assert evaluation.obstacle_clearance[i, t] == pytest.approx(min(apart), abs=1e-5)
-
-
-def segment_distance(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    along = end - start
-    share = np.clip((point - start) @ along / max(along @ along, 1e-30), 0.0, 1.0)
-    return float(np.linalg.norm(point - start - share * along))
 
 
 def test_rigidly_connected_links_are_ignored() -> None:

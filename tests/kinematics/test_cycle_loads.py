@@ -13,30 +13,17 @@ from armwright.kinematics.cycle.cycle_loads import BETWEEN, CycleLoads, cycle_lo
 from armwright.kinematics.cycle.cycle_path import INSTANTS, find_paths
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.cycle.torque_terms import torque_terms
-from armwright.robot.arm import Actuator, Arm, Joint, uniform_link
+from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.mjcf import to_mjcf
 from armwright.tasks.payload import Payload
 from armwright.tasks.task import Task
-from tests.support.cycles import Case, own_joints, random_case, tolerated
+from tests.support.cycles import COULOMB, DRIVE, INERTIA, VISCOUS, Case, own_joints, random_case, tolerated
 from tests.support.exported_arms import Peer, carrying_peer, load, moving, peer_of
 from tests.support.reference_kinematics import Array
 
 PAYLOAD = {"mass": 0.8, "center": [0.02, -0.01, 0.05], "size": [0.06, 0.04, 0.1]}
 CASES = [(3, "position"), (4, "axis"), (5, "position"), (6, "axis"), (6, "orientation"), (7, "position")]
 CYCLE: dict[str, Any] = {"picks": True, "payload": PAYLOAD, "dwell": 0.3}
-INERTIA, COULOMB, VISCOUS = 0.02, 0.3, 0.1  # of the rotor [kg m²], [N m], [N m s/rad]
-DRIVE = Actuator(
-    "drive",
-    0.3,
-    60.0,
-    8.0,
-    continuous_torque=20.0,
-    corner_speed=0.0,
-    rotor_inertia=INERTIA,
-    coulomb_friction=COULOMB,
-    viscous_friction=VISCOUS,
-    voltage=24.0,
-)
 
 
 @cache

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.kinematics.arms.arm_arrays import FIXED, stack_arms
+from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_choice import CLOSED, MAX_SLIDE, MAX_STEP, choose_candidates
 from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths
 from armwright.kinematics.cycle.entry_postures import entry_postures
@@ -15,6 +16,7 @@ from armwright.kinematics.cycle.line_following import follow_lines
 from armwright.kinematics.cycle.motion_path import MANY_SAMPLES, MotionPath
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.tasks.motions import Motion
+from armwright.tasks.obstacles import Cylinder
 from armwright.tasks.task import Task
 from tests.support.cycles import KINDS, Case, line_errors, own_joints, random_case, tolerated
 
@@ -163,20 +165,13 @@ def test_loop_of_lines_ends_where_it_began() -> None:
 
 
 def test_clearances_of_a_motion_are_the_smallest_of_its_samples() -> None:
-    post = {"kind": "cylinder", "center": [0.35, 0.25, 0.0], "radius": 0.02, "height": 0.2}
-    paths = through(planar(0.3, 0.25), [0.45, -0.1, 0.0], [0.1, 0.4, 0.0], [0.45, -0.1, 0.0], obstacles=[post])
-    free = through(planar(0.3, 0.25), [0.45, -0.1, 0.0], [0.1, 0.4, 0.0])
-    assert np.isinf(free.obstacle_clearance).all()
-    assert paths.obstacle_clearance[0, 0] == pytest.approx(paths.obstacle_clearance[0, 1], abs=1e-4)
-    (q,) = (path.q[0] for path in paths.of_arm(0)[1][:1])
-    tips = np.cumsum(
-        [[0.3 * np.cos(q[:, 0]), 0.3 * np.sin(q[:, 0])], [0.25 * np.cos(q.sum(1)), 0.25 * np.sin(q.sum(1))]], 0
-    )
-    points = np.concatenate([np.zeros((1, *tips[0].shape)), tips]).transpose(2, 0, 1)  # (R, 3, 2)
-    share = np.linspace(0.0, 1.0, 500)[:, None]
-    along = [(1 - share) * points[:, j, None] + share * points[:, j + 1, None] for j in (0, 1)]
-    nearest = min(np.linalg.norm(line - [0.35, 0.25], axis=-1).min() for line in along) - 0.02 - 0.01
-    assert paths.obstacle_clearance[0, 0] == pytest.approx(nearest, abs=1e-3)
+    post = Cylinder(kind="cylinder", center=(0.35, 0.25, 0.0), radius=0.02, height=0.2)
+    arm, targets = planar(0.3, 0.25), ([0.45, -0.1, 0.0], [0.1, 0.4, 0.0], [0.45, -0.1, 0.0])
+    paths = through(arm, *targets, obstacles=[post.model_dump()])
+    assert np.isinf(through(arm, *targets).obstacle_clearance).all()
+    for index, path in enumerate(paths.of_arm(0)[1]):
+        nearest = clearances(stack_arms([arm], "float64"), path.q, [post])[1].min()
+        assert paths.obstacle_clearance[0, index] == pytest.approx(nearest, abs=1e-3)
 
 
 @pytest.mark.parametrize("samples", [20, MANY_SAMPLES, MANY_SAMPLES + 1])

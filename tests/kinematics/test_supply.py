@@ -12,23 +12,8 @@ from armwright.kinematics.cycle.supply import supply_currents
 from armwright.kinematics.cycle.torque_terms import torque_terms
 from armwright.robot.actuators import catalogue, value_of
 from armwright.robot.arm import Actuator
-from tests.support.cycles import Case, random_case, tolerated
+from tests.support.cycles import CURRENT, DRIVE, PEAK, VOLTAGE, Case, random_case, tolerated
 from tests.support.reference_kinematics import Array
-
-PEAK, VOLTAGE, CURRENT = 60.0, 24.0, 5.0  # [N m], [V], [A]
-COULOMB, VISCOUS = 0.3, 0.1  # [N m], [N m s/rad]
-DRIVE = Actuator(
-    "drive",
-    0.3,
-    PEAK,
-    8.0,
-    corner_speed=0.0,
-    rotor_inertia=0.02,
-    coulomb_friction=COULOMB,
-    viscous_friction=VISCOUS,
-    voltage=VOLTAGE,
-    current=CURRENT,
-)
 
 
 def drives_of(*actuators: Actuator, travel: float = 1.0) -> Actuation:

@@ -42,3 +42,12 @@ def test_only_actuators_in_use_count() -> None:
     }})  # fmt: skip
     assert set(assumed_values(desk.problem)) == {"XM540-W270", "XM430-W350"}
     assert set(assumed_values(desk.problem, [desk.arm])) == {"XM540-W270"}
+
+
+def test_backlash_is_assumed_only_if_a_quantity_depends_on_it() -> None:
+    servo = {"name": "servo", "mass": 0.1, "stall_torque": 5.0}
+    space = DesignSpace.model_validate({"actuators": [servo], "motor_bodies": False})
+    for constraints, names in ((["mass <= 3"], []), (["mass <= 3", "backlash_error <= 0.01"], ["backlash"])):
+        task = Task.model_validate({"name": "one", "targets": [[0.3, 0.0, 0.2]], "constraints": constraints})
+        problem = aw.Problem(task, space)
+        assert [name for values in assumed_values(problem).values() for name in values] == names

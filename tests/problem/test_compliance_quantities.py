@@ -1,19 +1,25 @@
 """Deflection, backlash error and payload capacity as objectives, constraints and requirements."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from armwright.exceptions import SettingsError
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.reach.compliance import Stiffness, backlash_errors
+from armwright.problem.conditions import read_condition
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
 from armwright.problem.problem import Problem
+from armwright.proof.selection import pick
 from armwright.robot.actuators import named_actuator
 from armwright.robot.arm import Arm
+from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace
+from armwright.study.study import optimize
 from armwright.tasks.moments import MAX_MASS
 from armwright.tasks.task import Task
 from tests.support.arms import moving_arms
@@ -107,3 +113,21 @@ def test_targets_without_the_payload_of_a_cycle_do_not_limit_it() -> None:
     limits = PAYLOAD_CAPACITY.each(task.physics(SPACE.sample(20, 2)))
     assert (limits[:, 0] == MAX_MASS).all()
     assert (limits[:, 1:] < MAX_MASS).any()
+
+
+def test_designs_can_be_picked_by_quantities_that_the_run_did_not_evaluate(tmp_path: Path) -> None:
+    asked = problem(objectives=["worst_error", "mass"])
+    optimize(asked, proposer="none", sampler="random", n_init=15, n_total=15, verify=False, out=tmp_path)
+    history = read_run(tmp_path)[1]
+    numbers = [member.number for member in history.front]
+    errors = dict(zip(numbers, BACKLASH_ERROR(history.evaluation(numbers)), strict=True))
+    assert len(numbers) > 1
+    bound = float(sorted(errors.values())[len(errors) // 2])
+    picked = pick(history, [read_condition(f"backlash_error <= {bound!r}")], by="backlash_error")
+    assert [member.number for member in picked] == sorted(
+        (number for number in numbers if errors[number] <= bound), key=errors.__getitem__
+    )
+    with pytest.raises(SettingsError, match="deflection is not known: no section and material of the links are stated"):
+        pick(history, [read_condition("deflection <= 0.001")])
+    with pytest.raises(SettingsError, match=r'unknown quantity "backlash_eror".*Did you mean "backlash_error"'):
+        pick(history, [read_condition("backlash_eror <= 0.001")])

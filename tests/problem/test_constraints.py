@@ -225,16 +225,10 @@ def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
     assert np.all(off <= 0.06)  # 5 % in float64
 
 
-def test_changed_constraints_are_refused(tmp_path: Path) -> None:
+def test_changed_constraints_and_missing_violations_are_refused(tmp_path: Path) -> None:
     optimize(Problem(task(*BOUNDS)), proposer="none", sampler="random", n_total=2, out=tmp_path / "run")
     with pytest.raises(RunConflictError, match=r"constraints: .*worst_error <= 0.4"):
-        optimize(
-            Problem(task("worst_error <= 0.3")), proposer="none", sampler="random", n_total=2, out=tmp_path / "run"
-        )
-
-
-def test_trial_without_violations_is_damaged(tmp_path: Path) -> None:
-    optimize(Problem(task(*BOUNDS)), proposer="none", sampler="random", n_total=2, out=tmp_path / "run")
+        optimize(Problem(task("worst_error <= 0.3")), proposer="none", n_total=2, out=tmp_path / "run")
     file = tmp_path / "run" / "trials.jsonl"
     first = json.loads(file.read_text(encoding="utf-8").splitlines()[0])
     del first["violations"]

@@ -133,7 +133,6 @@ SIX_AXIS = DesignSpace(
     link_section={"tubes": [[0.03, 0.002]], "material": {"density": 2700, "youngs": 70e9, "shear": 27e9}},  # type: ignore[arg-type]
 )
 ONE_JOINT = paper_space(1).model_copy(update={"joint_types": ("P",), "link": (0.2, 0.2)})
-TWO_JOINTS = paper_space(2)
 SMALL = paper_space(2).model_copy(
     update={"link": (0.0005, 0.004), "origin_x": (-0.001, 0.001), "origin_y": (-0.001, 0.001), "origin_z": (0, 1 / 3)}
 )

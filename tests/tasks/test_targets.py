@@ -79,10 +79,6 @@ def test_target_with_only_a_position_is_a_point() -> None:
             "{position: [0, 0, 1], orientation: [0, 0, 90]}",
             r"targets\[1\]: orientation: expected .* rad.*90° is 1.5708",
         ),
-        (
-            "{position: [0, 0, 1], tolerance: 0}",
-            r"targets\[1\].tolerance: expected a number of at least 1e-09 m, got 0",
-        ),
         ("{position: [0, 0, 1], angle_tolerance: 0.1}", r"targets\[1\]: angle_tolerance needs an axis"),
         ("{position: [0, 0, 1001]}", "target 2 = .* is more than 1000 m away"),
         ("{position: [0, 0,4, 1]}", r"targets\[1\].position: expected three numbers .*, got 4: .*0.4, not 0,4"),
