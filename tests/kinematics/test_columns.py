@@ -83,16 +83,12 @@ def test_bases_at_the_foot_have_no_column() -> None:
     assert all(low.arm(design).column is None for design in designs)
 
 
-def test_column_is_as_far_as_the_link_beside_it() -> None:
-    """The first link lies on the column, and the second hangs from its end, beside the column."""
-    joints = (Joint("revolute", "y", -3.2, 3.2), Joint("revolute", "y", -3.2, 3.2))
-    links = [uniform_link((0.0, 0.0, length), 0.1, 0.01) for length in (0.15, 0.3)]
-    arm = Arm((0.1, 0.2, 0.5), joints, tuple(links), column=COLUMN)
-    q = np.array([[[0.5 * math.pi, 0.5 * math.pi], [0.5 * math.pi, 0.0], [-0.3 * math.pi, -0.9 * math.pi]]])
-    own, obstacle = clearances(stack_arms([arm], "float64"), q, [Ground(kind="ground", z=0.4)])
-    assert own[0, :2] == pytest.approx([0.15 - 0.03 - 0.01, 0.15 - 0.03 - 0.01], abs=1e-6)
-    assert own[0, 2] < 0.0, "the second link is folded through the column"
-    assert obstacle[0, 1] > 0.0, "obstacles do not count against the column"
+def test_obstacles_do_not_count_against_the_column() -> None:
+    """The ground is higher than the foot of the column; the arm stretches out level above it."""
+    joints, links = (Joint("revolute", "y", -3.2, 3.2),) * 2, (uniform_link((0.0, 0.0, 0.2), 0.1, 0.01),) * 2
+    arms = stack_arms([Arm((0.1, 0.2, 0.5), joints, links, column=COLUMN)])
+    obstacle = clearances(arms, np.array([[[0.5 * math.pi, 0.0]]]), [Ground(kind="ground", z=0.4)])[1]
+    assert obstacle == pytest.approx(0.1 - 0.01, abs=1e-6)
 
 
 def test_parts_at_rest_do_not_count() -> None:
@@ -115,14 +111,11 @@ def test_parts_at_rest_do_not_count() -> None:
 def test_column_implies_that_nothing_collides() -> None:
     task = Task(name="low", targets=((0.02, 0.0, 0.3),))
     content = {"joints": 2, "joint_types": ["P"], "link": [0.1, 0.4], "joint_range": [-3.1, 3.1]}
-    content |= {"origin_z": [0.5, 0.5], "column": {}}
-    without = DesignSpace.model_validate({**content, "column": None})
-    assert [one.description for one in Problem(task, DesignSpace.model_validate(content)).constraints] == [
-        "collision <= 0"
-    ]
+    content |= {"origin_z": [0.5, 0.5]}
+    space, without = (DesignSpace.model_validate({**content, "column": column}) for column in ({}, None))
+    assert [one.description for one in Problem(task, space).constraints] == ["collision <= 0"]
     assert not Problem(task, without).constraints
     bounded = task.model_copy(update={"constraints": ("self_clearance >= 0.01",)})
-    space = DesignSpace.model_validate(content)
     problem = Problem(bounded, space)
     assert [constraint.description for constraint in problem.constraints] == ["self_clearance >= 0.01"]
     folded = space.clipped((0.0, 0.0, 0.5), "PP", (0.1, 0.3))  # its tip is inside the column at the target

@@ -126,17 +126,8 @@ LOADED = Task(name="loaded", targets=((0.3, 0.0, 0.2), (0.2, 0.2, 0.3), (0.2, -0
 
 
 def test_named_objectives_match_their_formulas() -> None:
-    names = [
-        "position_error",
-        "torque",
-        "worst_error",
-        "unreached_targets",
-        "peak_torque",
-        "rms_torque",
-        "mass",
-        "length",
-        "joints",
-    ]
+    names = ["position_error", "torque", "worst_error", "unreached_targets", "peak_torque"]
+    names += ["rms_torque", "mass", "length", "joints"]
     problem = Problem(LOADED, objectives=named_objectives(names[:5]))
     rest = Problem(LOADED, objectives=named_objectives(names[5:]))
     designs = problem.space.sample(50, 1)
