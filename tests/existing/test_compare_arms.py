@@ -26,6 +26,7 @@ from armwright.page.page import write_report
 from armwright.pictures.figures import draw_front, write_figures
 from armwright.pictures.style import RC
 from armwright.problem.objectives import named_objectives
+from armwright.robot.mounting import Mounting
 from armwright.robot.robot_descriptions import find_urdf
 from armwright.robot.urdf_reader import read_urdf
 from armwright.runs.folder import read_run
@@ -36,7 +37,7 @@ from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from armwright.tasks.tool import Tool
 from tests.support.browser import Tab
-from tests.support.command_line import armwright
+from tests.support.command_line import armwright, refused
 from tests.support.robots import robot
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -48,13 +49,14 @@ SPACE = DesignSpace(
     link=(0.05, 0.4),
     link_section={"tubes": [[0.06, 0.004]], "material": "aluminium"},  # type: ignore[arg-type]
 )
+WITH_MOTORS = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
 UR5, PANDA = robot("ur5_robot"), robot("panda")
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("arms") / "run"
-    aw.optimize(aw.Problem(TASK, SPACE), proposer="none", n_init=10, n_total=30, out=folder)
+    aw.optimize(aw.Problem(TASK, SPACE), proposer="none", sampler="random", n_init=10, n_total=30, out=folder)
     return folder
 
 
@@ -138,12 +140,12 @@ def values_of(arm: ComparedArm) -> dict[str, float | None]:
 
 
 def test_designs_and_arms_have_the_values_of_their_data_sheets(run: Path, compared: ArmComparison) -> None:
-    for design in compared.designs:
+    for design in compared.designs[:3]:
         sheet = design_sheet(run, int(design.name[1:].split()[0]))
         assert {name: fact.value for name, fact in sheet.facts.items()} == values_of(design)
         assert tuple(value for value, _ in sheet.objectives.values()) == design.values
     for arm, file in zip(compared.arms, (UR5, PANDA), strict=True):
-        placement = placed(compared.problem, read_urdf(file), seed=0)
+        placement = placed(compared.problem, read_urdf(file), 0, Mounting(arm.base, arm.yaw))
         sheet = urdf_sheet(placement.described, job=Job(compared.problem, placement.mounting, placement.description))
         assert {name: fact.value for name, fact in sheet.facts.items()} == values_of(arm)
         assert sheet.violated == arm.violated
@@ -154,12 +156,8 @@ def test_designs_and_arms_have_the_values_of_their_data_sheets(run: Path, compar
 
 def test_dominance_counts_match_pairwise_comparison(history: History) -> None:
     values = np.array([member.values for member in history.front])
-    for point in [
-        *values,
-        values.min(axis=0),
-        values.max(axis=0) + 1.0,
-        *np.random.default_rng(1).uniform(0, 9, (9, 2)),
-    ]:
+    anywhere = np.random.default_rng(1).uniform(0, 9, (9, 2))
+    for point in [*values, values.min(axis=0), values.max(axis=0) + 1.0, *anywhere]:
         better = sum(all(p <= v) and any(p < v) for p, v in ((point, row) for row in values))  # type: ignore[arg-type]
         worse = sum(all(v <= p) and any(v < p) for p, v in ((point, row) for row in values))  # type: ignore[arg-type]
         assert dominance_counts(point.tolist(), (), history) == (better, worse)
@@ -233,24 +231,22 @@ def table(tab: Tab) -> dict[str, dict[str, str]]:
     return {row[0]: dict(zip(heads, row, strict=True)) for row in rows}
 
 
-def test_front_figure_without_existing_arms_and_with_a_damaged_file(run: Path, history: History) -> None:
-    (run / EXISTING_ARMS).unlink(missing_ok=True)
-    assert read_existing_arms(run, 2) == ()
-    (run / EXISTING_ARMS).write_text('[{"name": "x"}]', encoding="utf-8")
-    with pytest.raises(RunFolderError, match=r"existing_arms.json is damaged; remove it"):
-        write_figures(run)
+def test_arm_name_with_markup_is_escaped_on_the_page(run: Path, tmp_path: Path, tab: Tab) -> None:
+    hostile = tmp_path / "<img src=x onerror='window.hacked = 1'>.urdf"
+    hostile.write_text(UR5.read_text(encoding="utf-8"), encoding="utf-8")
+    compare_arms(TASK, [hostile], run, base=(0.0, 0.0, 0.0))
+    tab.open(write_report(run))
+    assert tab.ask("window.hacked") is None
+    assert tab.faults == []
     (run / EXISTING_ARMS).unlink()
-    (axes,) = draw_front(history).axes
-    assert "existing arm" not in [text.get_text() for text in axes.figure.legends[0].get_texts()]
 
 
 @pytest.mark.slow
 def test_unknown_price_and_effort_are_not_compared(tmp_path: Path) -> None:
-    space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
     problem = aw.Problem(
-        TASK, space, objectives=named_objectives(["position_error", "mass", "price", "torque_utilisation"])
+        TASK, WITH_MOTORS, objectives=named_objectives(["position_error", "mass", "price", "torque_utilisation"])
     )
-    aw.optimize(problem, proposer="none", n_init=4, n_total=4, out=tmp_path / "run")
+    aw.optimize(problem, proposer="none", sampler="random", n_init=4, n_total=4, out=tmp_path / "run")
     silent = tmp_path / "silent.urdf"
     silent.write_text(UR5.read_text(encoding="utf-8").replace('effort="', 'effort="0" was="'), encoding="utf-8")
     ur5, without = compare_arms(TASK, [UR5, silent], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
@@ -265,43 +261,25 @@ def test_unknown_price_and_effort_are_not_compared(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_stated_prices_are_compared_and_bounded(tmp_path: Path) -> None:
-    space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
-    task = TASK.model_copy(update={"constraints": ("price <= 20000",)})
-    problem = aw.Problem(task, space, objectives=named_objectives(["position_error", "price"]))
-    aw.optimize(problem, proposer="none", n_init=4, n_total=4, verify=False, out=tmp_path / "run")
+    task = TASK.model_copy(update={"constraints": ("price <= 20000", "self_clearance >= 0.01")})
+    problem = aw.Problem(task, WITH_MOTORS, objectives=named_objectives(["position_error", "price"]))
+    aw.optimize(problem, proposer="none", sampler="random", n_init=4, n_total=4, verify=False, out=tmp_path / "run")
     prices = {"ur5_robot": 28_000.0, "panda": 15_000.0}
     found = compare_arms(task, [UR5, PANDA], tmp_path / "run", base=(0.0, 0.0, 0.0), prices=prices)
     ur5, panda = found.arms
-    assert (ur5.value("price"), ur5.values[1], panda.value("price"), panda.values[1]) == (
-        28_000.0,
-        28_000.0,
-        15_000.0,
-        15_000.0,
-    )
+    assert [(arm.value("price"), arm.values[1]) for arm in (ur5, panda)] == [(28e3, 28e3), (15e3, 15e3)]
     assert ur5.violated == ("price <= 20000 (it has 28,000)",)
-    assert panda.violated == ()
-    assert panda.dominates is not None
-    assert {design.value("price") for design in found.designs} == {3 * 482.89}
-
-
-def test_violated_constraints_exclude_an_arm_from_the_front(tmp_path: Path) -> None:
-    """A violated constraint is listed with its value; the clearance of a URDF is unknown."""
-    task = TASK.model_copy(update={"constraints": ("mass <= 19", "self_clearance >= 0.01")})
-    aw.optimize(aw.Problem(task, SPACE), proposer="none", n_init=10, n_total=10, out=tmp_path / "run")
-    ur5, panda = compare_arms(task, [UR5, PANDA], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
-    assert ur5.violated == ("mass <= 19 (it has 21)",)
-    assert (ur5.dominates, ur5.dominated_by) == (None, None)
-    assert panda.violated == ()
+    assert (ur5.dominates, ur5.dominated_by, panda.violated) == (None, None, ())
     assert panda.dominates is not None
     assert "unknown whether it meets self_clearance >= 0.01" in panda.notes
+    assert {design.value("price") for design in found.designs} == {3 * 482.89}
 
 
 def test_existing_arm_drives_a_cycle_of_stated_durations() -> None:
     """A URDF states effort and speed; what else a drive can do is unknown, and so is the fastest cycle."""
     cycle = {"time": 2.0, "steps": [{"to": 1}, {"to": 2}, {"to": 3}]}
     task = Task(name="feeder", targets=TASK.targets, payload=0.5, cycle=cycle, objectives=["dynamic_torque", "price"])  # type: ignore[arg-type]
-    space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
-    (ur5,) = compare_arms(task, [UR5], space=space, base=(-0.2, 0.0, 0.0)).arms
+    (ur5,) = compare_arms(task, [UR5], space=WITH_MOTORS, base=(-0.2, 0.0, 0.0)).arms
     peak = ur5.value("peak_torque")
     assert peak is not None
     assert ur5.values[0] > peak  # type: ignore[operator]
@@ -309,7 +287,7 @@ def test_existing_arm_drives_a_cycle_of_stated_durations() -> None:
     unknown = ("collision", "dynamic_utilisation", "thermal_utilisation", "voltages")
     assert {f"unknown whether it meets {name} <= {int(name != 'collision')}" for name in unknown} < set(ur5.notes)
     fastest = task.model_copy(update={"cycle": task.cycle.model_copy(update={"time": "fastest"})})  # type: ignore[union-attr]
-    assert compare_arms(fastest, [UR5], space=space, base=(-0.2, 0.0, 0.0)).arms[0].values == (None, None)
+    assert compare_arms(fastest, [UR5], space=WITH_MOTORS, base=(-0.2, 0.0, 0.0)).arms[0].values == (None, None)
 
 
 def test_slides_of_existing_arms_use_the_travel_of_the_space(tmp_path: Path) -> None:
@@ -328,14 +306,11 @@ def test_invalid_arguments_are_refused(run: Path, tmp_path: Path) -> None:
         compare_arms(TASK, [])
     with pytest.raises(TaskError, match="is a run of the task feeder, with other targets, another tool"):
         compare_arms("target-1", [UR5], run)
-    with pytest.raises(TaskError, match="another tool or other payloads"):
-        compare_arms(TASK.model_copy(update={"payload": 1.0}), [UR5], run)
-    with pytest.raises(TaskError, match="another tool or other payloads"):
-        compare_arms(TASK.model_copy(update={"tool": Tool(mass=0.5)}), [UR5], run)
+    for other in ({"payload": 1.0}, {"tool": Tool(mass=0.5)}):
+        with pytest.raises(TaskError, match="another tool or other payloads"):
+            compare_arms(TASK.model_copy(update=other), [UR5], run)
     with pytest.raises(SettingsError, match="the run has its own space"):
         compare_arms(TASK, [UR5], run, space=SPACE)
-    with pytest.raises(SettingsError, match="expected three finite numbers"):
-        compare_arms(TASK, [UR5], base=(0.0, float("nan"), 0.0))
     with pytest.raises(ArmError, match="there is no file"):
         compare_arms(TASK, ["none.urdf"])
     with pytest.raises(ArmError, match="is a folder"):
@@ -385,15 +360,7 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
     done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run, "--no-figures", "--price", "panda=15000")
     assert done.returncode == 0, done.stderr
     assert "…" not in done.stdout
-    for word in (
-        "ur5_robot",
-        "panda",
-        "1,500 places",
-        "of the front, dominated by",
-        "panda 15,000.00 USD",
-        "do not include housings",
-        'tip is the link "ee_link"',
-    ):
+    for word in ("ur5_robot", "1,500 places", "dominated by", "panda 15,000.00 USD", 'tip is the link "ee_link"'):
         assert word in done.stdout
     told = json.loads(
         armwright("compare-arms", "task.yaml", UR5, "--run", run, "--base", "0,0.1,0", "--no-figures", "--json").stdout
@@ -403,20 +370,12 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
     turned = armwright("compare-arms", "task.yaml", UR5, "--base", "0,0.1,0,90", "--json").stdout
     assert json.loads(turned)["arms"][0]["yaw"] == pytest.approx(np.pi / 2)
     (run / EXISTING_ARMS).unlink()
-    for args, words in (
-        (("task.yaml", UR5, "--base", "0,0"), '--base "0,0": expected three numbers with commas'),
-        (("task.yaml", UR5, "--base", "0,0,0,nan"), '--base "0,0,0,nan": expected three numbers with commas'),
-        (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),
-        (("task.yaml", UR5, "--price", "ur5"), '--price "ur5": expected ARM=USD'),
-        (
-            ("task.yaml", UR5, "--price", "ur5_robot=1", "--price", "ur5_robot=2"),
-            "expected one price of ur5_robot, got two",
-        ),
-        (("task.yaml", UR5, "--price", "ur5_rob=1e4"), 'unknown arm "ur5_rob". Did you mean "ur5_robot"?'),
-        (("task.yaml", UR5, "--price", "ur5_robot=-1"), "expected a finite number of at least 0 USD, got -1.0"),
-        (("target-1", UR5, "--run", run), "with other targets, another tool or other payloads"),
+    for options, words in (
+        (("--base", "0,0,0,nan"), '--base "0,0,0,nan": expected three numbers with commas'),
+        (("--tip", "tool1"), 'Did you mean "tool0"?'),
+        (("--price", "ur5"), '--price "ur5": expected ARM=USD'),
+        (("--price", "ur5_robot=1", "--price", "ur5_robot=2"), "expected one price of ur5_robot, got two"),
+        (("--price", "ur5_rob=1e4"), 'unknown arm "ur5_rob". Did you mean "ur5_robot"?'),
+        (("--price", "ur5_robot=-1"), "expected a finite number of at least 0 USD, got -1.0"),
     ):
-        done = armwright("compare-arms", *args)
-        assert done.returncode == 2
-        (line,) = done.stderr.strip().splitlines()
-        assert words in line
+        assert words in refused(2, "compare-arms", "task.yaml", UR5, *options)

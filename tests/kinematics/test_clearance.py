@@ -11,14 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from armwright.kinematics.arms.arm_arrays import Precision, stack_arms
-from armwright.kinematics.arms.forward import link_lines
 from armwright.kinematics.contact.clearance import clearances
-from armwright.problem.evaluation import evaluate
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.design_space import paper_space
 from armwright.tasks.obstacles import Box, Cylinder, Ground, Obstacle, Sphere
-from armwright.tasks.tool import Tool
 from tests.support.arms import moving_arms
 
 Array = NDArray[np.float64]
@@ -164,16 +161,16 @@ def test_clearance_of_nearly_parallel_segments_is_accurate() -> None:
     """Arms folded onto themselves, nearly in a plane, make common normals ill-conditioned."""
     rng = np.random.default_rng(0)
     arms = []
-    for _ in range(1500):
+    for _ in range(500):
         lengths = rng.uniform(0.1, 0.3, 3)
         links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in lengths.tolist())
         arms.append(Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", axis, -3.2, 3.2) for axis in ("z", "y", "y")), links))
-    folds = rng.choice([0.0, np.pi / 2, -np.pi / 2, 1.5708, np.pi / 2 + 1e-4], (1500, 1, 3))
+    folds = rng.choice([0.0, np.pi / 2, -np.pi / 2, 1.5708, np.pi / 2 + 1e-4], (500, 1, 3))
     q = folds + rng.choice([0.0, 1e-7, 1e-5, 1e-3], folds.shape)
     own = clearances(stack_arms(arms), q)[0]
     exact = clearances(stack_arms(arms, "float64"), q)[0]
     assert own == pytest.approx(exact, abs=1e-5)
-    for n in range(0, 1500, 15):
+    for n in range(0, 500, 5):
         assert agree(own[n, 0], expected_self(places_of(arms[n], q[n, 0]), [0.01] * 3))
 
 
@@ -196,67 +193,6 @@ def test_penetration_depth_adds_axis_and_radius() -> None:
     square = Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", "y", -3, 3) for _ in links), links)
     folded = np.array([[[0.0, np.pi / 2, np.pi / 2, np.pi / 2]]])  # the last crosses the first
     assert clearances(stack_arms([square]), folded)[0][0, 0] == pytest.approx(-0.04, abs=1e-6)
-
-
-def test_clearance_is_infinite_without_anything_to_hit() -> None:
-    own, clear = clearances(stack_arms(moving_arms(5, 2, 0)), np.zeros((5, 4, 2)))
-    assert own.shape == clear.shape == (5, 4)
-    assert np.all(np.isinf(own))
-    assert np.all(np.isinf(clear))
-    assert np.all(np.isfinite(clearances(stack_arms(moving_arms(5, 3, 0)), np.zeros((5, 4, 3)))[0]))
-
-
-def test_clearance_is_invariant_to_rigid_motion() -> None:
-    rng = np.random.default_rng(2)
-    turn, shift = 1.1, (0.3, -0.2, 0.4)
-    c, s = np.cos(turn), np.sin(turn)
-    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-    def moved(point: Sequence[float]) -> tuple[float, float, float]:
-        x, y, z = (rotation @ point + shift).tolist()
-        return x, y, z
-
-    arms = moving_arms(50, 5, 6)  # whose first joint turns the whole arm as the world is turned
-    arms = [replace(arm, joints=(Joint("revolute", "z", -6.0, 6.0), *arm.joints[1:])) for arm in arms]
-    q = random_postures(arms, 4, 7)
-    boxes = [
-        Box(kind="box", center=tuple(rng.uniform(-1, 1, 3)), size=(0.3, 0.2, 0.1), yaw=float(rng.uniform(-2, 2)))
-        for _ in range(3)
-    ]
-    bars = [
-        Cylinder(kind="cylinder", center=tuple(at), radius=0.05, height=0.5, axis=tuple(axis))
-        for at, axis in zip(rng.uniform(-1, 1, (3, 3)), rng.normal(size=(3, 3)), strict=True)
-    ]
-    ground = Ground(kind="ground", z=-0.5)
-    there = [
-        *(box.model_copy(update={"center": moved(box.center), "yaw": box.yaw + turn}) for box in boxes),
-        *(
-            bar.model_copy(update={"center": moved(bar.center), "axis": tuple(rotation @ np.array(bar.axis))})
-            for bar in bars
-        ),
-        Ground(kind="ground", z=-0.5 + shift[2]),
-    ]
-    before = clearances(stack_arms(arms, "float64"), q, [*boxes, *bars, ground])
-    elsewhere = [replace(arm, base=moved(arm.base)) for arm in arms]
-    after = clearances(stack_arms(elsewhere, "float64"), q + turn * np.eye(5)[0], there)
-    assert np.array(after) == pytest.approx(np.array(before), abs=1e-9)
-
-
-def test_thicker_links_have_less_clearance() -> None:
-    arms = [
-        Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", axis, -3, 3) for axis in ("x", "y", "x", "y", "x")), links)
-        for links in (tuple(uniform_link((0.0, 0.0, 0.3), 1.0, 0.01) for _ in range(5)) for _ in range(100))
-    ]
-    arrays, q = stack_arms(arms), random_postures(arms, 5, 1)
-    obstacles = [random_obstacle(np.random.default_rng(3), kind) for kind in SHAPES]
-    thin = clearances(arrays, q, obstacles)
-    thick = clearances(replace(arrays, radius=arrays.radius + np.float32(0.02)), q, obstacles)
-    assert thick[0] == pytest.approx(thin[0] - 0.04, abs=1e-6), "all of them are far apart along the arm"
-    # The first link begins to count farther from its foot, so another place of it may be the nearest.
-    later = arrays.radius + np.array([0.0, 0.02, 0.02, 0.02, 0.02], dtype=np.float32)
-    rest = clearances(replace(arrays, radius=later), q, obstacles)[1]
-    assert np.all((rest <= thin[1]) & (rest >= thin[1] - 0.02 - 1e-6))
-    assert np.mean(rest < thin[1] - 0.019) > 0.5
 
 
 def test_links_of_no_radius_are_ignored() -> None:
@@ -307,31 +243,6 @@ def test_first_link_may_stand_on_an_obstacle_at_its_base() -> None:
     arm = replace(planar((0.2, 0.3)), base=(0.0, 0.0, 0.0))
     out = clearances(stack_arms([arm]), np.array([[[np.pi / 2, 0.0]]]), wall)[1][0, 0]
     assert out == pytest.approx(0.2 - 0.015), "straight out of a wall"
-
-
-def test_prismatic_and_fixed_joints_place_their_links() -> None:
-    content = {"joints": [2, 5], "joint_types": ["P", "O", "F", "X", "S"], "link_directions": ["+z", "+x"]}
-    space = DesignSpace.model_validate({**content, "mount": ["ceiling"]})
-    designs = [d for d in space.sample(60, 4) if d.joints[0] == "P"]
-    arms = [space.arm(design, Tool(tip=(0.1, 0.0, 0.0))) for design in designs]
-    targets = np.random.default_rng(0).uniform(-0.5, 0.5, (4, 3))
-    ball = Sphere(kind="sphere", center=(0.2, 0.1, 0.3), radius=0.05)
-    evaluation = evaluate(arms, targets, obstacles=[ball])
-    for i, arm in enumerate(arms):
-        for t in range(len(targets)):
-            lines = link_lines(arm, evaluation.q[i, t, : len(arm.joints)])[1:-1]  # without the foot and the tool
-            apart = [segment_distance(np.array(ball.center), *line) - 0.015 - 0.05 for line in lines]
-            first, end = link_lines(arm, evaluation.q[i, t, : len(arm.joints)])[0]
-            beyond = first + (end - first) * min(1.0, 0.03 / np.linalg.norm(end - first))
-            if np.linalg.norm(end - first) > 0.03:
-                apart.append(segment_distance(np.array(ball.center), beyond, end) - 0.015 - 0.05)
-            assert evaluation.obstacle_clearance[i, t] == pytest.approx(min(apart), abs=1e-5)
-
-
-def segment_distance(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    along = end - start
-    share = np.clip((point - start) @ along / max(along @ along, 1e-30), 0.0, 1.0)
-    return float(np.linalg.norm(point - start - share * along))
 
 
 def test_rigidly_connected_links_are_ignored() -> None:

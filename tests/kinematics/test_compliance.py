@@ -70,56 +70,6 @@ def test_displacement_agrees_with_a_frame_program(seed: int) -> None:
         assert np.linalg.norm(found - theirs) < 1e-3 * np.linalg.norm(theirs)
 
 
-def cantilever(mass: float, length: float = 0.5) -> ArmArrays:
-    """A fixed joint and a horizontal link along x."""
-    link = uniform_link((length, 0.0, 0.0), mass, 0.01)
-    return stack_arms([Arm((0.0, 0.0, 0.0), (Joint("fixed", "z"),), (link,))], "float64")
-
-
-def of_parts(arms: ArmArrays, bending: float = np.inf, torsional: float = np.inf, joints: float = np.inf) -> Stiffness:
-    return Stiffness(*(np.full(arms.motion.shape, value) for value in (bending, torsional, joints)))
-
-
-def test_cantilever_has_the_closed_forms() -> None:
-    """P L³ / 3EI under an end load, w L⁴ / 8EI under its own weight (Timoshenko, Strength of Materials I)."""
-    length, stiffness = 0.5, 80.0
-    arms, q = cantilever(mass=0.6, length=length), np.zeros((1, 1, 1))
-    held = sag(arms, q, of_parts(arms, stiffness), payload=2.0, own=False)[0, 0]
-    assert held == pytest.approx([0.0, 0.0, -2.0 * GRAVITY * length**3 / (3.0 * stiffness)], rel=1e-12)
-    own = sag(arms, q, of_parts(arms, stiffness))[0, 0]
-    assert own == pytest.approx([0.0, 0.0, -0.6 / length * GRAVITY * length**4 / (8.0 * stiffness)], rel=1e-12)
-
-
-def test_twisted_link_has_the_closed_form() -> None:
-    """A payload beside the end of a link turns it by P a L / GJ, which lowers the tip by a times that."""
-    length, beside, stiffness = 0.5, 0.2, 30.0
-    link = uniform_link((length, 0.0, 0.0), 0.0, 0.01)
-    tool = MountedTool(tip=(0.0, beside, 0.0))
-    arms = stack_arms([Arm((0.0, 0.0, 0.0), (Joint("fixed", "z"),), (link,), tool)], "float64")
-    found = sag(arms, np.zeros((1, 1, 1)), of_parts(arms, torsional=stiffness), payload=1.5, own=False)[0, 0]
-    assert found == pytest.approx([0.0, 0.0, -1.5 * GRAVITY * beside**2 * length / stiffness], rel=1e-12)
-
-
-def test_joints_turn_and_slides_move_by_their_load_over_stiffness() -> None:
-    link = uniform_link((0.4, 0.0, 0.0), 0.0, 0.01)
-    joints = Joint("prismatic", "z", -0.3, 0.3), Joint("revolute", "y", -1.0, 1.0)
-    arms = stack_arms([Arm((0.0, 0.0, 0.0), joints, (link, link))], "float64")
-    stiffness = Stiffness(*np.full((2, 1, 2), np.inf), np.array([[5000.0, 200.0]]))
-    weight = 3.0 * GRAVITY
-    found = sag(arms, np.zeros((1, 1, 2)), stiffness, payload=3.0, own=False)[0, 0]
-    assert found == pytest.approx([0.0, 0.0, -weight / 5000.0 - weight * 0.4**2 / 200.0], rel=1e-12)
-
-
-def test_rigid_arms_do_not_yield_and_displacement_is_linear_in_load_and_compliance() -> None:
-    arms = stacked(random_arm(3))
-    q = np.random.default_rng(0).uniform(-0.3, 0.3, (1, 4, arms.dof))
-    assert not sag(arms, q, of_parts(arms), 1.0).any()
-    soft = random_stiffness(arms, 3)
-    stiff = Stiffness(2.0 * soft.bending, 2.0 * soft.torsional, 2.0 * soft.joints)
-    assert sag(arms, q, stiff, 1.0) == pytest.approx(sag(arms, q, soft, 1.0) / 2.0)
-    assert sag(arms, q, soft, 3.0, own=False) == pytest.approx(3.0 * sag(arms, q, soft, 1.0, own=False))
-
-
 def test_backlash_error_bounds_every_combination_of_half_backlashes() -> None:
     arms, rng = stacked(random_arm(4)), np.random.default_rng(2)
     q = rng.uniform(-0.3, 0.3, (1, 1, arms.dof)) * (arms.motion < FIXED)
@@ -129,13 +79,6 @@ def test_backlash_error_bounds_every_combination_of_half_backlashes() -> None:
     tips = forward_kinematics(arms, moved).tip[0]
     off = np.linalg.norm(tips - forward_kinematics(arms, q).tip[0], axis=-1).max()
     assert 0.2 * bound < off <= bound * (1.0 + 1e-3)
-
-
-def test_backlash_error_of_one_joint_is_half_its_backlash_times_the_lever() -> None:
-    arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "z", -1.0, 1.0),), (uniform_link((0.35, 0.0, 0.0), 0.1, 0.01),))
-    arms = stack_arms([arm], "float64")
-    found = backlash_errors(arms, forward_kinematics(arms, np.zeros((1, 1, 1))), np.full((1, 1), np.radians(0.25)))
-    assert found[0, 0] == pytest.approx(0.35 * np.radians(0.25) / 2.0)
 
 
 def test_errors_at_full_reach_are_those_of_a_cantilever() -> None:

@@ -13,30 +13,17 @@ from armwright.kinematics.cycle.cycle_loads import BETWEEN, CycleLoads, cycle_lo
 from armwright.kinematics.cycle.cycle_path import INSTANTS, find_paths
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.cycle.torque_terms import torque_terms
-from armwright.robot.arm import Actuator, Arm, Joint, uniform_link
+from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.mjcf import to_mjcf
 from armwright.tasks.payload import Payload
 from armwright.tasks.task import Task
-from tests.support.cycles import Case, own_joints, random_case, tolerated
-from tests.support.exported_arms import Peer, load, moving, peer_of
+from tests.support.cycles import COULOMB, DRIVE, INERTIA, VISCOUS, Case, own_joints, random_case, tolerated
+from tests.support.exported_arms import Peer, carrying_peer, load, moving, peer_of
 from tests.support.reference_kinematics import Array
 
 PAYLOAD = {"mass": 0.8, "center": [0.02, -0.01, 0.05], "size": [0.06, 0.04, 0.1]}
 CASES = [(3, "position"), (4, "axis"), (5, "position"), (6, "axis"), (6, "orientation"), (7, "position")]
 CYCLE: dict[str, Any] = {"picks": True, "payload": PAYLOAD, "dwell": 0.3}
-INERTIA, COULOMB, VISCOUS = 0.02, 0.3, 0.1  # of the rotor [kg m²], [N m], [N m s/rad]
-DRIVE = Actuator(
-    "drive",
-    0.3,
-    60.0,
-    8.0,
-    continuous_torque=20.0,
-    corner_speed=0.0,
-    rotor_inertia=INERTIA,
-    coulomb_friction=COULOMB,
-    viscous_friction=VISCOUS,
-    voltage=24.0,
-)
 
 
 @cache
@@ -57,16 +44,11 @@ def smooth_rows(found: Case) -> list[int]:
     return [row for row in range(len(found.arms)) if not is_sharp(found, row)]
 
 
-def carrying_peer(arm: Arm, payload: Any, carries: bool) -> Peer:
+def loaded_peer(arm: Arm, payload: Any, carries: bool) -> Peer:
     """Pinocchio's model of an arm, with the payload in its tip frame if it carries it."""
-    peer = peer_of(arm)
-    if carries:
-        frame = peer.model.frames[peer.model.getFrameId("tip")]
-        gyration = np.diag(payload.shape.gyration)
-        body = pinocchio.Inertia(payload.mass, np.array(payload.center), payload.mass * gyration)
-        peer.model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
-        peer.data = peer.model.createData()
-    return peer
+    gyration = np.diag(payload.shape.gyration)
+    body = pinocchio.Inertia(payload.mass, np.array(payload.center), payload.mass * gyration)
+    return carrying_peer(arm, body) if carries else peer_of(arm)
 
 
 def rnea(peer: Peer, q: Array, v: Array, a: Array) -> Array:
@@ -99,7 +81,7 @@ def test_torque_terms_agree_with_pinocchio(dof: int, kind: str) -> None:
         for at, row in enumerate(group.index):
             arm = found.arms[row]
             for path, part in zip(group.paths, of_motions, strict=True):
-                peer = carrying_peer(arm, found.task.payload, path.motion.carries)
+                peer = loaded_peer(arm, found.task.payload, path.motion.carries)
                 some = np.linspace(0, len(path.share) - 1, 4).astype(int)
                 q, q_s, q_ss = (own_joints(arm, values[at, some]) for values in (path.q, part.q_s, part.q_ss))
                 still = np.zeros_like(q)
@@ -151,19 +133,6 @@ def test_torques_in_motion_agree_with_mujoco(dof: int, kind: str) -> None:
     assert np.mean(left_out) < 0.5
 
 
-@pytest.mark.parametrize(("dof", "kind"), CASES)
-def test_speeds_integrate_to_the_motion_from_rest_to_rest(dof: int, kind: str) -> None:
-    found = case(dof, kind)
-    of_cycle = loads(found)
-    assert not of_cycle.speeds[:, :, [0, -1]].any()
-    good = np.intersect1d(np.flatnonzero(tolerated(found.paths)), smooth_rows(found))
-    for row in good:
-        for i, path in enumerate(found.paths.of_arm(row)[1]):
-            moved = np.trapezoid(of_cycle.speeds[row, i], dx=of_cycle.durations[row, i] / (INSTANTS - 1), axis=0)
-            change = path.q[0, -1] - path.q[0, 0]
-            assert moved == pytest.approx(change, abs=2e-3 * np.abs(path.q).max() + 1e-6)
-
-
 def test_durations_of_the_motions_of_a_step_add_up_to_its_time() -> None:
     found = random_case(6, "axis", seed=7, time=1.5, approach=0.03, **CYCLE)
     of_cycle = loads(found)
@@ -172,27 +141,6 @@ def test_durations_of_the_motions_of_a_step_add_up_to_its_time() -> None:
         assert len(own) >= 2
         assert of_cycle.durations[:, own].sum(axis=1) == pytest.approx(1.5)
     assert of_cycle.cycle_time == pytest.approx(3 * 1.5 + 2 * 0.3)  # dwells after pick and place
-
-
-def test_drives_add_inertia_and_friction_at_the_joint() -> None:
-    """By hand, of the same path without drives; a joint that does not move has no friction."""
-    found, bare = case(5, "position", driven=True), case(5, "position")
-    of_drives, without = loads(found), loads(bare)
-    assert of_drives.durations == pytest.approx(without.durations)
-    half, signs = INSTANTS // 2, set[float]()
-    for row in smooth_rows(found):
-        arm = found.arms[row]
-        scale = own_joints(arm, found.arrays.travel[[row]])
-        for i, path in enumerate(found.paths.of_arm(row)[1]):
-            if path.q.shape[1] % 2 == 0:  # interpolated half way
-                continue
-            _, v, a = states(arm, path, np.array([0.5]), of_drives.durations[row, i])
-            direction = np.where(np.abs(v) > 1e-6, np.sign(v), 0.0)
-            extra = INERTIA / scale**2 * a + VISCOUS / scale**2 * v + COULOMB / scale * direction
-            added = own_joints(arm, (of_drives.torques - without.torques)[row, i, [half]])
-            assert added == pytest.approx(extra, rel=1e-6, abs=1e-6 * max(1.0, np.abs(extra).max()))
-            signs |= set(direction.ravel().tolist())
-    assert signs == {-1.0, 0.0, 1.0}
 
 
 @pytest.mark.parametrize(("dof", "kind"), CASES)
@@ -208,12 +156,12 @@ def test_rms_torques_agree_with_fine_integration(dof: int, kind: str) -> None:
         motions = found.paths.of_arm(row)[1]
         for i, path in enumerate(motions):
             duration = of_cycle.durations[row, i]
-            peer = carrying_peer(arm, found.task.payload, path.motion.carries)
+            peer = loaded_peer(arm, found.task.payload, path.motion.carries)
             torques = rnea(peer, *states(arm, path, tau, duration))
             total += np.trapezoid(torques**2, dx=duration / 800, axis=0)
             if of_cycle.dwells[i]:
                 after = motions[(i + 1) % len(motions)]
-                rest = carrying_peer(arm, found.task.payload, after.motion.carries)
+                rest = loaded_peer(arm, found.task.payload, after.motion.carries)
                 total += of_cycle.dwells[i] * rest.gravity(own_joints(arm, after.q[0])[0]) ** 2
         expected = np.sqrt(total / of_cycle.cycle_time[row])
         mine = own_joints(arm, of_cycle.rms_torques[[row]])[0]
@@ -233,7 +181,7 @@ def test_dwells_hold_what_was_picked() -> None:
         for i, path in enumerate(found.paths.of_arm(row)[1]):
             carries = path.motion.step == 0  # it arrives with nothing, and picks
             q = own_joints(arm, path.q[0])[-1]
-            expected = carrying_peer(arm, payload, carries).gravity(q)
+            expected = loaded_peer(arm, payload, carries).gravity(q)
             assert own_joints(arm, of_cycle.holding[row, [i]])[0] == pytest.approx(expected, abs=1e-7 * load(arm))
 
 
@@ -244,7 +192,7 @@ def test_open_cycles_dwell_where_they_end() -> None:
     assert of_cycle.dwells.tolist() == [0.3, 0.0]
     arm, (_, motions) = found.arms[0], found.paths.of_arm(0)
     q = own_joints(arm, motions[-1].q[0])[-1]
-    expected = carrying_peer(arm, found.task.payload, carries=False).gravity(q)
+    expected = loaded_peer(arm, found.task.payload, carries=False).gravity(q)
     assert own_joints(arm, of_cycle.holding[[0], -1])[0] == pytest.approx(expected, abs=1e-7 * load(arm))
 
 

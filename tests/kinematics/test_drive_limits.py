@@ -64,7 +64,7 @@ def random_motions(seed: int, samples: int = S, joints: int = D) -> tuple[Motion
     return loads(motors, rng, samples), motors
 
 
-@pytest.mark.parametrize(("samples", "joints"), [(S, D), (3, 2), (2, 1)])
+@pytest.mark.parametrize(("samples", "joints"), [(5, D), (3, 2), (2, 1)])
 def test_least_time_is_the_least_of_all_times(samples: int, joints: int) -> None:
     load, motors = random_motions(samples, samples, joints)
     time = least_time(load, motors)
@@ -77,57 +77,6 @@ def test_least_time_is_the_least_of_all_times(samples: int, joints: int) -> None
     assert not (possible & (TIMES[:, None] < time * (1.0 - 1e-9))).any()
     begins = (np.diff(possible.astype(int), axis=0) == 1).sum(axis=0)
     assert joints > 2 or begins.max() > 1  # some of few joints are possible again after a gap between times
-
-
-def test_least_time_may_be_impossible_at_lower_speeds() -> None:
-    """Friction adds to gravity, inertia helps: the least time is possible, and 1.5 times as much, but 1 s is not."""
-    shape = (1, 1, 1)
-    ratings = np.array([[[2.0, 1.0, 0.0, 100.0, 0.0, 0.5, 0.0, 1.0, 1.0, 0.0, 1.0]]])
-    motors = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
-    load = motion_load(np.full(shape, 1.9), np.full(shape, -0.03), np.ones(shape), np.zeros(shape), motors)
-    (time,) = least_time(load, motors)
-    times = (0.999 * time, time, 1.5 * time, 1.0)
-    assert [can_follow(load, motors, np.array([each]), 1e-9)[0] for each in times] == [False, True, True, False]
-
-
-def test_least_time_is_found_between_times_that_are_excluded() -> None:
-    """The first joint alone could do it in 1 s; the second excludes all times from 0.14 to 21.8 s."""
-    ratings = np.tile([2.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0], (1, 2, 1)).astype(float)
-    motors = actuation_at_joints(ratings, np.ones((1, 2)), np.zeros(1), np.ones(1))
-    gravity, inertial = np.array([[[0.0, -1.9]]]), np.array([[[0.0, 0.0]]])
-    load = motion_load(gravity, inertial, np.array([[[1.0, 0.0]]]), np.zeros((1, 1, 2)), motors)
-    assert least_time(load, motors) == pytest.approx([1.0])  # by the speed of the first
-    excluded = replace(load, viscous=np.array([[[0.0, -2.2]]]), inertial=np.array([[[0.0, 0.3]]]))
-    (time,) = least_time(excluded, motors)
-    assert time == pytest.approx(2.0 * 0.3 / (2.2 - np.sqrt(2.2**2 - 4.0 * 0.3 * 0.1)))  # 0.3 / T² - 2.2 / T + 0.1 = 0
-    assert can_follow(excluded, motors, np.array([time]), slack=1e-9)[0]
-
-
-def test_arms_that_cannot_hold_themselves_have_no_least_time() -> None:
-    load, motors = random_motions(7)
-    heavy = replace(load, gravity=np.where(np.arange(S)[:, None] == 4, 3.0 * motors.peak[:, None], load.gravity))
-    assert np.isinf(least_time(heavy, motors)).all()
-
-
-def test_stronger_motors_are_not_slower() -> None:
-    load, motors = random_motions(11)
-    time = least_time(load, motors)
-    assert (least_time(load, replace(motors, peak=2.0 * motors.peak)) <= time).all()
-    assert (least_time(load, replace(motors, safety_factor=2.0 * motors.safety_factor)) >= time).all()
-
-
-def test_least_time_of_a_slide_is_that_of_its_motor() -> None:
-    """Torque, speed and inertia at the joint instead of at the motor: the same motion takes the same time."""
-    load, motors = random_motions(13)
-    travel = 0.02
-    joint = actuation_at_joints(
-        np.stack([motors.peak, motors.continuous, motors.corner_speed, motors.no_load_speed, motors.rotor_inertia,
-                  motors.coulomb, motors.viscous, motors.voltage, motors.current, motors.backlash,
-                  motors.joint_stiffness], axis=-1),
-        np.full((N, D), travel), motors.price, motors.safety_factor,
-    )  # fmt: skip
-    force = (load.gravity / travel, load.coulomb / travel, load.viscous / travel, load.inertial / travel)
-    assert least_time(MotionLoad(*force, load.velocity * travel), joint) == pytest.approx(least_time(load, motors))
 
 
 def test_fixed_joints_do_not_limit_a_motion() -> None:
@@ -178,21 +127,6 @@ def test_utilisation_is_at_most_1_where_the_torque_is_available() -> None:
     assert np.array_equal(use <= 1.0, required <= available)
     at_rest = torque_speed_utilisation(torque, np.zeros_like(velocity), motors)
     assert np.array_equal(at_rest, required / motors.peak[:, None])
-
-
-def test_a_limit_is_reached_in_the_least_time() -> None:
-    load, motors = random_motions(19)
-    time = least_time(load, motors)
-    finite = np.flatnonzero(np.isfinite(time))
-    part = [MotionLoad(*(each[i : i + 1] for each in vars(load).values())) for i in finite]
-    for i, one in zip(finite, part, strict=True):
-        velocity = one.velocity / time[i]
-        use = torque_speed_utilisation(one.torque(time[i : i + 1]), velocity, motors[i : i + 1])
-        speed = np.abs(velocity) / motors.no_load_speed[i]
-        assert max(use.max(), speed.max()) == pytest.approx(1.0)
-
-
-# TOPP-RA
 
 
 def quintic(n: int) -> tuple[Array, Array, Array]:

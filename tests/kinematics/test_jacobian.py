@@ -1,7 +1,6 @@
-"""Manipulability and dexterity against Pinocchio, scikit-robot and a closed form."""
+"""Manipulability and dexterity against Pinocchio and scikit-robot."""
 
 import numpy as np
-import pinocchio
 import pytest
 from numpy.typing import NDArray
 from skrobot.coordinates.math import manipulability
@@ -12,12 +11,11 @@ from armwright.kinematics.arms.jacobian import jacobians
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
-from armwright.robot.arm import Arm, Joint, uniform_link
-from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.arm_builder import stack_designs
+from armwright.robot.arm import Arm
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.catalogue import load_task
 from tests.support.arms import general_arms, moving_arms
+from tests.support.exported_arms import peer_of
 
 Array = NDArray[np.float64]
 SLIDING = DesignSpace.model_validate(
@@ -42,28 +40,20 @@ def test_jacobian_agrees_with_pinocchio(arms: list[Arm]) -> None:
     q = postures(arms, 3, stacked.dof)
     ours, frames = jacobians(stacked, q), forward_kinematics(stacked, q)
     for i, arm in enumerate(arms):
-        model = pinocchio.buildModelFromXML(to_urdf(arm))
-        data = model.createData()
+        peer = peer_of(arm)
         moving = [j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"]
         for t in range(3):
-            tip = model.getFrameId("tip")
-            theirs = pinocchio.computeFrameJacobian(
-                model, data, q[i, t, moving], tip, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            )[:3]
-            assert ours[i, t][:, moving] == pytest.approx(np.reshape(theirs, (3, -1)), abs=1e-9)
+            assert ours[i, t][:, moving] == pytest.approx(peer.jacobian(q[i, t, moving])[:3], abs=1e-9)
             assert not ours[i, t][:, [j for j in range(stacked.dof) if j not in moving]].any()
-            assert frames.tip[i, t] == pytest.approx(data.oMf[tip].translation, abs=1e-9)
+            assert frames.tip[i, t] == pytest.approx(peer.tip(q[i, t, moving])[:3, 3], abs=1e-9)
 
 
 def test_manipulability_and_dexterity_follow_from_singular_values() -> None:
     arms = moving_arms(30, 6, 5)
     evaluation = evaluate(arms, np.random.default_rng(0).uniform(-0.6, 0.6, (4, 3)))
     for i, arm in enumerate(arms):
-        model = pinocchio.buildModelFromXML(to_urdf(arm))
-        data, tip = model.createData(), model.getFrameId("tip")
         for t in range(4):
-            q = evaluation.q[i, t]
-            j = pinocchio.computeFrameJacobian(model, data, q, tip, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)[:3]
+            j = peer_of(arm).jacobian(evaluation.q[i, t])[:3]
             assert evaluation.manipulability[i, t] == pytest.approx(np.sqrt(np.linalg.det(j @ j.T)), rel=1e-4, abs=1e-7)
             assert evaluation.dexterity[i, t] == pytest.approx(1.0 / np.linalg.cond(j), rel=1e-3, abs=1e-6)
 
@@ -74,29 +64,10 @@ def test_manipulability_agrees_with_scikit_robot() -> None:
     assert evaluation.manipulability[:, 0] == pytest.approx(theirs, rel=1e-6, abs=1e-9)
 
 
-def test_planar_arm_has_the_closed_form_manipulability() -> None:
-    """With a joint about z below them: w = a b |sin elbow| times the tip's distance from that axis."""
-    a, b = 0.3, 0.2
-    links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in (0.1, a, b))
-    joints = tuple(Joint("revolute", axis, -3.1, 3.1) for axis in ("z", "y", "y"))
-    whole, planar = Arm((0.0, 0.0, 0.0), joints, links), Arm((0.0, 0.0, 0.1), joints[1:], links[1:])
-    evaluation = evaluate([whole], [[0.2, 0.15, 0.3], [0.3, -0.1, 0.2], [2.0, 0.1, 0.3]])
-    elbow, reached = evaluation.q[0, :, 2], evaluation.reached[0]
-    expected = a * b * np.abs(np.sin(elbow)) * np.hypot(reached[:, 0], reached[:, 1])
-    assert evaluation.manipulability[0] == pytest.approx(expected, abs=1e-6)
-    (anisotropy,) = named_objectives(["anisotropy"])
-    assert anisotropy(evaluation)[0] > 0.95, "a stretched arm, which misses its target, cannot go farther"
-    assert anisotropy(evaluate([planar], [[0.2, 0.0, 0.3]]))[0] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_anisotropy_is_of_the_worst_target_and_computed_on_demand() -> None:
+def test_anisotropy_is_of_the_worst_target() -> None:
     space, task = paper_space(5), load_task("shelf").model_copy(update={"reference_point": None})
     problem = Problem(task, space, objectives=named_objectives(["anisotropy", "position_error"]))
     designs = space.sample(20, 3)
     evaluation = problem.physics(designs)
     assert problem.evaluate(designs).values[:, 0] == pytest.approx((1.0 - evaluation.dexterity).max(axis=1))
     assert np.all((evaluation.dexterity >= 0.0) & (evaluation.dexterity <= 1.0))
-    plain = Problem(task, space).physics(designs)
-    Problem(task, space).outcomes(plain)
-    assert "_singular_values" not in vars(plain)
-    assert stack_designs(space, space.matrix(designs)).precision == "float32"

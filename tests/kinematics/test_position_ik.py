@@ -10,22 +10,20 @@ from itertools import pairwise
 
 import mujoco
 import numpy as np
-import pinocchio
 import pytest
 
 from armwright.exceptions import ArmError, SettingsError
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.ik import ik as solve
 from armwright.kinematics.ik.ik import Postures
-from armwright.robot.arm import Arm, Joint, Link, uniform_link
+from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.spaces.parameters import Design
 from armwright.tasks.catalogue import load_task
 from tests.support import reference_kinematics as reference
 from tests.support.arms import general_arms, paper_arms
+from tests.support.exported_arms import Peer
 from tests.support.moving_joints import moving, solve_postures, update_once
-from tests.support.reference_kinematics import Array, Chains
+from tests.support.reference_kinematics import Array, Chains, random_states
 
 MAKERS = pytest.mark.parametrize("arms_of", [paper_arms, general_arms])
 DOFS = pytest.mark.parametrize("dof", range(1, 9))
@@ -88,38 +86,8 @@ def test_reference_agrees_with_pinocchio_and_mujoco(dof: int, arms_of: ArmMaker)
         for peer in (PinocchioArm(arm), MujocoArm(arm)):
             peer_tip, peer_torque = peer.tip_and_torque(q[i, 0])
             assert np.abs(peer_tip - tip[i]).max() < 1e-9  # the URDF's numbers have ten digits
-            assert np.abs(peer.jacobian(q[i, 0]) - jacobian[i]).max() < 1e-9
+            assert np.abs(peer.jacobian(q[i, 0])[:3] - jacobian[i]).max() < 1e-9
             assert np.abs(peer_torque - torque[i]).max() < 1e-8 * load(arm)
-
-
-def test_kernel_torque_is_the_gradient_of_potential_energy() -> None:
-    """The kernels' torque against finite differences of the reference's energy, general arms: +dV/dq."""
-    arms = general_arms(200, 4, 4)
-    chains = reference.chains(arms)
-    postures = solve_postures(stack_arms(arms), np.array([[0.3, -0.2, 0.4]]))
-    q = np.float64(postures.q)
-    for j in range(4):
-        step = 1e-5 * np.eye(4)[j]
-        dv = (reference.potential_energy(chains, q + step) - reference.potential_energy(chains, q - step)) / 2e-5
-        assert np.abs(dv - postures.torque[..., j]).max() < 1e-4
-
-
-def test_planar_two_link_arm() -> None:
-    """Two pitch joints in the xz-plane: tip and torque in closed form; what they can reach is reached."""
-    (l1, m1), (l2, m2) = (0.3, 0.8), (0.2, 0.5)
-    joints = (Joint("revolute", "y", -2.4, 2.4),) * 2
-    arm = Arm((0.0, 0.0, 0.0), joints, (uniform_link((0, 0, l1), m1, 0.015), uniform_link((0, 0, l2), m2, 0.015)))
-    a1, a2 = np.meshgrid(np.linspace(-1.5, 1.5, 9), np.array([-1.8, -1.2, -0.7, 0.7, 1.2, 1.8]))
-    x, z = l1 * np.sin(a1) + l2 * np.sin(a1 + a2), l1 * np.cos(a1) + l2 * np.cos(a1 + a2)
-    targets = np.stack([x, np.zeros_like(x), z], axis=-1).reshape(-1, 3)
-    postures = solve_postures(stack_arms([arm]), targets)
-    q1, q2 = np.float64(postures.q[0]).T
-    tip = np.stack([l1 * np.sin(q1) + l2 * np.sin(q1 + q2), 0 * q1, l1 * np.cos(q1) + l2 * np.cos(q1 + q2)], axis=-1)
-    torque_2 = -9.81 * m2 * l2 / 2 * np.sin(q1 + q2)
-    torque_1 = -9.81 * (m1 * l1 / 2 + m2 * l1) * np.sin(q1) + torque_2
-    assert np.abs(postures.reached[0] - tip).max() < 1e-6
-    assert np.abs(postures.torque[0] - np.stack([torque_1, torque_2], axis=-1)).max() < 1e-5
-    assert error_of(postures, targets).max() < 1e-3
 
 
 # Single updates of the inverse kinematics
@@ -165,19 +133,6 @@ def test_single_updates_in_float64_agree_with_the_reference(dof: int, arms_of: A
     assert np.abs((h_after - expected_h[:, 0]) / (1.0 + expected_h[:, 0])).max() < 1e-12
 
 
-def random_states(chains: Chains, seed: int) -> tuple[Array, Array, Array]:
-    """q, H before and targets, all (N, 1, ...) and exact in float32.
-
-    H before is 0 to 0.9 or 1.1 to 3 times the present H: the branch H >= H before is never a matter of rounding.
-    """
-    rng = np.random.default_rng(seed)
-    q = np.float64(np.float32(rng.uniform(chains.lower, chains.upper)))
-    factor = np.where(rng.random(q.shape) < 0.5, rng.uniform(0.0, 0.9, q.shape), rng.uniform(1.1, 3.0, q.shape))
-    h_before = np.float64(np.float32(reference.limit_gradient(chains, q) * factor))
-    targets = np.float64(np.float32(chains.base + rng.uniform(-1.0, 1.0, (*q.shape[:2], 3))))
-    return q, h_before, targets
-
-
 def least_root(chains: Chains, q: Array, h_before: Array) -> Array:
     """(N, T) root of the least eigenvalue of J W Jᵀ + k I [m]: the smaller, the more an error of J counts."""
     J, h = reference.jacobian(chains, q), reference.limit_gradient(chains, q)
@@ -211,42 +166,6 @@ def test_whole_solves_in_float64_agree_with_the_reference(arms_of: ArmMaker) -> 
     assert agreeing(solved.reached, all_of_them.reached) > inherent - 0.06
     assert np.abs(reference.tip(chains, solved.q) - solved.reached).max() < 1e-14
     assert np.all((chains.lower <= solved.q) & (solved.q <= chains.upper))
-
-
-@pytest.mark.parametrize(
-    ("dof", "bound"),
-    [
-        (1, 1e-5),
-        (2, 1e-5),
-        (3, 1e-3),
-        pytest.param(6, 3e-3, marks=pytest.mark.slow),
-        pytest.param(8, 3e-3, marks=pytest.mark.slow),
-    ],
-)
-def test_solves_of_any_joint_count_agree_in_distribution(dof: int, bound: float) -> None:
-    """400 general arms each, 3 targets: the mean errors differ by less than `bound` times the straight start's.
-
-    With one and two joints nothing is chaotic; with six and eight much is.
-    """
-    arms, targets = general_arms(400, dof, 7), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1], [0.0, -0.4, -0.5]])
-    arrays, chains = stack_arms(arms), reference.chains(arms)
-    start = error_of(solve_postures(arrays, targets, updates=0), targets)
-    ours = error_of(solve_postures(arrays, targets), targets)
-    assert abs(ours.mean() - reference.solve(chains, targets).error.mean()) < bound * start.mean()
-
-
-def test_best_posture_respects_limits_and_its_torque() -> None:
-    """reached = FK(q); limits kept; never farther than the straight start; the torque is that of the posture."""
-    for arms in (paper_arms(2000, 4, 9), general_arms(2000, 6, 9)):
-        targets = np.random.default_rng(9).uniform(-0.8, 0.8, (3, 3))
-        chains, postures = reference.chains(arms), solve_postures(stack_arms(arms), targets)
-        q = np.float64(postures.q)
-        assert np.abs(reference.tip(chains, q) - postures.reached).max() < 1e-5
-        assert np.all((chains.lower <= q) & (q <= chains.upper))
-        start = np.linalg.norm(targets - reference.tip(chains, np.zeros_like(q)), axis=-1)
-        assert np.all(error_of(postures, targets) <= start + 1e-6)
-        scale = np.array([load(arm) for arm in arms])[:, None, None]
-        assert np.abs((reference.gravity_torque(chains, q) - postures.torque) / scale).max() < 1e-5
 
 
 def test_more_updates_never_increase_the_error() -> None:
@@ -330,41 +249,6 @@ def test_initial_q_broadcasts_and_is_clipped_to_limits() -> None:
         assert np.array_equal(q, np.broadcast_to(start, q.shape).astype(np.float32))
 
 
-# Symmetries
-
-
-def turned_design(space: DesignSpace, design: Design) -> Design:
-    """Turned by 90° about z: x -> y, y -> -x. R becomes P; P becomes R that turns the other way; Y stays Y."""
-    x, y, z = design.origin
-    return space.clipped((-y, x, z), design.joints.translate(str.maketrans("RP", "PR")), design.links)
-
-
-def turned_points(points: Array) -> Array:
-    return np.stack([-points[..., 1], points[..., 0], points[..., 2]], axis=-1)
-
-
-def test_result_rotates_with_the_world() -> None:
-    """Turned by 90°, R and P change places: single updates within 1e-4 rad, whole solves in distribution."""
-    space = paper_space()
-    designs = space.sample(2000, 14)
-    turned = [turned_design(space, design) for design in designs]
-    arrays, turned_arrays = (stack_arms([space.arm(design) for design in group]) for group in (designs, turned))
-    sign = np.array([[-1.0 if kind == "P" else 1.0 for kind in design.joints] for design in designs])
-
-    chains = reference.chains([space.arm(design) for design in designs])
-    q, h_before, targets = (values[:, 0] for values in random_states(chains, seed=14))
-    after, _ = update_once(arrays, targets, q.astype(np.float32), h_before.astype(np.float32))
-    turned_q = (q * sign).astype(np.float32)
-    turned_after, _ = update_once(turned_arrays, turned_points(targets), turned_q, h_before.astype(np.float32))
-    assert np.abs(turned_after - after * sign).max() < 1e-4
-
-    points = load_task("target-3").target_positions
-    plain, other = solve_postures(arrays, points), solve_postures(turned_arrays, turned_points(points))
-    assert abs(error_of(other, turned_points(points)).mean() / error_of(plain, points).mean() - 1.0) < 5e-3
-    norms = [np.linalg.norm(postures.torque, axis=-1).mean() for postures in (plain, other)]
-    assert abs(norms[1] / norms[0] - 1.0) < 5e-3
-
-
 # What the kernels refuse
 
 
@@ -410,59 +294,17 @@ def test_zero_outside_the_limits_is_clipped() -> None:
     assert np.array_equal(solve_postures(arrays, np.zeros((1, 3)), 0).q[0, 0], np.float32([0.5, -0.25, 0.1]))
 
 
-def test_sixteen_joints_and_full_turn_limits_are_accepted() -> None:
-    joints = [Joint("revolute", "y", -2 * np.pi, 2 * np.pi)] * 15 + [Joint("fixed", "x")]
-    links = (uniform_link((0.0, 0.0, 0.1), 0.1, 0.015),) * 16
-    arrays = stack_arms([Arm((0.0, 0.0, 0.0), tuple(joints), links)])
-    assert arrays.dof == 16
-    assert np.isfinite(solve_postures(arrays, np.array([[0.3, 0.0, 0.3]])).torque).all()
-
-
-def test_float32_limits_are_never_wider() -> None:
-    """float32(2.4) is 1e-7 more than 2.4: rounded to the inside, so that no kept angle is beyond its limit."""
-    for arms in (paper_arms(1, 4, 15), general_arms(100, 5, 15)):
-        arrays, chains = stack_arms(arms), reference.chains(arms)
-        assert np.all(arrays.lower >= chains.lower[:, 0])
-        assert np.all(arrays.upper <= chains.upper[:, 0])
-        assert np.abs(arrays.upper - chains.upper[:, 0]).max() < 1e-6
-        wide = stack_arms(arms, "float64")
-        assert np.array_equal(wide.lower, chains.lower[:, 0])
-        assert np.array_equal(wide.upper, chains.upper[:, 0])
-
-
-def test_fixed_joints_merge_their_links() -> None:
-    """An arm cut into pieces by fixed joints moves and weighs the same; what stands before joint 1 only lifts it."""
-    joint = Joint("revolute", "y", -2.0, 2.0)
-    fixed = Joint("fixed", "z")
-    half = uniform_link((0.1, 0.0, 0.2), 0.5, 0.015)
-    whole = uniform_link((0.2, 0.0, 0.4), 1.0, 0.015)
-    pedestal = Link((0.0, 0.0, 0.3), 7.0, (0.0, 0.0, 0.1), 0.05)
-    pieces = Arm((0.0, 0.0, 0.0), (fixed, joint, fixed, joint, fixed), (pedestal, half, half, half, half))
-    plain = Arm((0.0, 0.0, 0.3), (joint, joint), (whole, whole))
-    targets = np.array([[0.4, 0.0, 0.6], [0.1, 0.2, 0.9]])
-    cut, uncut = (solve_postures(stack_arms([arm]), targets) for arm in (pieces, plain))
-    for name in ("q", "reached", "torque"):
-        assert np.abs(getattr(cut, name) - getattr(uncut, name)).max() < 1e-5
-
-
 # Peers
 
 
-class PinocchioArm:
+class PinocchioArm(Peer):
     """An arm in Pinocchio, from its URDF."""
 
     def __init__(self, arm: Arm) -> None:
-        self.model = pinocchio.buildModelFromXML(to_urdf(arm))
-        self.data = self.model.createData()
+        super().__init__(to_urdf(arm))
 
     def tip_and_torque(self, q: Array) -> tuple[Array, Array]:
-        torque = pinocchio.computeGeneralizedGravity(self.model, self.data, q).copy()
-        pinocchio.framesForwardKinematics(self.model, self.data, q)
-        return self.data.oMf[self.model.getFrameId("tip")].translation.copy(), torque
-
-    def jacobian(self, q: Array) -> Array:
-        frame, reference_frame = self.model.getFrameId("tip"), pinocchio.LOCAL_WORLD_ALIGNED
-        return pinocchio.computeFrameJacobian(self.model, self.data, q, frame, reference_frame).reshape(6, -1)[:3]
+        return self.tip(q)[:3, 3], self.gravity(q)
 
 
 class MujocoArm:

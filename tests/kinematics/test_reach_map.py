@@ -15,8 +15,8 @@ from armwright.kinematics.reach.reachable_poses import PoseSearch, Tolerances, s
 from armwright.robot.arm import Actuator, Arm, Joint, MountedTool, uniform_link
 from armwright.rotations import cone_directions
 from armwright.tasks.obstacles import Ground
-from tests.support.arms import moving_arms, paper_arms
-from tests.support.exported_arms import moving, odd_arms, peer_of
+from tests.support.arms import paper_arms
+from tests.support.exported_arms import peer_of
 from tests.support.robots import robot
 
 ROUNDING = 1e-5  # [m] or [rad] of float32 kinematics
@@ -37,23 +37,6 @@ def wrist_arm(upper: float, fore: float, hand: float, actuator: Actuator | None 
     lengths = (0.0, upper, fore, 0.0, 0.0, hand)
     links = tuple(uniform_link((0.0, 0.0, length), 0.5 if length else 0.0, 0.02) for length in lengths)
     return Arm((0.0, 0.0, 0.0), joints, links)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("arm", [*paper_arms(1, 6, 3), *moving_arms(1, 7, 1), odd_arms(3, 6, 2)[2]])
-def test_postures_are_at_their_poses_by_pinocchio(arm: Arm) -> None:
-    found = aw.reach_map(arm, spacing=arm.reach / 8, n_directions=12, axis=(1, 0, -1), half_angle=1.0)
-    peer, own = peer_of(arm), [number - 1 for number, _ in moving(arm)]
-    assert found.bare.reached.any()
-    assert np.array_equal(np.isnan(found.bare.q).any(axis=-1), ~found.bare.reached)
-    for point, direction in np.argwhere(found.bare.reached)[::17]:
-        q = found.bare.q[point, direction]
-        for index in own:
-            assert arm.joints[index].lower <= q[index] <= arm.joints[index].upper
-        tip = peer.tip(q[own])
-        assert np.linalg.norm(tip[:3, 3] - found.points[point]) < 1e-3 + ROUNDING
-        assert np.linalg.norm(np.cross(tip[:3, 2], found.directions[direction])) < 1e-3 + ROUNDING
-        assert tip[:3, 2] @ found.directions[direction] > 0.0
 
 
 def test_postures_of_a_urdf_are_those_of_its_joints() -> None:
@@ -127,9 +110,6 @@ def test_directions_fill_their_cone_evenly() -> None:
     assert cone_directions((0.0, 2.0, 0.0), 1.0, 1).tolist() == [[0.0, 1.0, 0.0]]
 
 
-# Conditions
-
-
 def test_usable_poses_keep_links_above_the_ground() -> None:
     arm = wrist_arm(0.4, 0.3, 0.1)
     arm = replace(arm, base=(0.0, 0.0, 0.2))
@@ -147,17 +127,6 @@ def test_usable_poses_keep_links_above_the_ground() -> None:
         assert min(tip[2, 3], wrist[2]) > 0.02 - ROUNDING, "the link's radius"
 
 
-@pytest.mark.slow
-def test_usable_poses_hold_the_payload() -> None:
-    strong, weak = (wrist_arm(0.4, 0.3, 0.1, Actuator("motor", 0.1, torque, 5.0)) for torque in (1e3, 9.0))
-    options: dict[str, Any] = {"spacing": 0.3, "n_directions": 12}
-    found = aw.reach_map(strong, payload=1.0, **options)
-    assert np.array_equal(found.usable.reached, found.bare.reached)
-    shares = [aw.reach_map(weak, payload=payload, **options).usable for payload in (0.0, 0.5, 1.0)]
-    assert shares[0].volume > shares[1].volume > shares[2].volume > 0.0
-    assert not aw.reach_map(weak, payload=1e3, **options).usable.reached[:, 0].all()
-
-
 def test_held_payloads_agree_with_pinocchio() -> None:
     arm = wrist_arm(0.4, 0.3, 0.1, Actuator("motor", 0.0, 9.0, 5.0))
     found = aw.reach_map(arm, payload=0.5, spacing=0.25, n_directions=12)
@@ -167,21 +136,14 @@ def test_held_payloads_agree_with_pinocchio() -> None:
         assert np.abs(peer.gravity(found.usable.q[point, direction])).max() <= 9.0 + 1e-3
 
 
-# Faults
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"axis": (0, 0, 0)}, "axis: expected a direction x, y, z"),
         ({"half_angle": 4.0}, "half_angle = 4.0: expected 0 to π rad"),
-        ({"n_directions": 0}, "n_directions = 0: expected 1 to 1000"),
         ({"spacing": 0.0}, "spacing = 0.0: expected more than 0 m"),
         ({"spacing": 0.001}, "try a larger spacing than 0.001 m"),
         ({"box": [(0, 0, 1), (1, 1, 0)]}, "box: expected .* with low <= high"),
-        ({"payload": -1.0}, "payload = -1.0: expected 0 to 10000 kg"),
-        ({"clearance": -0.1}, "clearance = -0.1: expected 0 m or more"),
-        ({"tolerance": 0.0}, "expected tolerance > 0 m"),
     ],
 )
 def test_arguments_out_of_range_are_refused(options: dict[str, Any], message: str) -> None:

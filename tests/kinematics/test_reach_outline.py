@@ -1,7 +1,5 @@
 """The outline of the reach, against closed forms and Pinocchio's kinematics of random postures."""
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio
 import pytest
@@ -49,16 +47,8 @@ def test_no_posture_of_pinocchio_is_outside(arm: Arm, view: tuple[int, int]) -> 
     data, frame = model.createData(), model.getFrameId("tip")
     rng = np.random.default_rng(3)
     outline, base = radii(arm, view), np.array([arm.base[axis] for axis in view])
-    for q in rng.uniform(model.lowerPositionLimit, model.upperPositionLimit, (2000, model.nq)):
+    for q in rng.uniform(model.lowerPositionLimit, model.upperPositionLimit, (500, model.nq)):
         pinocchio.framesForwardKinematics(model, data, q)
         x, y = data.oMf[frame].translation[list(view)] - base
         sector = min(int((np.arctan2(y, x) + np.pi) / (2.0 * np.pi) * N_SECTORS), N_SECTORS - 1)
         assert np.hypot(x, y) <= 1.02 * outline[sector]
-
-
-def test_outline_is_the_same_each_time_and_moves_with_the_base() -> None:
-    arm = planar(-2.0, 2.0)
-    assert reach_outline(arm, SIDE) == reach_outline(arm, SIDE)
-    moved = replace(arm, base=(1.4, 0.8, -0.7))
-    there = np.array(reach_outline(moved, SIDE).points) - (1.0, -1.0)
-    assert there == pytest.approx(np.array(reach_outline(arm, SIDE).points), abs=1e-3)

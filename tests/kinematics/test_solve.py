@@ -119,13 +119,6 @@ def test_results_are_those_of_evaluate() -> None:
         assert np.array_equal(solutions.reached, ~evaluation.unreached)
 
 
-def test_arms_of_different_lengths_are_padded_with_zeros() -> None:
-    short, long = (paper_arms(1, dof, 7)[0] for dof in (3, 6))
-    q = aw.solve([short, long], [[0.2, 0.1, 0.3]]).q
-    assert q.shape == (2, 1, 6)
-    assert not q[0, :, 3:].any()
-
-
 @pytest.mark.parametrize("name", ["ur5_robot", "panda"])
 def test_values_of_a_urdf_are_those_of_its_joints(name: str) -> None:
     """Pinocchio reads the file itself; joints that are not in the chain stay at 0."""
@@ -160,21 +153,14 @@ GOOD = [[0.2, 0.1, 0.3]]
     ("arguments", "message"),
     [
         ({"positions": [0.2, 0.1, 0.3]}, r"positions: expected shape \(n, 3\), n >= 1, got \(3,\)"),
-        ({"positions": np.empty((0, 3))}, r"got \(0, 3\)"),
-        ({"positions": [["a", 0, 0]]}, "positions: expected numbers"),
         ({"positions": [*GOOD, [0.1, np.nan, 0.0]]}, "positions: row 1 is not finite"),
         ({"axes": [[0, 0, 1], [0, 0, 1]]}, r"axes: expected shape \(1, 3\)"),
         ({"axes": [[0, 0, 0]]}, "axes: row 0 has no direction"),
         ({"orientations": [[0, 0, 0, 1]]}, r"orientations: expected shape \(1, 3, 3\).* got \(1, 4\)"),
         ({"orientations": [2 * np.eye(3)]}, "orientations: expected rotation matrices"),
-        ({"orientations": [np.diag([1, 1, -1])]}, "orientations: expected rotation matrices"),
         ({"axes": GOOD, "orientations": [np.eye(3)]}, "expected axes or orientations, got both"),
-        ({"tolerance": 0.0}, "expected tolerance > 0 m"),
         ({"angle_tolerance": np.nan}, "angle_tolerance"),
-        ({"restarts": -1}, "restarts = -1 is below 0"),
-        ({"arms": []}, "at least one arm"),
         ({"arms": ["ur5.urdf"]}, r"expected arms, got 'ur5.urdf'; try aw.read_urdf"),
-        ({"arms": "ur5.urdf"}, "try aw.read_urdf"),
     ],
 )
 def test_wrong_arguments_are_named(arguments: dict[str, object], message: str) -> None:

@@ -1,6 +1,5 @@
 """Currents from the supply, by hand and by the balance of energy."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,23 +12,8 @@ from armwright.kinematics.cycle.supply import supply_currents
 from armwright.kinematics.cycle.torque_terms import torque_terms
 from armwright.robot.actuators import catalogue, value_of
 from armwright.robot.arm import Actuator
-from tests.support.cycles import Case, random_case, tolerated
+from tests.support.cycles import CURRENT, DRIVE, PEAK, VOLTAGE, Case, random_case, tolerated
 from tests.support.reference_kinematics import Array
-
-PEAK, VOLTAGE, CURRENT = 60.0, 24.0, 5.0  # [N m], [V], [A]
-COULOMB, VISCOUS = 0.3, 0.1  # [N m], [N m s/rad]
-DRIVE = Actuator(
-    "drive",
-    0.3,
-    PEAK,
-    8.0,
-    corner_speed=0.0,
-    rotor_inertia=0.02,
-    coulomb_friction=COULOMB,
-    viscous_friction=VISCOUS,
-    voltage=VOLTAGE,
-    current=CURRENT,
-)
 
 
 def drives_of(*actuators: Actuator, travel: float = 1.0) -> Actuation:
@@ -58,16 +42,6 @@ def test_at_rest_at_the_peak_torque_a_drive_draws_its_current(name: str) -> None
     assert found.mean[0] == pytest.approx(current)
 
 
-def test_motion_adds_mechanical_power_and_braking_returns_none() -> None:
-    loss = CURRENT * 0.5**2
-    half = PEAK / 2.0
-    for speed, power in ((4.0, half * 4.0), (-4.0, 0.0)):
-        found = supply_currents(constant([half], [speed], [0.0]), drives_of(DRIVE))
-        assert found.peak[0] == pytest.approx(power / VOLTAGE + loss)
-    both = supply_currents(constant([half, half], [4.0, -4.0], [0.0, 0.0]), drives_of(DRIVE, DRIVE))
-    assert both.peak[0] == pytest.approx(half * 4.0 / VOLTAGE + 2.0 * loss)
-
-
 def test_dwells_count_by_their_time_with_the_holding_torque() -> None:
     found = supply_currents(constant([30.0], [2.0], [15.0], time=3.0, dwell=1.0), drives_of(DRIVE))
     moving, resting = 60.0 / VOLTAGE + CURRENT * 0.25, CURRENT * 0.0625
@@ -75,15 +49,6 @@ def test_dwells_count_by_their_time_with_the_holding_torque() -> None:
     assert found.mean[0] == pytest.approx((3.0 * moving + resting) / 4.0)
     heavy = supply_currents(constant([0.0], [0.0], [PEAK], dwell=1.0), drives_of(DRIVE))
     assert heavy.peak[0] == pytest.approx(CURRENT)
-
-
-def test_slides_draw_what_their_motors_draw() -> None:
-    travel = 0.01
-    motor = supply_currents(constant([20.0], [3.0], [10.0], dwell=1.0), drives_of(DRIVE))
-    slide = supply_currents(
-        constant([20.0 / travel], [3.0 * travel], [10.0 / travel], dwell=1.0), drives_of(DRIVE, travel=travel)
-    )
-    assert (slide.peak[0], slide.mean[0]) == pytest.approx((motor.peak[0], motor.mean[0]))
 
 
 def loads(found: Case) -> tuple[CycleLoads, Actuation]:
@@ -113,16 +78,3 @@ def test_energy_is_balanced_over_a_closed_cycle(dof: int, kind: str) -> None:
     windings += np.einsum("m,nmd->n", of_cycle.dwells, VOLTAGE * CURRENT * share)
     drawn = VOLTAGE * supply_currents(of_cycle, drives).mean * of_cycle.cycle_time
     assert drawn[closed] == pytest.approx((friction + braked + windings)[closed], rel=0.02)
-
-
-@pytest.mark.parametrize(("dof", "kind"), [(4, "axis"), (6, "orientation")])
-def test_currents_scale_with_ratings(dof: int, kind: str) -> None:
-    of_cycle, drives = loads(random_case(dof, kind, seed=7, drive=DRIVE, time=1.5, dwell=0.3))
-    found = supply_currents(of_cycle, drives)
-    assert (found.mean > 0.0).all()
-    assert (found.mean <= found.peak).all()
-    halved = supply_currents(of_cycle, replace(drives, voltage=2.0 * drives.voltage, current=drives.current / 2.0))
-    assert 2.0 * halved.peak == pytest.approx(found.peak)
-    assert 2.0 * halved.mean == pytest.approx(found.mean)
-    safe = supply_currents(of_cycle, replace(drives, safety_factor=3.0 * drives.safety_factor))
-    assert np.array_equal(safe.peak, found.peak)

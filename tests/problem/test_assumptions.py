@@ -1,18 +1,13 @@
 """Assumed values of actuators in the results of a run."""
 
-import json
-from pathlib import Path
 from typing import Any
-
-import pytest
 
 import armwright as aw
 from armwright.problem.assumptions import assumed_values
-from armwright.robot.actuators import named_actuator, value_of
+from armwright.robot.actuators import named_actuator
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests.proof.test_simulation import DESK, SPACE, Desk
-from tests.support.command_line import armwright
 
 SERVO = ["rated_torque", "corner_speed", "rotor_inertia", "coulomb_friction", "viscous_friction", "shaft_offset"]
 SIZE = {"width": 0.03, "height": 0.04, "depth": 0.03}
@@ -49,27 +44,10 @@ def test_only_actuators_in_use_count() -> None:
     assert set(assumed_values(desk.problem, [desk.arm])) == {"XM540-W270"}
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished run whose only trial is the desk arm."""
-    desk = Desk(objectives=["peak_torque", "length"])
-    folder = tmp_path_factory.mktemp("runs") / "desk"
-    aw.optimize(
-        desk.problem, proposer="none", n_init=1, n_total=1, initial_designs=[desk.design], verify=False, out=folder
-    )
-    return folder
-
-
-def test_files_state_assumed_values(run: Path) -> None:
-    record = named_actuator("XM540-W270").completed()
-    expected = {"XM540-W270": {name: value_of(record, name) for name in SERVO}}
-    for file in (run / "summary.json", run / "designs" / "0000" / "design.json"):
-        assert json.loads(file.read_text(encoding="utf-8"))["assumed"] == expected
-
-
-def test_commands_state_assumed_values(run: Path) -> None:
-    assert "assumed values of actuators: 6 of XM540-W270" in armwright("pick", run).stdout
-    sheet = json.loads(armwright("datasheet", run, "--design", 0, "--json").stdout)
-    assert sheet["assumptions"]["actuators"].startswith(
-        "defaults of their kind or estimates: XM540-W270: rated torque 2.65 N m"
-    )
+def test_backlash_is_assumed_only_if_a_quantity_depends_on_it() -> None:
+    servo = {"name": "servo", "mass": 0.1, "stall_torque": 5.0}
+    space = DesignSpace.model_validate({"actuators": [servo], "motor_bodies": False})
+    for constraints, names in ((["mass <= 3"], []), (["mass <= 3", "backlash_error <= 0.01"], ["backlash"])):
+        task = Task.model_validate({"name": "one", "targets": [[0.3, 0.0, 0.2]], "constraints": constraints})
+        problem = aw.Problem(task, space)
+        assert [name for values in assumed_values(problem).values() for name in values] == names

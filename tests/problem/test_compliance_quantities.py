@@ -1,6 +1,7 @@
 """Deflection, backlash error and payload capacity as objectives, constraints and requirements."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,14 +10,16 @@ from armwright.exceptions import SettingsError
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.reach.compliance import Stiffness, backlash_errors
-from armwright.problem.checks.requirements import check_requirements
-from armwright.problem.estimates import lower_bounds
+from armwright.problem.conditions import read_condition
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
 from armwright.problem.problem import Problem
+from armwright.proof.selection import pick
 from armwright.robot.actuators import named_actuator
 from armwright.robot.arm import Arm
-from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.runs.folder import read_run
+from armwright.spaces.design_space import DesignSpace
+from armwright.study.study import optimize
 from armwright.tasks.moments import MAX_MASS
 from armwright.tasks.task import Task
 from tests.support.arms import moving_arms
@@ -91,16 +94,6 @@ def test_designs_of_a_batch_yield_like_single_arms_to_the_bit() -> None:
         assert outcomes.violations[i].tolist() == [constraint(evaluation)[0] for constraint in tubes.constraints]
 
 
-def test_bounds_of_screening_hold_for_deflection() -> None:
-    bounds = ["payload_deflection <= 0.001", "payload_capacity >= 0.5"]
-    task = Task.model_validate(TASK | {"objectives": ["deflection", "mass"], "constraints": bounds})
-    tubes = Problem(task, TUBES)
-    matrix = TUBES.matrix(TUBES.sample(60, 7))
-    found, outcomes = lower_bounds(tubes, matrix), tubes.evaluate(matrix)
-    assert (found.values <= outcomes.values).all()
-    assert (found.violations <= outcomes.violations).all()
-
-
 def test_backlash_error_reads_the_backlash_of_the_actuators() -> None:
     designs = SPACE.sample(20, 0)
     evaluation = problem().physics(designs)
@@ -110,14 +103,6 @@ def test_backlash_error_reads_the_backlash_of_the_actuators() -> None:
         arms = stack_arms([arm])
         frames = forward_kinematics(arms, evaluation.q[i : i + 1])
         assert BACKLASH_ERROR.each(evaluation)[i] == pytest.approx(backlash_errors(arms, frames, backlash)[0])
-
-
-def test_slides_play_by_their_travel_and_yield_by_its_square() -> None:
-    space = SPACE.model_copy(update={"joint_types": ("S",), "travel": 0.02, "actuators": SPACE.actuators[:1]})
-    actuation = Problem(Task.model_validate(TASK), space).physics(space.sample(3, 0)).arms.actuation
-    assert actuation is not None
-    assert actuation.backlash == pytest.approx(0.02 * MOTOR.backlash)
-    assert actuation.joint_stiffness == pytest.approx(MOTOR.joint_stiffness / 0.02**2)
 
 
 def test_targets_without_the_payload_of_a_cycle_do_not_limit_it() -> None:
@@ -130,19 +115,19 @@ def test_targets_without_the_payload_of_a_cycle_do_not_limit_it() -> None:
     assert (limits[:, 1:] < MAX_MASS).any()
 
 
-@pytest.mark.parametrize("quantity", ["deflection", "payload_deflection"])
-def test_deflection_reports_missing_sections(quantity: str) -> None:
-    unknown = problem(objectives=["mass"], constraints=[f"{quantity} <= 0.001"])
-    message = f"{quantity} needs the section and the material of the links; try link_section: "
-    with pytest.raises(SettingsError, match=message):
-        unknown.evaluate(SPACE.sample(1, 0))
-    with pytest.raises(SettingsError, match=message):
-        check_requirements(unknown)
-
-
-@pytest.mark.parametrize("quantity", ["deflection", "payload_deflection", "backlash_error", "payload_capacity"])
-def test_quantities_report_missing_actuators(quantity: str) -> None:
-    relation = ">=" if quantity == "payload_capacity" else "<="
-    task = Task.model_validate(TASK | {"constraints": [f"{quantity} {relation} 0.1"]})
-    with pytest.raises(SettingsError, match=f"objective {quantity} needs actuators"):
-        check_requirements(Problem(task, paper_space()))
+def test_designs_can_be_picked_by_quantities_that_the_run_did_not_evaluate(tmp_path: Path) -> None:
+    asked = problem(objectives=["worst_error", "mass"])
+    optimize(asked, proposer="none", sampler="random", n_init=15, n_total=15, verify=False, out=tmp_path)
+    history = read_run(tmp_path)[1]
+    numbers = [member.number for member in history.front]
+    errors = dict(zip(numbers, BACKLASH_ERROR(history.evaluation(numbers)), strict=True))
+    assert len(numbers) > 1
+    bound = float(sorted(errors.values())[len(errors) // 2])
+    picked = pick(history, [read_condition(f"backlash_error <= {bound!r}")], by="backlash_error")
+    assert [member.number for member in picked] == sorted(
+        (number for number in numbers if errors[number] <= bound), key=errors.__getitem__
+    )
+    with pytest.raises(SettingsError, match="deflection is not known: no section and material of the links are stated"):
+        pick(history, [read_condition("deflection <= 0.001")])
+    with pytest.raises(SettingsError, match=r'unknown quantity "backlash_eror".*Did you mean "backlash_error"'):
+        pick(history, [read_condition("backlash_eror <= 0.001")])

@@ -8,7 +8,6 @@ from typing import Any
 
 import moocore
 import numpy as np
-import optuna
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,7 +18,6 @@ from armwright.exceptions import FailureError, RunConflictError, RunFolderError,
 from armwright.pareto import (
     default_reference_point,
     feasible_mask,
-    front_indices,
     hypervolume,
     masked_objectives,
     penalised_objectives,
@@ -45,7 +43,6 @@ from armwright.study.front.front_run import find_front
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
-from armwright.tasks.task_template import task_template
 from tests.support.fixed_problem import FixedProblem, fixed_history
 
 SPACE = paper_space()
@@ -87,14 +84,10 @@ def test_constraint_text_is_parsed(name: str, relation: str, bound: float) -> No
         (["worst_eror <= 0.01"], r'unknown quantity "worst_eror"\. Did you mean "worst_error"\? Quantities: position_'),
         (["mass <= three"], r'expected a finite number \[kg\], at most ±1e\+60, got "three"; try mass <= 3'),
         (["mass <= nan"], r'expected a finite number \[kg\], at most ±1e\+60, got "nan"'),
-        (["mass <= inf"], r'expected a finite number \[kg\], at most ±1e\+60, got "inf"'),
         (["mass <= 1e999"], r'expected a finite number \[kg\], at most ±1e\+60, got "1e999"'),
-        (["mass >= -1e308"], r'at most ±1e\+60, got "-1e308"'),
         (["mass <= 1_0"], r'expected a finite number \[kg\], at most ±1e\+60, got "1_0"'),
         (["mass < 3"], "<= or >=, and a number without unit; try mass <= 3"),
         (["mass <= 3 kg"], "a number without unit"),
-        (["0 <= mass <= 3"], "a quantity, <= or >=, and a number"),
-        (["mass"], "a quantity, <= or >=, and a number"),
         (["__import__('os').getcwd() <= 3"], "a quantity, <= or >=, and a number"),
         (["mass <= 3", "mass <= 2"], '"mass <= 3" and "mass <= 2" bound the same quantity'),
         (["mass <= 3", "mass >= 4"], 'no design satisfies both "mass >= 4" and "mass <= 3"'),
@@ -104,16 +97,6 @@ def test_invalid_constraints_are_refused_in_one_line(sentences: list[str], words
     with pytest.raises(TaskError, match=words.replace("(", r"\(") if "import" in words else words) as refusal:
         Problem(task(*sentences))
     assert "\n" not in str(refusal.value)
-
-
-def test_constraints_in_the_task_template_are_valid(tmp_path: Path) -> None:
-    shown = "# constraints:\n#   - worst_error <= 0.01\n#   - mass <= 3\n"
-    text = task_template(tmp_path / "mine.yaml")
-    assert shown in text
-    text = text.replace(shown, shown.replace("#   - ", "  - ").replace("# ", ""))
-    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
-    found = Problem(load_task(tmp_path / "mine.yaml")).constraints
-    assert [constraint.description for constraint in found] == ["worst_error <= 0.01", "mass <= 3"]
 
 
 def test_violations_are_relative_distances_from_the_bound() -> None:
@@ -187,21 +170,11 @@ def test_constrained_front_agrees_with_optuna_and_hypervolume_with_moocore(
 
 
 def test_unconstrained_task_records_no_violations(tmp_path: Path) -> None:
-    run = optimize(Problem(task()), proposer="none", n_total=3, out=tmp_path / "run")
+    run = optimize(Problem(task()), proposer="none", sampler="random", n_total=3, out=tmp_path / "run")
     assert all("violations" not in line for line in lines(tmp_path / "run"))
     assert "feasibility" not in run.summary
     assert run.history.masked_objectives is run.history.values
     assert all(trial.is_feasible for trial in run.trials)
-
-
-@pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
-def test_inactive_constraint_changes_no_trial(sampler: str) -> None:
-    free, bound = (
-        optimize(Problem(task(*words)), proposer="none", sampler=sampler, n_total=16, seed=2)
-        for words in ((), ("length <= 100",))
-    )
-    assert [trial.design for trial in bound.trials] == [trial.design for trial in free.trials]
-    assert np.array_equal(bound.hypervolume, free.hypervolume)
 
 
 @pytest.mark.slow
@@ -218,7 +191,7 @@ def test_black_boxes_prefer_feasible_designs(sampler: str) -> None:
 
 def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
-    run = optimize(problem, proposer="rules", n_total=40, seed=1, out=tmp_path / "run")
+    run = optimize(problem, proposer="rules", sampler="nsga2", n_total=40, seed=1, out=tmp_path / "run")
     broken = problem.evaluate([trial.design for trial in run.trials]).violations
     assert np.array_equal(run.history.violations, broken)
     feasible = np.all(broken <= 0.0, axis=1)
@@ -252,26 +225,10 @@ def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
     assert np.all(off <= 0.06)  # 5 % in float64
 
 
-def test_optuna_study_of_a_run_has_its_constraints(tmp_path: Path) -> None:
-    problem = Problem(task(*BOUNDS))
-    run = optimize(problem, proposer="none", n_total=30, seed=1, out=tmp_path / "run")
-    names = [constraint.description for constraint in problem.constraints]
-    box = BlackBox(SPACE, "tpe", seed=1, constraints=names)
-    box.restore(run.trials)
-    assert [list(trial.constraints.items()) for trial in box.study.trials] == [
-        list(zip(names, trial.violations, strict=True)) for trial in run.trials
-    ]
-    assert sorted(t.number for t in box.study.best_trials) == sorted(member.number for member in run.front)
-
-
-def test_changed_constraints_are_refused(tmp_path: Path) -> None:
-    optimize(Problem(task(*BOUNDS)), proposer="none", n_total=2, out=tmp_path / "run")
+def test_changed_constraints_and_missing_violations_are_refused(tmp_path: Path) -> None:
+    optimize(Problem(task(*BOUNDS)), proposer="none", sampler="random", n_total=2, out=tmp_path / "run")
     with pytest.raises(RunConflictError, match=r"constraints: .*worst_error <= 0.4"):
         optimize(Problem(task("worst_error <= 0.3")), proposer="none", n_total=2, out=tmp_path / "run")
-
-
-def test_trial_without_violations_is_damaged(tmp_path: Path) -> None:
-    optimize(Problem(task(*BOUNDS)), proposer="none", n_total=2, out=tmp_path / "run")
     file = tmp_path / "run" / "trials.jsonl"
     first = json.loads(file.read_text(encoding="utf-8").splitlines()[0])
     del first["violations"]
@@ -282,7 +239,7 @@ def test_trial_without_violations_is_damaged(tmp_path: Path) -> None:
 
 def test_run_without_a_feasible_design_reports_the_nearest(tmp_path: Path) -> None:
     problem = Problem(task(*IMPOSSIBLE))
-    run = optimize(problem, proposer="rules", n_total=6, seed=1, out=tmp_path / "run")
+    run = optimize(problem, proposer="rules", sampler="random", n_total=6, seed=1, out=tmp_path / "run")
     assert run.front == []
     assert run.hypervolume.tolist() == [0.0] * 6
     broken = problem.evaluate([trial.design for trial in run.trials]).violations
@@ -303,7 +260,7 @@ def test_reference_point_comes_from_feasible_designs() -> None:
     assert found_reference_point(values, np.ones((4, 1))) == default_reference_point(values)
     assert found_reference_point(values, np.empty((4, 0))) == default_reference_point(values)
     open_ = task("length >= 0.2", reference_point=None)
-    run = optimize(Problem(open_), proposer="none", n_total=2, seed=0)
+    run = optimize(Problem(open_), proposer="none", sampler="random", n_total=2, seed=0)
     assert run.history.reference_point == run.history.found_reference_point()
 
 
@@ -386,11 +343,3 @@ def test_feedback_of_infeasible_designs_starts_with_the_nearest() -> None:
     history = fixed_history(FixedProblem(task("mass <= 0.0001")))
     assert history.front == []
     assert history.nearest(3) == np.argsort(history.violations[:, 0], kind="stable")[:3].tolist()
-
-
-def test_optuna_treats_violations_up_to_zero_as_feasible() -> None:
-    study = optuna.create_study(directions=["minimize"] * 2)
-    values, broken = np.array([[1.0, 2.0], [2.0, 1.0], [0.5, 0.5]]), np.array([[0.0], [-1.0], [1e-12]])
-    for row, by in zip(values, broken[:, 0], strict=True):
-        study.add_trial(optuna.create_trial(values=row.tolist(), constraints={"b": float(by)}))
-    assert [trial.number for trial in study.best_trials] == front_indices(masked_objectives(values, broken))

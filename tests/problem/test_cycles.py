@@ -46,50 +46,39 @@ def bounds(problem: Problem) -> list[str]:
     return [constraint.description for constraint in problem.constraints]
 
 
-# Implied constraints
+STILL = {"cycle": None}
+LINES = {"cycle": {"steps": [{"to": n, "by": "line"} for n in (1, 2, 3)]}, "targets": [t["position"] for t in TARGETS]}
+WIDE = {"cycle": {"tolerance": {"path": 0.005, "angle": 0.1}}}
 
 
-def test_cycle_implies_constraints() -> None:
-    assert bounds(Problem(task(), BARE)) == IMPLIED
-    assert bounds(Problem(task(), DRIVEN)) == [*IMPLIED, *DRIVES]
-    assert bounds(Problem(task(cycle={"tolerance": {"path": 0.005, "angle": 0.1}}), BARE))[1:3] == [
-        "path_error <= 0.005",
-        "path_angle <= 0.1",
-    ]
+@pytest.mark.parametrize(
+    ("more", "space", "expected"),
+    [
+        ({}, BARE, IMPLIED),
+        ({}, DRIVEN, [*IMPLIED, *DRIVES]),
+        (WIDE, BARE, [IMPLIED[0], "path_error <= 0.005", "path_angle <= 0.1", *IMPLIED[3:]]),
+        (LINES, BARE, [c for c in IMPLIED if "angle" not in c]),
+        (STILL, BARE, []),
+        (STILL, DRIVEN, ["collision <= 0"]),
+    ],
+)
+def test_cycle_and_motors_imply_constraints(more: dict[str, Any], space: DesignSpace, expected: list[str]) -> None:
+    asked = task(**more) if more is not STILL else task().model_copy(update=STILL)
+    assert bounds(Problem(asked, space)) == expected
 
 
-def test_points_have_no_angle_along_their_path() -> None:
-    points = [target["position"] for target in TARGETS]
-    assert bounds(
-        Problem(task(cycle={"steps": [{"to": n, "by": "line"} for n in (1, 2, 3)]}, targets=points), BARE)
-    ) == [c for c in IMPLIED if "angle" not in c]
-
-
-def test_tasks_without_a_cycle_imply_only_that_motors_do_not_collide() -> None:
-    still = task(cycle=None).model_copy(update={"cycle": None})
-    assert bounds(Problem(still, BARE)) == []
-    assert bounds(Problem(still, DRIVEN)) == ["collision <= 0"]
-
-
-@pytest.mark.parametrize("implied", [*IMPLIED, *DRIVES])
-def test_a_bound_of_the_task_replaces_the_implied_one(implied: str) -> None:
-    own = f"{implied.split()[0]} <= 3"
-    assert bounds(Problem(task(constraints=[own]), DRIVEN)) == [own, *(c for c in [*IMPLIED, *DRIVES] if c != implied)]
-
-
-@pytest.mark.parametrize("quantity", ["clearance", "self_clearance", "obstacle_clearance"])
-def test_bounds_of_clearances_replace_the_bound_of_collisions(quantity: str) -> None:
-    own = f"{quantity} >= 0.01"
-    assert bounds(Problem(task(constraints=[own]), BARE)) == [own, *(c for c in IMPLIED if "collision" not in c)]
-
-
-def test_bounds_of_other_quantities_replace_nothing() -> None:
-    assert bounds(Problem(task(constraints=["mass <= 3", "path_error >= 0"]), BARE))[2:] == [
-        c for c in IMPLIED if "path_error" not in c
-    ]
-
-
-# Quantities of motions
+@pytest.mark.parametrize(
+    ("own", "replaced"),
+    [
+        *((f"{implied.split()[0]} <= 3", implied) for implied in [*IMPLIED, *DRIVES]),
+        *((f"{quantity} >= 0.01", "collision <= 0") for quantity in ("clearance", "self_clearance")),
+        ("obstacle_clearance >= 0.01", "collision <= 0"),
+        ("mass <= 3", None),
+    ],
+)
+def test_a_bound_of_the_task_replaces_the_implied_one(own: str, replaced: str | None) -> None:
+    implied = [c for c in [*IMPLIED, *DRIVES] if c != replaced]
+    assert bounds(Problem(task(constraints=[own]), DRIVEN)) == [own, *implied]
 
 
 @pytest.mark.parametrize("name", [name for name, q in QUANTITIES.items() if "cycle" in q.needs])
@@ -116,9 +105,6 @@ def test_quantities_of_time_need_durations_or_drives() -> None:
     assert Problem(task(objectives=["cycle_time"]), BARE).evaluate(designs).values == pytest.approx(6.0)
 
 
-# What the cycle decides at targets
-
-
 def test_postures_at_targets_are_those_of_the_cycle_whatever_the_restarts() -> None:
     plain, restarted = (Problem(task(restarts=n), BARE) for n in (0, 4))
     designs = BARE.sample(N, 1)
@@ -135,18 +121,6 @@ def test_payload_counts_only_where_the_cycle_carries_it() -> None:
     assert not np.allclose(loaded.joint_torques[:, :2], empty.joint_torques[:, :2])
     carried = Problem(task(cycle={"steps": [{"to": n} for n in (1, 2)]}, payload=0.5), BARE)
     assert carried.scenes[0].payload.tolist() == [0.5, 0.5, 0.5]  # throughout, and at a target that it leaves out
-
-
-def test_payload_factors_count_as_heavier_payloads() -> None:
-    designs = DRIVEN.sample(N, 2)
-    names = ("dynamic_torque", "thermal_utilisation", "peak_torque")
-    both, once, twice = (
-        Problem(task(objectives=names, **more), DRIVEN).evaluate(designs)
-        for more in ({"payload_factors": [2.0]}, {}, {"payload": 0.4})
-    )
-    assert np.array_equal(both.values, np.maximum(once.values, twice.values))
-    assert np.array_equal(both.violations, np.maximum(once.violations, twice.violations))
-    assert (twice.values > once.values).any()
 
 
 def test_target_noise_shifts_the_whole_cycle() -> None:
@@ -181,9 +155,6 @@ def test_feasible_designs_exist_and_stay_within_what_is_implied() -> None:
     assert not physics.paths.jumps[feasible].any()
     assert not physics.unreached[feasible].any()
     assert physics.clearance[feasible].min() >= 0.0
-
-
-# Build tolerance
 
 
 def test_robust_values_are_the_worst_of_copies_that_keep_the_postures_of_the_arm() -> None:

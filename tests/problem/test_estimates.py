@@ -12,7 +12,7 @@ from armwright.spaces.design_space import DesignSpace, default_space, paper_spac
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task
 
-N = {False: 300, True: 40}  # random designs without and with a cycle
+N = {False: 150, True: 20}  # random designs without and with a cycle
 
 
 def sampled(problem: Problem, n: int, seed: int = 0) -> Any:

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import armwright as aw
 from armwright.problem.checks.instant import check_instantly
 from armwright.problem.ignored_errors import describe_ignored_errors, stated_tolerance
 from armwright.problem.objectives import OBJECTIVES
@@ -17,7 +16,6 @@ from armwright.tasks.task import Task
 
 HERE, THERE = [0.3, 0.1, 0.2], [0.2, 0.3, 0.1]
 DOWN = {"axis": [0, 0, -1]}
-RESOLUTION = {"worst_error": 1e-9, "torque": 1e-9}  # so that the front is reported as the search finds it
 ERRORS = ("position_error", "worst_error", "orientation_error", "worst_angle")
 
 
@@ -43,13 +41,6 @@ def test_errors_count_beyond_the_tolerances_of_their_targets() -> None:
     assert values == pytest.approx(np.column_stack(expected))
     assert (distance[:, 0] == 0.0).any()
     assert (angle[:, 1] == 0.0).any()
-
-
-def test_default_tolerances_leave_all_errors_to_the_bit() -> None:
-    plain = problem({"position": HERE, **DOWN, "weight": 2.0}, {"position": THERE, **DOWN}, objectives=ERRORS)
-    found = plain.physics(plain.space.sample(300, 0))
-    expected = np.column_stack([OBJECTIVES[name](found) for name in ERRORS])
-    assert np.array_equal(plain.outcomes(found).values, expected)
 
 
 def test_tolerances_change_no_builtin_task() -> None:
@@ -99,26 +90,6 @@ def test_deviations_from_lines_count_beyond_the_tolerance_of_the_cycle() -> None
     assert not stated_tolerance(plain.task, OBJECTIVES["path_error"]).any()
 
 
-def test_fronts_hold_one_design_within_the_tolerances() -> None:
-    """Without stated tolerances, many designs of the front differ by errors that nobody cares about."""
-    keys: dict[str, Any] = {
-        "objectives": ["worst_error", "torque"],
-        "reference_point": [1.0, 20.0],
-        "resolution": RESOLUTION,
-    }
-    space = paper_space().model_copy(update={f"origin_{axis}": (0.0, 0.0) for axis in "xyz"})
-    near: dict[str, int] = {}
-    for name, extra in (("plain", {}), ("stated", {"tolerance": 0.005})):
-        targets = ({"position": point, **extra} for point in (HERE, THERE))
-        run = aw.find_front(Problem(task(*targets, **keys), space), evaluations=4000, seed=0)
-        found = run.history.problem.physics([member.design for member in run.front])
-        errors = found.position_error.max(axis=1)
-        near[name] = int((errors < 0.005).sum())
-        assert len(run.front) > 5
-    assert near["stated"] == 1
-    assert near["plain"] > 1
-
-
 @pytest.mark.parametrize(
     ("targets", "constraints", "start"),
     [
@@ -155,10 +126,3 @@ def test_objectives_that_suit_the_task_are_suggested() -> None:
         second = Problem(task(HERE, THERE, **keys, objectives=names), space)  # type: ignore[arg-type]
         assert check_instantly(second) == []
         assert second.evaluate(space.sample(3, 0)).values.shape == (3, 2)
-
-
-def test_descriptions_name_the_objectives() -> None:
-    stated = problem({"position": HERE, "tolerance": 0.002}, objectives=["position_error", "worst_error", "torque"])
-    text = "errors below the stated tolerances count as 0 in position_error and worst_error"
-    assert describe_ignored_errors(stated) == text
-    assert describe_ignored_errors(problem(HERE)) == ""

@@ -5,26 +5,20 @@ from pathlib import Path
 
 import moocore
 import numpy as np
-import pinocchio
 import pytest
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError
+from armwright.exceptions import RunFolderError, SettingsError, TaskError
 from armwright.pictures.figures import chosen_members, write_figures
-from armwright.problem.evaluation import evaluate
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, named_objectives
 from armwright.problem.problem import Problem
-from armwright.robot.arm import Arm, Joint, Link
-from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
-from armwright.spaces.design_space import paper_space
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
-from tests.support.arms import general_arms
 
 SPREAD = Objective(
     name="spread",
@@ -62,7 +56,7 @@ def bounded(*point: float) -> Task:
 
 
 def short(problem: Problem, n_total: int, out: Path | None = None) -> StudyResult:
-    return optimize(problem, proposer="rules", n_init=5, n_step=3, n_total=n_total, out=out)
+    return optimize(problem, proposer="rules", sampler="tpe", n_init=5, n_step=3, n_total=n_total, out=out)
 
 
 @pytest.mark.parametrize(
@@ -100,8 +94,8 @@ def test_runs_of_one_and_three_objectives_complete_and_resume(tmp_path: Path, pr
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("problem", [one(OPEN), three(OPEN)])
-def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path, problem: Problem) -> None:
+def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path) -> None:
+    problem = three(OPEN)
     run = short(problem, 12, tmp_path / "run")
     config, history = read_run(tmp_path / "run")
     names = [objective.name for objective in problem.objectives]
@@ -110,23 +104,12 @@ def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path, proble
     assert [member.values for member in history.front] == [member.values for member in run.front]
     assert history.hypervolume == pytest.approx(run.hypervolume)
     drawn = {path.stem for path in write_figures(tmp_path / "run")}
-    assert {"hypervolume", "arms"} <= drawn
-    assert ("front" in drawn) == (len(names) > 1)
+    assert {"hypervolume", "arms", "front"} <= drawn
     titles = [title for title, _ in chosen_members(history)]
     assert all("position error" in title or "spread" in title or "nee" in title for title in titles)
-    designs = problem.space.sample(3, 0)
-    if SPREAD in problem.objectives:
-        with pytest.raises(RunFolderError, match="the custom objective"):
-            history.problem.evaluate(designs)
-    else:
-        assert np.array_equal(history.problem.evaluate(designs).values, problem.evaluate(designs).values)
+    with pytest.raises(RunFolderError, match="the custom objective"):
+        history.problem.evaluate(problem.space.sample(3, 0))
     assert (tmp_path / "run" / "trials.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",".join(names))
-
-
-def test_changed_objectives_are_refused(tmp_path: Path) -> None:
-    short(three(OPEN), 3, tmp_path / "run")
-    with pytest.raises(RunConflictError, match="objectives: "):
-        short(Problem(OPEN), 3, tmp_path / "run")
 
 
 @pytest.mark.parametrize(("objectives", "point"), [(ONE, (5.0, 5.0)), (THREE, (5.0, 5.0)), (PAPER_OBJECTIVES, (5.0,))])
@@ -142,17 +125,8 @@ LOADED = Task(name="loaded", targets=((0.3, 0.0, 0.2), (0.2, 0.2, 0.3), (0.2, -0
 
 
 def test_named_objectives_match_their_formulas() -> None:
-    names = [
-        "position_error",
-        "torque",
-        "worst_error",
-        "unreached_targets",
-        "peak_torque",
-        "rms_torque",
-        "mass",
-        "length",
-        "joints",
-    ]
+    names = ["position_error", "torque", "worst_error", "unreached_targets", "peak_torque"]
+    names += ["rms_torque", "mass", "length", "joints"]
     problem = Problem(LOADED, objectives=named_objectives(names[:5]))
     rest = Problem(LOADED, objectives=named_objectives(names[5:]))
     designs = problem.space.sample(50, 1)
@@ -197,37 +171,3 @@ def test_objectives_option_drops_a_foreign_reference_point(tmp_path: Path) -> No
 
 
 # What the tip carries
-
-
-@pytest.mark.parametrize("dof", [1, 3, 4, 6, 8])
-def test_torques_with_a_payload_agree_with_pinocchio(dof: int) -> None:
-    """A payload is a point mass at the tip, in the URDF a fixed link without length."""
-    targets, payload = np.random.default_rng(dof).uniform(-0.8, 0.8, (3, 3)), np.array([0.0, 0.7, 2.5])
-    arms = general_arms(20, dof, 3)
-    evaluation = evaluate(arms, targets, payload=payload)
-    for row, arm in enumerate(arms):
-        for t, kg in enumerate(payload):
-            carried = Link(offset=(0.0, 0.0, 0.0), mass=float(kg), com=(0.0, 0.0, 0.0), radius=0.01)
-            loaded = Arm(arm.base, (*arm.joints, Joint("fixed", "x")), (*arm.links, carried))
-            model = pinocchio.buildModelFromXML(to_urdf(loaded))
-            q = evaluation.q[row, t][[joint.kind != "fixed" for joint in arm.joints]]
-            torque = pinocchio.computeGeneralizedGravity(model, model.createData(), q)
-            ours = evaluation.joint_torques[row, t][[joint.kind != "fixed" for joint in arm.joints]]
-            load = 9.81 * (sum(link.mass for link in arm.links) + kg) * arm.reach
-            assert ours == pytest.approx(torque, abs=1e-5 * load)
-
-
-def test_payload_changes_only_torques() -> None:
-    designs = paper_space().sample(50, 2)
-    bare, loaded = (Problem(LOADED.model_copy(update={"payload": kg})).physics(designs) for kg in (0.0, 1.0))
-    assert np.array_equal(bare.q, loaded.q)
-    assert np.array_equal(bare.position_error, loaded.position_error)
-    doubled = Problem(LOADED.model_copy(update={"payload": 2.0})).physics(designs)
-    gain = loaded.joint_torques - bare.joint_torques
-    assert doubled.joint_torques - bare.joint_torques == pytest.approx(2.0 * gain, abs=1e-4 * np.abs(gain).max())
-
-
-@pytest.mark.parametrize("payload", [-1.0, (1.0, 2.0), 2e4, float("nan")])
-def test_invalid_payload_is_refused(payload: object) -> None:
-    with pytest.raises(ValueError, match="payload"):
-        Task.model_validate({"name": "x", "targets": [[0.1, 0.2, 0.3]], "payload": payload})

@@ -37,10 +37,6 @@ SPACES = {
 PLANE = [[0.3, 0.0, 0.2], [0.2, 0.0, 0.35], [0.35, 0.0, 0.1]]  # [m]; arms whose base is in it never leave it
 
 
-def tip(arm: Arm, q: np.ndarray) -> np.ndarray:
-    return peer_of(arm).tip(q)
-
-
 def is_clipped(arm: Arm, other: Arm) -> bool:
     """Whether a merged link or the base had to be moved into its range; the length is that of parent and base shift."""
     moved = float(np.linalg.norm(np.subtract(other.base, arm.base)))
@@ -56,7 +52,7 @@ def planar(**update: Any) -> Problem:
 @pytest.mark.parametrize("name", SPACES)
 def test_removing_a_joint_at_zero_keeps_the_tip(name: str) -> None:
     space, n_reduced, n_exact = DesignSpace.model_validate(SPACES[name]), 0, 0
-    for design in space.sample(40, 0):
+    for design in space.sample(25, 0):
         arm = space.arm(design)
         numbers = [number - 1 for number, joint in moving(arm) if joint.kind == "revolute"]
         for joint in numbers:
@@ -71,8 +67,8 @@ def test_removing_a_joint_at_zero_keeps_the_tip(name: str) -> None:
                 place = [number - 1 for number, _ in moving(arm)].index(joint)
                 for q in postures(arm, 3):
                     q[place] = 0.0
-                    assert tip(other, np.delete(q, place)) == pytest.approx(tip(arm, q), abs=1e-9)
-    assert n_reduced >= n_exact >= 15
+                    assert peer_of(other).tip(np.delete(q, place)) == pytest.approx(peer_of(arm).tip(q), abs=1e-9)
+    assert n_reduced >= n_exact >= 8
 
 
 def test_the_price_falls_by_the_removed_actuator() -> None:
@@ -113,7 +109,7 @@ def test_reduced_arms_reach_what_their_parents_reach(cycle: dict[str, str], leas
                 if is_clipped(problem.arm(design), arms[candidate]):
                     continue
                 for q, reached in zip(evaluation.q[i, :, : len(idle)], evaluation.reached[i], strict=True):
-                    place = tip(arms[candidate], np.delete(q, joint))[:3, 3]
+                    place = peer_of(arms[candidate]).tip(np.delete(q, joint))[:3, 3]
                     assert place == pytest.approx(reached, abs=IDLE * problem.max_reach)
     assert found == set(arms)
     assert len(found) >= least

@@ -53,7 +53,7 @@ def test_feasible_designs_keep_the_bounds() -> None:
 
 def test_study_takes_its_reference_point_from_the_bounds() -> None:
     open_ = problem("worst_error <= 0.3", objectives=("worst_error", "torque"))
-    run = optimize(open_, proposer="none", n_total=1, seed=0)
+    run = optimize(open_, proposer="none", sampler="random", n_total=1, seed=0)
     assert run.history.reference_point is not None
     assert run.history.reference_point[0] == pytest.approx(0.33)
     assert run.history.reference_point == run.history.found_reference_point()

@@ -70,17 +70,19 @@ def test_actuator_masses_agree_with_pinocchio_and_mujoco() -> None:
 
 def test_actuation_is_by_the_motion_of_the_joint() -> None:
     """A slide of 0.02 m/rad turns torques into forces, speeds into m/s, and inertia into a mass of equal energy."""
-    motor = ActuatorRecord(name="x", mass=0.1, stall_torque=4.0, speed=5.0, voltage=12.0).actuator()
+    motor = ActuatorRecord(name="x", mass=0.1, stall_torque=4.0, speed=5.0, voltage=12.0, corner_speed=2.0).actuator()
     joints = (Joint("prismatic", "z", 0.0, 0.3, motor, travel=0.02), Joint("revolute", "y", -1.0, 1.0, motor))
     arms = stack_arms([Arm((0.0, 0.0, 0.0), joints, (Link((0.1, 0.0, 0.0), 0.1, (0.05, 0.0, 0.0), 0.01),) * 2)])
     actuation = arms.actuation
     slide, hinge = (
-        {name: getattr(actuation, name)[0, j] for name in ("peak", "no_load_speed", "rotor_inertia", "viscous")}
-        for j in (0, 1)
+        {name: values[0, j] for name, values in vars(actuation).items() if values.ndim == 2} for j in (0, 1)
     )
     assert (hinge["peak"], hinge["no_load_speed"]) == (4.0, 5.0)
     assert slide["peak"] == pytest.approx(4.0 / 0.02)  # N
     assert slide["no_load_speed"] == pytest.approx(5.0 * 0.02)  # m/s
+    assert slide["backlash"] == pytest.approx(0.02 * hinge["backlash"])  # m
+    assert slide["joint_stiffness"] == pytest.approx(hinge["joint_stiffness"] / 0.02**2)  # N/m
+    assert slide["corner_speed"] == pytest.approx(0.02 * 2.0)
     for mass, speed in ((slide, 0.1), (hinge, 5.0)):
         assert 0.5 * mass["rotor_inertia"] * speed**2 == pytest.approx(0.5 * motor.rotor_inertia * 25.0)
         assert mass["viscous"] * speed**2 == pytest.approx(motor.viscous_friction * 25.0)  # W
@@ -113,13 +115,9 @@ def test_torque_utilisation_is_the_worst_share_of_peak_torque_with_the_safety_fa
     [
         ({"actuators": ["XM430-W35"]}, 'unknown actuator "XM430-W35".*Did you mean'),
         ({"actuators": [BIG, dict(BIG)]}, "actuators has duplicates"),
-        ({"actuators": [{"name": "x", "mass": -1.0}]}, "mass"),
         ({"actuators": [{"name": "x", "mass": 1.0}]}, "actuator x states no torque; give stall_torque"),
-        ({"actuators": [MID | {"kind": "hydraulic"}]}, "kind"),
         ({"actuators": [BIG | {"corner_speed": 4.0}]}, "corner_speed is above the no-load speed of 3.1 rad/s"),
         ({"actuators": [MID | {"estimates": ["speed"]}]}, "estimates names speed, which has no value"),
-        ({"actuators": "XM430-W350"}, "expected a list of names"),
-        ({"actuators": [MID], "safety_factor": 0.0}, "safety_factor"),
     ],
 )
 def test_unbuildable_actuator_settings_are_refused(tmp_path: Path, space: dict, words: str) -> None:
@@ -161,8 +159,8 @@ def test_catalogue_completes_every_actuator_and_counts_assumed_values() -> None:
     n_assumed = sum(len(record.assumed) for record in records)
     n_estimates = sum(len(record.estimates) for record in records)
     guide = (ROOT / "docs" / "spaces.md").read_text(encoding="utf-8")
-    assert f"{n_assumed} of the catalogue's {n_values} values are assumed" in guide
-    assert f"{n_assumed - n_estimates} defaults and {n_estimates} estimates" in guide
+    stated = f"{n_assumed} of its {n_values} values, {n_assumed - n_estimates} defaults and {n_estimates} estimates"
+    assert stated in guide
 
 
 def test_defaults_are_ratios_of_the_reference_torque() -> None:

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -17,22 +18,23 @@ from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
 GIVEN = PROBLEM.space.sample(2, 77)
+OPTIONS: dict[str, Any] = {"proposer": None, "sampler": "tpe", "n_init": 5}
 
 
 def test_initial_designs_are_the_first_trials(tmp_path: Path) -> None:
-    run = optimize(PROBLEM, proposer=None, n_init=5, n_total=10, initial_designs=GIVEN, out=tmp_path / "run")
+    run = optimize(PROBLEM, **OPTIONS, n_total=10, initial_designs=GIVEN, out=tmp_path / "run")
     assert [trial.source for trial in run.trials] == ["initial_design"] * 2 + ["random"] * 3 + ["bbo"] * 10
     assert [trial.design for trial in run.trials[:2]] == GIVEN
     assert [trial.values for trial in run.trials[:2]] == [tuple(row) for row in PROBLEM.evaluate(GIVEN).values.tolist()]
-    without = optimize(PROBLEM, proposer=None, n_init=5, n_total=10)
+    without = optimize(PROBLEM, **OPTIONS, n_total=10)
     assert [t.design for t in run.trials[2:5]] == [t.design for t in without.trials[2:5]]  # drawn by their numbers
     config, history = read_run(tmp_path / "run")
     assert [dict(design.params) for design in GIVEN] == list(config.study.initial_designs)
     assert history.trials[0].source == "initial_design"
-    again = optimize(PROBLEM, proposer=None, n_init=5, n_total=14, initial_designs=GIVEN, out=tmp_path / "run")
+    again = optimize(PROBLEM, **OPTIONS, n_total=14, initial_designs=GIVEN, out=tmp_path / "run")
     assert again.resumed == 15
     with pytest.raises(RunConflictError, match="initial_designs"):
-        optimize(PROBLEM, proposer=None, n_init=5, n_total=14, out=tmp_path / "run")
+        optimize(PROBLEM, **OPTIONS, n_total=14, out=tmp_path / "run")
 
 
 def test_invalid_initial_designs_are_refused() -> None:

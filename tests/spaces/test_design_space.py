@@ -9,17 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError, SpaceError
-from armwright.llm.prompt import design_prompt
-from armwright.problem.problem import Problem
 from armwright.robot.tubes import MATERIALS
-from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace, load_space, paper_space
 from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.link_section import LinkSection
 from armwright.spaces.parameters import Design, FloatParameter
-from armwright.study.front.front_run import find_front
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 
 GOOD = paper_space().sample(1, 0)[0].params
 
@@ -32,11 +26,6 @@ def test_paper_space_has_the_parameters_of_the_paper() -> None:
     assert [(p.low, p.high) for p in space.parameters if isinstance(p, FloatParameter)] == [(-1, 1)] * 3 + [
         (0.03, 0.30)
     ] * 4
-
-
-@pytest.mark.parametrize("joints", range(1, 9))
-def test_paper_space_has_2d_plus_3_parameters(joints: int) -> None:
-    assert len(paper_space(joints).parameters) == 2 * joints + 3
 
 
 def test_design_builds_the_arm_of_its_values() -> None:
@@ -71,10 +60,6 @@ def test_samples_lie_in_the_space(seed: int, joints: int) -> None:
         assert space.design(design.params) == design
 
 
-def test_samples_depend_on_the_seed_only() -> None:
-    assert paper_space().sample(5, 1) == paper_space().sample(5, 1) != paper_space().sample(5, 2)
-
-
 @given(st.lists(st.floats(-10, 10), min_size=7, max_size=7))
 def test_clipped_is_always_in_the_space(values: list[float]) -> None:
     design = paper_space().clipped(values[:3], "YPRP", values[3:])
@@ -85,12 +70,11 @@ def test_clipped_is_always_in_the_space(values: list[float]) -> None:
     ("change", "message"),
     [
         ({"link_3": 1.4}, "link_3 = 1.4 m is outside 0.03 <= link_3 <= 0.3 m"),
-        ({"link_3": 0.029}, "link_3 = 0.029 m is outside"),
         ({"origin_x": float("nan")}, "origin_x = nan is not a finite number [m]"),
         ({"origin_x": True}, "origin_x = True is not a finite number [m]"),
+        ({"joint_1": ["R"]}, "joint_1 = ['R'] is not one of R, P, Y"),
         ({"origin_x": "0.1"}, "origin_x = '0.1' is not a finite number [m]"),
         ({"joint_1": "Z"}, "joint_1 = 'Z' is not one of R, P, Y"),
-        ({"joint_1": ["R"]}, "joint_1 = ['R'] is not one of R, P, Y"),
         ({"orgin_x": 0.0}, 'unknown parameter "orgin_x".*Did you mean "origin_x"?'),
     ],
 )
@@ -122,7 +106,6 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("joints: 0", "joints"),
         ("joints: 9", "joints = 9: expected a number from 1 to 8"),
         ("link: [0.3, 0.03]", "link = [0.3, 0.03] m is reversed"),
         ("origin_x: [1, -1]", "origin_x = [1, -1] m is reversed"),
@@ -130,29 +113,18 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
         ("joint_range: [0.5, 2.4]", "must contain 0"),
         ("joint_range: [0, 0.01]", "narrower than 3 degrees"),
         ("joint_types: [R, R]", "joint_types has duplicates: R, R"),
-        ("joint_types: []", "joint_types"),
-        ("joint_types: [R, Q]", "joint_types"),
-        ("links: [0.03, 0.3]", 'unknown key "links".'),
-        ("mass: {kind: lead}", "mass"),
-        ("mass: {kg: 3}", "kind is missing: expected per_metre or per_link"),
         ("joint_range: [-7, 2.4]", "exceeds ±2π"),
         ("link_section: {tubes: [[0.03, 0.02]]}", "expected a wall of at most the radius, 0.015 m"),
         ("link_section: {tubes: [[20, 1.5]]}", "got 20 m; lengths are in metres: write 0.02 for 20 mm"),
-        ("link_section: {tubes: [[0.03, 0.0]]}", "above 0 m, got 0.03 m and 0 m"),
-        ("link_section: {tubes: []}", "link_section.tubes"),
         ("link_section: {tubes: [[0.03, 0.002], [0.03, 0.002]]}", "duplicates among 30x2, 30x2"),
-        ("link_section: {material: aluminum}", 'unknown material "aluminum". Did you mean "aluminium"?'),
         ("link_section: {material: {density: 1, youngs: 70, shear: 27}}", "got 70 Pa; 70 GPa is 70.0e+9"),
         ("link_section: {material: steel}\nmass: {kind: per_link}", "beside link_section.material"),
         ("column: {outer_diameter: 60}", "column: expected an outer diameter of at most 1 m, got 60 m"),
         ("column: {wall: 0.04}", "column: expected a wall of at most the radius, 0.03 m"),
         ("column: {}\nmount: wall+x", "column: expected mount: floor, got wall+x"),
         ("base_on: table\nmount: [floor, ceiling]", "base_on: expected mount: floor, got floor, ceiling"),
-        ("origin_x: [-.inf, 1]", "finite"),
         ("origin_x: [-1.0e308, 1]", "exceeds ±1000"),
         ("- a\n- list", "keys and values"),
-        ("a: [", "not valid YAML"),
-        ("a: &x 1\nb: *x", "aliases"),
         ("joints: 4\njoints: 5", "duplicate key"),
     ],
 )
@@ -206,18 +178,6 @@ def test_restrict_fixes_or_narrows_parameters(tmp_path: Path) -> None:
     assert (moved.joints, moved.origin[2], moved.links[0]) == ("YRPY", 0.0, 0.2)
 
 
-def test_restricted_space_is_respected_by_a_run(tmp_path: Path) -> None:
-    space = DesignSpace.model_validate({"restrict": RESTRICTED})
-    problem = Problem(load_task("target-1"), space)
-    run = optimize(problem, proposer="rules", n_init=4, n_step=2, n_total=12, out=tmp_path / "run")
-    assert {trial.design.joints[0] for trial in run.trials} == {"Y"}
-    assert read_run(tmp_path / "run")[0].space == space
-    found = find_front(problem, evaluations=1500)
-    assert {member.design.joints[0] for member in found.front} == {"Y"}
-    prompt = design_prompt(run.history, 0)
-    assert "origin_z = 0 (fixed); joint_1 = Y; joint_2 is one of R, P; 0.1 <= link_1 <= 0.2." in prompt
-
-
 @pytest.mark.parametrize(
     ("restrict", "words"),
     [
@@ -225,10 +185,7 @@ def test_restricted_space_is_respected_by_a_run(tmp_path: Path) -> None:
         ({"joint_1": []}, "joint_1 has no choice left"),
         ({"link_9": 0.1}, 'unknown parameter "link_9".*Did you mean'),
         ({"link_1": [0.2, 0.1]}, "is outside"),
-        ({"link_1": 0.5}, "is outside"),
         ({"link_1": "Y"}, "neither a number nor a range"),
-        ({"link_1": [0.1, 0.15, 0.2]}, "restrict"),
-        ("joint_1", "restrict"),
     ],
 )
 def test_restriction_outside_a_parameter_is_refused(tmp_path: Path, restrict: object, words: str) -> None:

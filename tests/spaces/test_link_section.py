@@ -12,16 +12,7 @@ from armwright.llm.answer import Answer, read_answer, read_text, written_answer
 from armwright.llm.answer_format import design_in_lines
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt
-from armwright.problem.objectives import MASS, PRICE
-from armwright.problem.problem import Problem
-from armwright.robot.mjcf import to_mjcf
-from armwright.robot.tubes import MATERIALS, Tube
-from armwright.robot.urdf_writer import to_urdf
-from armwright.search.encoding import DesignEncoding
-from armwright.search.front.variation import offspring
-from armwright.sheet.arm_drawing import link_line
-from armwright.sheet.parts import parts_list
-from armwright.spaces.arm_builder import stack_designs
+from armwright.robot.tubes import MATERIALS
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import CategoricalParameter
 from armwright.tasks.catalogue import load_task
@@ -49,12 +40,6 @@ def test_tubes_match_the_table_of_the_standard(outer_mm: float, wall_mm: float, 
     assert tube.torsional_stiffness == pytest.approx(steel.shear * 2.0 * moment * 1e-8, rel=3e-3)
 
 
-def test_solid_bar_is_a_tube_with_a_wall_of_its_radius() -> None:
-    bar = Tube(0.03, 0.015)
-    assert bar.second_moment == pytest.approx(math.pi * 0.03**4 / 64)
-    assert bar.mass_per_metre(1000.0) == pytest.approx(1000.0 * math.pi * 0.015**2)
-
-
 def test_section_without_a_material_keeps_the_paper() -> None:
     paper, stated = paper_space(), space(joints=4, link_section={"tubes": [[0.03, 0.015]]})
     assert stated.parameters == paper.parameters
@@ -79,13 +64,6 @@ def test_several_tubes_are_parameters(section: dict[str, Any], names: list[str])
     assert all(isinstance(p, CategoricalParameter) and p.choices == ("20x1.5", "30x2") for p in parameters)
 
 
-def test_tubes_of_absent_modules_are_inactive() -> None:
-    searched = space(joints=[1, 3])
-    for design in searched.sample(50, 0):
-        assert len(design.tubes) == len(design.joints)
-        assert searched.design(design.params) == design
-
-
 def test_each_link_has_its_own_tube() -> None:
     searched = space(joint_types=["S", "P"], restrict={"joint_2": "S"})
     (design,) = searched.sample(1, 0)
@@ -97,26 +75,6 @@ def test_each_link_has_its_own_tube() -> None:
     assert [link.mass / link.length for link in arm.links] == pytest.approx([per_metre[i] for i in (0, 1, 0)])
     assert arm.links[0].end_mass == pytest.approx(per_metre[1] * 0.3)  # the rail of the slide
     assert arm.structure_price == pytest.approx(12.0 * sum(link.mass for link in arm.links))
-
-
-def test_mass_and_price_count_tubes() -> None:
-    searched = space(actuators=["XL430-W250"])
-    problem = Problem(load_task("target-1"), searched, objectives=(MASS, PRICE))
-    designs = searched.sample(20, 3)
-    arms = [searched.arm(design) for design in designs]
-    actuators = [sum(joint.actuator.price or 0.0 for joint in arm.joints if joint.actuator) for arm in arms]
-    expected = [(arm.mass, price + arm.structure_price) for arm, price in zip(arms, actuators, strict=True)]
-    assert problem.evaluate(designs).values == pytest.approx(np.array(expected), rel=1e-6)
-
-
-def test_search_varies_tubes_and_keeps_ties() -> None:
-    searched = space(tie={"tube_3": "tube_1"})
-    encoding, rng = DesignEncoding(searched.parameters), np.random.default_rng(0)
-    pool = searched.normalised(encoding.random(40, rng))
-    children = searched.designs(offspring(pool, np.arange(40), encoding, 200, rng))
-    assert {tube for design in children for tube in design.tubes} == {"20x1.5", "30x2"}
-    assert all(design.params["tube_3"] == design.params["tube_1"] for design in children)
-    assert len(stack_designs(searched, searched.matrix(children))) == 200
 
 
 @pytest.mark.parametrize(
@@ -147,16 +105,3 @@ def test_prompts_ask_for_tubes_and_read_them_back(per_link: bool) -> None:
     tubes = f"TUBES: ({', '.join(design.tubes)})" if per_link else f"TUBE: {design.tubes[0]}"
     lines = f"ORIGIN: ({origin})\nJOINTS: ({', '.join(design.joints)})\nLINKS: ({links})\n{tubes}\n"
     assert read_text(lines, problem).design == design
-
-
-def test_files_show_the_radius_and_the_tube_of_each_link() -> None:
-    searched = space()
-    (design,) = searched.sample(1, 0)
-    design = searched.design({**design.params, "tube_1": "30x2", "tube_2": "20x1.5", "tube_3": "30x2"})
-    arm = searched.arm(design)
-    for text in (to_urdf(arm), to_mjcf(arm)):
-        assert "0.015" in text
-        assert "0.01" in text
-    lines = [link_line(arm, n) for n in (1, 2, 3)]
-    assert [(line.outer_diameter, line.wall) for line in lines] == [(0.03, 0.002), (0.02, 0.0015), (0.03, 0.002)]
-    assert sum(part.price or 0.0 for part in parts_list(arm, searched)) == pytest.approx(arm.structure_price)

@@ -16,6 +16,12 @@ from tests.support.exported_arms import Peer, moving, odd_arms, peer_of
 from tests.support.reference_kinematics import Array
 
 KINDS = ("position", "axis", "orientation")
+INERTIA, COULOMB, VISCOUS = 0.02, 0.3, 0.1  # of the rotor [kg m²], [N m], [N m s/rad]
+PEAK, VOLTAGE, CURRENT = 60.0, 24.0, 5.0  # [N m], [V], [A]
+DRIVE = Actuator(
+    "drive", 0.3, PEAK, 8.0, continuous_torque=20.0, corner_speed=0.0, rotor_inertia=INERTIA, coulomb_friction=COULOMB,
+    viscous_friction=VISCOUS, voltage=VOLTAGE, current=CURRENT,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

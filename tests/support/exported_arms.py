@@ -4,6 +4,7 @@ That this is our arm is what test_urdf, test_mjcf and test_kinematics prove.
 """
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,11 @@ class Peer:
         pinocchio.framesForwardKinematics(self.model, self.data, q)
         return np.array(self.data.oMf[self.model.getFrameId(f"{prefix}tip")].homogeneous)
 
+    def jacobian(self, q: Array) -> Array:
+        """(6, D) of the tip: its velocity and angular velocity in the world by joint speeds."""
+        frame, axes = self.model.getFrameId("tip"), pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        return np.array(pinocchio.computeFrameJacobian(self.model, self.data, q, frame, axes)).reshape(6, -1)
+
     def gravity(self, q: Array) -> Array:
         """(D,) [N m] or [N]."""
         return np.array(pinocchio.computeGeneralizedGravity(self.model, self.data, q))
@@ -130,5 +136,15 @@ class Peer:
         return upper + np.triu(upper, 1).T
 
 
+@lru_cache(maxsize=256)
 def peer_of(arm: Arm) -> Peer:
     return Peer(to_urdf(arm))
+
+
+def carrying_peer(arm: Arm, body: pinocchio.Inertia) -> Peer:
+    """Pinocchio's model of an arm with a body in its tip frame."""
+    peer = Peer(to_urdf(arm))
+    frame = peer.model.frames[peer.model.getFrameId("tip")]
+    peer.model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
+    peer.data = peer.model.createData()
+    return peer

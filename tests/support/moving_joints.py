@@ -1,13 +1,16 @@
 """Kernel results in the moving joints only, as the references have them."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
-from armwright.kinematics.ik import ik as solve
+from armwright.kinematics.devices import load_kernels
+from armwright.kinematics.ik import ik
 from armwright.kinematics.ik.ik import Postures
-from tests.support import single_update
+from armwright.tasks.targets import TargetArrays
 
 
 def moving(arrays: ArmArrays) -> np.ndarray:
@@ -31,7 +34,7 @@ def solve_postures(
         initial_q = np.asarray(initial_q, dtype=np.float64)
         if initial_q.ndim and initial_q.shape[-1] == len(own):
             initial_q = of_all(initial_q, arrays)
-    found = solve.solve_postures(arrays, targets, *args, initial_q=initial_q, **options)
+    found = ik.solve_postures(arrays, targets, *args, initial_q=initial_q, **options)
     assert not np.delete(found.q, own, axis=-1).any()
     assert not np.delete(found.torque, own, axis=-1).any()
     q, torque = (np.ascontiguousarray(values[..., own]) for values in (found.q, found.torque))
@@ -39,8 +42,29 @@ def solve_postures(
 
 
 def update_once(
-    arrays: ArmArrays, targets: np.ndarray, q: np.ndarray, h_before: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    own = moving(arrays)
-    after, h = single_update.update_once(arrays, targets, of_all(q, arrays), of_all(h_before, arrays))
-    return after[:, own], h[:, own]
+    arrays: ArmArrays, targets: Array, q: Array, h_before: Array, target_arrays: TargetArrays | None = None
+) -> tuple[Array, Array]:
+    """Make one update of the inverse kinematics of each arm at its own target, on the CPU.
+
+    Args:
+        arrays: N arms.
+        targets: (N, 3) the target of each arm [m].
+        q: (N, D) joint angles [rad] or displacements [m], in the precision of the arms.
+        h_before: (N, D) limit gradients of the update before, in the same precision.
+        target_arrays: The axis or orientation of one target for all arms.
+
+    Returns:
+        (N, D) joint angles or displacements, and limit gradients.
+    """
+    own, lanes = moving(arrays), ik.LANES["cpu"]
+    # Only the target's position relative to the base matters, so each arm is moved and all share the target 0.
+    shifted = replace(arrays, base=np.asarray(arrays.base - targets, dtype=arrays.precision))
+    kind = ik._kind_of(target_arrays)
+    wp, kernels = load_kernels("ik.ik_kernels", "cpu", arrays.precision, lanes, arrays.motions, kind)
+    columns = ik._target_columns(np.zeros((1, 3)), np.zeros(1), target_arrays)
+    columns_, q_last, h_last = (
+        wp.array(ik._in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
+        for values in (columns[None], of_all(q, arrays)[:, None], of_all(h_before, arrays)[:, None])
+    )
+    ik._launch(shifted, columns_[0], 1, q_last, h_last, wp, kernels)
+    return ik._from_lanes(q_last.numpy())[:, 0, own], ik._from_lanes(h_last.numpy())[:, 0, own]

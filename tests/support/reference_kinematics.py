@@ -149,11 +149,17 @@ def solve(arms: Chains, targets: Array, updates: int = UPDATES, start: Array | N
     return Solution(q=kept, reached=tip(arms, kept), error=least, torque=gravity_torque(arms, kept))
 
 
-def potential_energy(arms: Chains, q: Array) -> Array:
-    """(N, T) V(q) = Σ m g z [J]."""
-    rotation, place, _ = frames(arms, q)
-    com = place + np.einsum("...jab,...jb->...ja", rotation, np.broadcast_to(arms.com, place.shape))
-    return GRAVITY * (arms.mass * com[..., 2]).sum(axis=-1)
+def random_states(chains: Chains, seed: int) -> tuple[Array, Array, Array]:
+    """q, H before and targets, all (N, 1, ...) and exact in float32.
+
+    H before is 0 to 0.9 or 1.1 to 3 times the present H: the branch H >= H before is never a matter of rounding.
+    """
+    rng = np.random.default_rng(seed)
+    q = np.float64(np.float32(rng.uniform(chains.lower, chains.upper)))
+    factor = np.where(rng.random(q.shape) < 0.5, rng.uniform(0.0, 0.9, q.shape), rng.uniform(1.1, 3.0, q.shape))
+    h_before = np.float64(np.float32(limit_gradient(chains, q) * factor))
+    targets = np.float64(np.float32(chains.base + rng.uniform(-1.0, 1.0, (*q.shape[:2], 3))))
+    return q, h_before, targets
 
 
 def gravity_torque(arms: Chains, q: Array) -> Array:

@@ -1,11 +1,8 @@
 """Decimal commas in the text of a task file."""
 
-from pathlib import Path
-
 import pytest
 
 from armwright.tasks.decimal_commas import find_decimal_commas
-from armwright.tasks.task_template import task_template
 
 
 @pytest.mark.parametrize(
@@ -26,7 +23,3 @@ def test_mixed_commas_are_found(text: str, messages: list[str]) -> None:
     assert len(found) == len(messages)
     for line, message in zip(found, messages, strict=True):
         assert line.startswith(message)
-
-
-def test_template_has_none() -> None:
-    assert find_decimal_commas(task_template(Path("mine.yaml"))) == []

@@ -12,7 +12,6 @@ from armwright.kinematics.arms.forward import joint_positions
 from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.problem import Problem
 from armwright.robot.arm import MountedTool
-from armwright.robot.urdf_writer import to_urdf
 from armwright.rotations import rotation_from_rpy
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.tool_mount import with_tool
@@ -20,7 +19,7 @@ from armwright.tasks.payload import Payload
 from armwright.tasks.task import Task
 from armwright.tasks.tool import Tool
 from tests.support.dynamics import inverse_dynamics
-from tests.support.exported_arms import ARMS, Peer, full, load, moving, peer_of, postures
+from tests.support.exported_arms import ARMS, carrying_peer, full, load, moving, peer_of, postures
 
 BOX = Payload(mass=0.8, center=(0.02, -0.01, 0.05), size=(0.06, 0.04, 0.1))
 BODY = Payload(mass=1.3, center=(-0.03, 0.02, 0.04), inertia=(3e-3, 2e-3, 4e-3))
@@ -38,15 +37,6 @@ def task(**more: Any) -> Task:
     return Task.model_validate({"name": "handling", "targets": POINTS, **more})
 
 
-def carrying_peer(urdf: str, body: Any) -> Peer:
-    """Pinocchio's model of an arm with a body in its tip frame."""
-    peer = Peer(urdf)
-    frame = peer.model.frames[peer.model.getFrameId("tip")]
-    peer.model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
-    peer.data = peer.model.createData()
-    return peer
-
-
 def body_of(payload: Payload, factor: float = 1.0) -> Any:
     """The payload by Pinocchio's own means; it has a formula of its own for boxes."""
     mass = factor * payload.mass
@@ -58,7 +48,7 @@ def body_of(payload: Payload, factor: float = 1.0) -> Any:
 @pytest.mark.parametrize("payload", [BOX, BODY], ids=["box", "inertia"])
 @pytest.mark.parametrize("arm", ARMS)
 def test_gravity_torque_and_inverse_dynamics_agree_with_pinocchio(arm: Any, payload: Payload) -> None:
-    peer = carrying_peer(to_urdf(arm), body_of(payload, 1.2))
+    peer = carrying_peer(arm, body_of(payload, 1.2))
     arrays, rng = carrying(stack_arms([arm], "float64"), payload.shape), np.random.default_rng(2)
     own, mass = [number - 1 for number, _ in moving(arm)], np.array([1.2 * payload.mass])
     size = load(arm) + 20.0
@@ -78,34 +68,10 @@ def test_problem_carries_the_payload_of_its_task_and_factors_multiply_it() -> No
     for case, factor in enumerate((1.0, 0.0, 1.5)):
         evaluation = problem.physics(arms, case)
         for row, design in enumerate(designs):
-            peer = carrying_peer(to_urdf(problem.arm(design)), body_of(BODY, factor))
+            peer = carrying_peer(problem.arm(design), body_of(BODY, factor))
             for t in range(len(POINTS)):
                 expected = peer.gravity(evaluation.q[row, t])
                 assert evaluation.joint_torques[row, t] == pytest.approx(expected, abs=2e-5)
-
-
-def test_torques_along_a_cycle_agree_with_pinocchio() -> None:
-    """With the payload between pick and place, and the tool all the way."""
-    steps = [{"to": 1, "do": "pick"}, {"to": 2, "by": "joint", "do": "place"}]
-    cycle = {"steps": steps, "time": 1.0}
-    problem = Problem(task(tool=TOOL, payload=BODY.model_dump(), cycle=cycle), SPACE)
-    designs = SPACE.sample(10, 7)
-    evaluation = problem.physics(designs)
-    speed, acceleration, kinds = 1.3, -2.1, set()
-    for group, motions in zip(evaluation.paths.groups, evaluation.torque_terms, strict=True):
-        for path, terms in zip(group.paths, motions, strict=True):
-            kinds.add(path.motion.carries)
-            found = terms.gravity + terms.drag * speed**2 + terms.push * acceleration
-            for row, number in enumerate(np.arange(len(designs))[group.index]):
-                urdf = to_urdf(problem.arm(designs[number]))
-                peer = carrying_peer(urdf, body_of(BODY)) if path.motion.carries else Peer(urdf)
-                for sample in range(0, found.shape[1], 3):
-                    q, q_s, q_ss = (values[row, sample] for values in (path.q, terms.q_s, terms.q_ss))
-                    v, a = q_s * speed, q_ss * speed**2 + q_s * acceleration
-                    expected = pinocchio.rnea(peer.model, peer.data, q, v, a)
-                    # Arms are in float32, their bodies in float64.
-                    assert found[row, sample] == pytest.approx(expected, rel=1e-5, abs=1e-5 * np.abs(expected).max())
-    assert kinds == {True, False}
 
 
 def test_point_mass_written_as_a_record_equals_a_number_to_the_bit() -> None:
@@ -113,23 +79,6 @@ def test_point_mass_written_as_a_record_equals_a_number_to_the_bit() -> None:
     one, other = (Problem(task(tool=TOOL, payload=kg), SPACE).physics(designs) for kg in (0.8, {"mass": 0.8}))
     assert np.array_equal(one.q, other.q)
     assert np.array_equal(one.joint_torques, other.joint_torques)
-
-
-def test_shape_of_a_payload_does_not_change_other_arms_of_the_batch() -> None:
-    """A centre of 0 adds nothing, exactly: the arms of a batch with and without one keep their bits."""
-    arms = [SPACE.arm(design) for design in SPACE.sample(30, 4)]
-    plain = stack_arms(arms)
-    mixed = carrying(plain, BODY.shape)
-    mixed.payload_center[::2], mixed.payload_gyration[::2] = 0.0, 0.0
-    rng = np.random.default_rng(5)
-    q, v, a = rng.uniform(-1.0, 1.0, (3, len(arms), 4, plain.dof))
-    mass = np.array([0.0, 0.5, 1.0, 2.0])
-    one, other = (inverse_dynamics(arrays, q, v, a, mass) for arrays in (plain, mixed))
-    assert np.array_equal(one[::2], other[::2])
-    assert not np.allclose(one[1::2], other[1::2])
-    points = rng.uniform(-0.4, 0.4, (4, 3))
-    one, other = (solve_postures(arrays, points, payload=mass).torque for arrays in (plain, mixed))
-    assert np.array_equal(one[::2], other[::2])
 
 
 @pytest.mark.parametrize("arm", ARMS)
@@ -158,7 +107,7 @@ def test_mass_of_a_tool_counts_as_in_pinocchio(arm: Any) -> None:
     """Add the tool to Pinocchio's model by its own means; compare gravity, inverse dynamics and the mass matrix."""
     bare = replace(arm, tool=replace(arm.tool, mass=0.0, com=(0.0, 0.0, 0.0), inertia=MountedTool().inertia))
     body = pinocchio.Inertia(HELD.mass, np.array(HELD.center), np.diag(HELD.inertia))
-    peer, held = carrying_peer(to_urdf(bare), body), with_tool(bare, HELD)
+    peer, held = carrying_peer(bare, body), with_tool(bare, HELD)
     arrays, rng = stack_arms([held], "float64"), np.random.default_rng(1)
     own = [number - 1 for number, _ in moving(arm)]
     for q in postures(arm, 3):

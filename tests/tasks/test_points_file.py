@@ -1,6 +1,5 @@
 """Targets from files of points: columns by name, units, tool directions and decimal commas."""
 
-import contextlib
 import csv
 import io
 import math
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -103,21 +102,14 @@ def test_the_order_of_columns_does_not_matter(order: list[str], given_points: li
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1))
+@example([0.0, 1.0, 0.0, 1.0])  # gimbal lock
+@example([1.0, 1.0, 1.0, 1.0])
+@example([1.0, 0.0, -1.0, 0.0])
 def test_quaternions_become_the_same_rotation(quaternion: list[float]) -> None:
     unit = np.array(quaternion) / np.linalg.norm(quaternion)
     (target,) = parsed("x,y,z,qw,qx,qy,qz\n1,2,3," + ",".join(f"{unit[i]:.17g}" for i in (3, 0, 1, 2))).targets
     assert isinstance(target, Target)
     assert target.rotation == pytest.approx(Rotation.from_quat(unit).as_matrix(), abs=1e-7)
-
-
-@pytest.mark.parametrize(
-    "turn", [(0.0, 1.0, 0.0, 1.0), (0.0, -1.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0), (1.0, 0.0, -1.0, 0.0)]
-)
-def test_quaternions_in_gimbal_lock_become_the_same_rotation(turn: tuple[float, ...]) -> None:
-    unit = np.array(turn) / np.linalg.norm(turn)
-    (target,) = parsed("x,y,z,qx,qy,qz,qw\n1,2,3," + ",".join(f"{value:.7f}" for value in unit)).targets
-    assert isinstance(target, Target)
-    assert target.rotation == pytest.approx(Rotation.from_quat(unit).as_matrix(), abs=1e-6)
 
 
 def test_angles_are_read_in_their_unit() -> None:
@@ -199,12 +191,6 @@ def test_a_unit_that_the_header_contradicts_is_refused(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_bytes(b"\xff\xfex")
     with pytest.raises(TaskError, match="UTF-8"):
         read_points(tmp_path / "points.csv")
-
-
-@given(st.text(max_size=200) | st.text('xyz,;\t 1.\n#"[m]', max_size=60))
-def test_any_text_is_read_or_refused(text: str) -> None:
-    with contextlib.suppress(TaskError):
-        assert parsed(text).targets
 
 
 targets = st.builds(

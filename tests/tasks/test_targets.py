@@ -70,10 +70,7 @@ def test_target_with_only_a_position_is_a_point() -> None:
 @pytest.mark.parametrize(
     ("target", "words"),
     [
-        ("{axis: [0, 0, 1]}", r"targets\[1\].position: expected three numbers \[m\], but the key is missing"),
-        ("{position: [0, 0, 1], axes: [0, 0, 1]}", r'targets\[1\]: unknown key "axes".*Did you mean "axis"'),
         ("{position: [0, 0, 1], axis: [0, 0, 0]}", r"targets\[1\]: axis = .* is no direction"),
-        ("{position: [0, 0, 1], axis: [0, 0, .nan]}", r"targets\[1\].axis\[2\]"),
         (
             "{position: [0, 0, 1], axis: [0, 0, 1], orientation: [0, 0, 1]}",
             r"targets\[1\]: expected axis or orientation, got both",
@@ -82,23 +79,14 @@ def test_target_with_only_a_position_is_a_point() -> None:
             "{position: [0, 0, 1], orientation: [0, 0, 90]}",
             r"targets\[1\]: orientation: expected .* rad.*90° is 1.5708",
         ),
-        (
-            "{position: [0, 0, 1], tolerance: 0}",
-            r"targets\[1\].tolerance: expected a number of at least 1e-09 m, got 0",
-        ),
         ("{position: [0, 0, 1], angle_tolerance: 0.1}", r"targets\[1\]: angle_tolerance needs an axis"),
-        ("{position: [0, 0, 1], weight: -1}", r"targets\[1\].weight"),
         ("{position: [0, 0, 1001]}", "target 2 = .* is more than 1000 m away"),
-        ("[0, 0]", r"targets\[1\]: expected three numbers x, y, z \[m\], got 2"),
         ("{position: [0, 0,4, 1]}", r"targets\[1\].position: expected three numbers .*, got 4: .*0.4, not 0,4"),
     ],
 )
 def test_mistakes_are_reported(target: str, words: str) -> None:
     with pytest.raises(TaskError, match=words):
         task(f"name: a\ntargets:\n  - [0, 0, 1]\n  - {target}\n")
-
-
-# Objectives
 
 
 def test_orientation_counts_only_for_oriented_targets() -> None:
@@ -140,9 +128,6 @@ def test_verification_uses_the_same_targets() -> None:
     assert (verified.exact[:, 2] > 0.0).all()
 
 
-# Why a target is missed
-
-
 def test_reasons_of_missed_targets() -> None:
     links = (uniform_link((0, 0, 0.3), 0.1, 0.01),) * 2
     arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -0.5, 2.0), Joint("revolute", "y", -2.0, 2.0)), links)
@@ -163,6 +148,3 @@ def test_reasons_of_missed_targets() -> None:
     assert "joint 1 at its lower limit" in limited
     assert " mm and " in askew
     assert f"{np.degrees(found.angle_error[0, 3]):.1f}°" in askew
-
-
-# Prompts and run folders

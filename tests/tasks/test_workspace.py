@@ -5,15 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.exceptions import SettingsError, TaskError
+from armwright.exceptions import TaskError
 from armwright.kinematics.ik.solve import solve
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import DEXTEROUS_VOLUME, OBJECTIVES, UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION
+from armwright.problem.objectives import DEXTEROUS_VOLUME, UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.rotations import cone_directions
 from armwright.spaces.design_space import paper_space
-from armwright.tasks.catalogue import load_task, random_task
 from armwright.tasks.obstacles import Box
 from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region, sample_regions
@@ -32,9 +31,6 @@ def task(**more: Any) -> Task:
     )
 
 
-# The points
-
-
 def test_workspace_points_lie_in_their_region() -> None:
     one, flat, spot = (
         region(points=50),
@@ -47,9 +43,6 @@ def test_workspace_points_lie_in_their_region() -> None:
     assert np.all((points[50:250] >= flat.low) & (points[50:250] <= flat.high))
     assert np.all(points[250:] == 0.0)
     assert np.array_equal(sample_regions((region(points=10),)), points[:10]), "more points keep those that are there"
-
-
-# What is reached
 
 
 def test_two_link_arm_reaches_a_spherical_shell() -> None:
@@ -78,27 +71,6 @@ def test_workspace_points_are_solved_like_targets() -> None:
     assert problem.evaluate(designs).values[:, 0] == pytest.approx((as_targets.position_error >= 1e-3).mean(axis=1))
 
 
-def test_workspace_is_computed_on_demand() -> None:
-    designs = paper_space().sample(10, 0)
-    target_1 = load_task("target-1")
-    with_ = target_1.model_copy(update={"workspace": task().workspace})
-    evaluation = Problem(with_).physics(designs)
-    assert np.array_equal(Problem(with_).outcomes(evaluation).values, Problem(target_1).evaluate(designs).values)
-    assert "workspace_error" not in vars(evaluation)
-    assert not Problem(with_).uses("workspace")
-    assert Problem(task(), objectives=(UNCOVERED_FRACTION,)).uses("workspace")
-
-
-def test_no_workspace_means_nothing_uncovered() -> None:
-    with pytest.raises(SettingsError, match="uncovered_fraction needs a workspace in the task; try workspace: "):
-        Problem(
-            random_task(1).model_copy(update={"reference_point": None}), objectives=(OBJECTIVES["uncovered_fraction"],)
-        ).evaluate(paper_space().sample(1, 0))
-
-
-# From the file on
-
-
 def test_default_targets_are_the_workspace_corners() -> None:
     found = task(workspace=[CUBE, {"low": (1, 0, 0), "high": (2, 1, 0), "points": 9}])
     assert len(found.targets) == 8 + 2, "corners that both have count once"
@@ -109,17 +81,10 @@ def test_default_targets_are_the_workspace_corners() -> None:
 
 FAULTS = {
     "{low: [0, 0, 0.5], high: [1, 1, 0.4]}": "workspace: expected low z <= high z, got 0.5 m and 0.4 m",
-    "{low: [0, 0], high: [1, 1, 1]}": "workspace.*low",
-    "{low: [0, 0, 0]}": "workspace.*high",
-    "{low: [0, 0, 0], high: [1, 1, 1], points: 0}": "points",
-    "{low: [0, 0, 0], high: [1, 1, 1], point: 9}": "point",
-    "{low: [0, 0, 0], high: [1, 1, 2000]}": "high",
-    "[[0, 0, 0], [1, 1, 1]]": "workspace",
     "everything": r"workspace: expected \{low: \[x, y, z\], high",
     "[]": "targets",
     "{low: [0, 0, 0], high: [1, 1, 1], directions: {axis: [0, 0, 0]}}": r"directions: axis = \[0.0, 0.0, 0.0\] is no",
     "{low: [0, 0, 0], high: [1, 1, 1], directions: {half_angle: 45}}": "directions.half_angle: .* at most 3.14159 rad",
-    "{low: [0, 0, 0], high: [1, 1, 1], directions: {cone: 1}}": 'directions: unknown key "cone"',
     "{low: [0, 0, 0], high: [1, 1, 1], points: 600, directions: {count: 100}}": "at most 50000 points x directions",
     "[{low: [0, 0, 0], high: [1, 1, 1], points: 6000}, {low: [0, 0, 0], high: [1, 1, 1], points: 6000}]": "10000",
 }
@@ -131,9 +96,6 @@ def test_invalid_workspaces_are_refused_in_one_line(written: str) -> None:
     with pytest.raises(TaskError, match=FAULTS[written]) as refused:
         parse_document(text, Task, TaskError, "it.yaml")
     assert "\n" not in str(refused.value)
-
-
-# Directions of the tool
 
 
 CONE: dict[str, Any] = {"axis": (0, 0, 1), "half_angle": 0.6, "count": 9, "share": 0.5}
