@@ -14,6 +14,7 @@ from pymoo.indicators.hv import HV
 from scipy.stats import wilcoxon
 from typer.testing import CliRunner
 
+from armwright import Problem, Task, find_front, load_task, optimize, read_run
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.experiments.compare_runs import Comparison, compare_runs, compare_summaries
@@ -23,13 +24,7 @@ from armwright.experiments.run_record import RunSummary, read_run_summary, share
 from armwright.experiments.statistics import interval, paired_test
 from armwright.experiments.tables import latex, markdown, write_tables
 from armwright.pictures.comparison_figures import write_comparison_figures
-from armwright.problem.problem import Problem
 from armwright.proof.front_gap import known_front
-from armwright.runs.folder import read_run
-from armwright.study.front.front_run import find_front
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
-from armwright.tasks.task import Task
 from tests.support.chat_server import ChatServer, wants_design
 from tests.support.wire_formats import llm_proposer
 
@@ -64,7 +59,7 @@ def changed(folder: Path, change: Callable[[dict], None]) -> None:
 
 
 def test_table_values_match_the_hypervolume_histories(runs: Path, comparison: Comparison) -> None:
-    assert comparison.rows
+    assert len(comparison.rows) == 4
     for row in comparison.rows:
         proposer = "none" if row.method.startswith("BBO (") else "rules"
         summaries = [
@@ -77,13 +72,21 @@ def test_table_values_match_the_hypervolume_histories(runs: Path, comparison: Co
         assert row.e_hv.mean == pytest.approx(np.mean([np.mean(at) for at in curves.T]))
         assert row.sigma_hv == pytest.approx(np.mean([np.std(at) for at in curves.T]))
         assert row.final.mean == pytest.approx(curves[:, -1].mean())
-    assert len(comparison.rows) == 4
+        share = row.share_of_best_known
+        assert share is None if row.task == "random-4" else share is not None and 0.0 < share.mean < 1.0
+    assert len(comparison.contrasts) == 2
+    for contrast in comparison.contrasts:
+        ours, theirs = (
+            [run.curve.mean() for run in comparison.runs_of(method, contrast.task)]
+            for method in (contrast.method, contrast.baseline)
+        )
+        assert contrast.test == paired_test(ours, theirs)
+        assert contrast.p_holm is None, "three pairs are too few for a test"
+    assert comparison.is_undecidable
 
 
 def test_methods_are_compared_with_each_that_they_name(runs: Path) -> None:
-    records = [
-        read_run_summary(folder, folder.name.split("-")[2]) for folder in find_runs([runs / f"{TASKS[0]}-none-0"])
-    ]
+    records = [read_run_summary(runs / f"{TASKS[0]}-none-0", "none")]
     records += [replace(records[0], method=f"m{i}", seed=seed) for i in range(3) for seed in range(min(2, i + 1))]
     labels = ["none", "m0", "m1", "m2"]
     found = Comparison(records, labels, TASKS[:1], "none", {"m1": ["none", "m0"], "m2": ["m1", "gone"]})
@@ -104,42 +107,19 @@ def test_shares_by_source_add_up(comparison: Comparison) -> None:
                 assert sum(share[part] for share in shares.values()) == pytest.approx(1.0)
 
 
-def test_share_of_best_known_needs_a_known_front(comparison: Comparison) -> None:
-    shares = {row.task: row.share_of_best_known for row in comparison.rows}
-    assert shares["random-4"] is None
-    assert shares["target-1"] is not None
-    assert 0.0 < shares["target-1"].mean < 1.0
-
-
-def test_contrasts_pair_runs_by_seed(comparison: Comparison) -> None:
-    assert comparison.contrasts
-    for contrast in comparison.contrasts:
-        ours, theirs = (
-            [run.curve.mean() for run in comparison.runs_of(method, contrast.task)]
-            for method in (contrast.method, contrast.baseline)
-        )
-        assert contrast.test == paired_test(ours, theirs)
-        assert contrast.p_holm is None, "three pairs are too few for a test"
-    assert comparison.is_undecidable
-
-
 def test_p_is_shown_and_corrected_from_six_pairs_on(runs: Path, tmp_path: Path) -> None:
     records = [read_run_summary(folder) for folder in find_runs([runs])]
-    doubled = [
-        replace(run, seed=run.seed + 3 * i) for i in range(2) for run in records if run.task == "target-1" or i == 0
-    ]
-    comparison = compare_summaries(doubled, baseline="BBO (12 trials)")
+    more = [replace(run, seed=run.seed + 3) for run in records if run.task == "target-1"]
+    comparison = compare_summaries([*records, *more], baseline="BBO (12 trials)")
     by_task = {contrast.task: contrast for contrast in comparison.contrasts}
-    assert by_task["target-1"].test.n == 6
-    assert by_task["target-1"].p_holm == by_task["target-1"].test.p, "the only test"
+    tested = by_task["target-1"]
+    assert (tested.test.n, tested.p_holm) == (6, tested.test.p), "the only test"
     assert by_task["random-4"].p_holm is None
     write_tables(tmp_path, comparison, "x")
-    rows = {
-        row["task"]: row
-        for row in csv.DictReader((tmp_path / "contrasts.csv").read_text(encoding="utf-8").splitlines())
-    }
-    assert float(rows["target-1"]["p_holm"]) == by_task["target-1"].test.p
-    assert (rows["random-4"]["p"], rows["random-4"]["p_holm"]) == ("", "")
+    rows = csv.DictReader((tmp_path / "contrasts.csv").read_text(encoding="utf-8").splitlines())
+    shown = {row["task"]: (row["p"], row["p_holm"]) for row in rows}
+    assert float(shown["target-1"][1]) == tested.test.p
+    assert shown["random-4"] == ("", "")
 
 
 def test_overall_contrast_counts_every_task_once(runs: Path) -> None:
@@ -175,24 +155,17 @@ def test_times_count_the_runs_that_reached_the_target(comparison: Comparison) ->
         assert (time.median_trials is None) == (time.reached < 2)
 
 
-def test_flagged_runs_are_excluded(runs: Path, tmp_path: Path) -> None:
-    place = shutil.copytree(runs, tmp_path / "runs")
-    changed(place / "target-1-rules-1", lambda s: s["proposer"].update(flagged=True, fallback_share=0.5))
-    found = compare_summaries([read_run_summary(folder) for folder in find_runs([place])])
-    method = next(m for m in found.methods if "rules" in m)
-    assert [run.seed for run in found.runs_of(method, "target-1")] == [0, 2]
-    assert "excluded, because 50% of its proposals failed" in markdown(found, "x")
-
-
-def test_scripted_runs_are_marked_in_tables(runs: Path, tmp_path: Path) -> None:
+def test_flagged_runs_are_excluded_and_scripted_ones_marked(runs: Path, tmp_path: Path) -> None:
     place = shutil.copytree(runs, tmp_path / "runs")
     for seed in SEEDS:
         changed(place / f"target-1-rules-{seed}", lambda s: s["proposer"].update(origin="scripted", model="gpt-x"))
+    changed(place / "target-1-rules-1", lambda s: s["proposer"].update(flagged=True, fallback_share=0.5))
     found = compare_summaries([read_run_summary(folder) for folder in find_runs([place])])
+    assert [run.seed for run in found.runs if run.folder.name.startswith("target-1-rules")] == [0, 2]
+    assert "excluded, because 50% of its proposals failed" in markdown(found, "x")
     for text in (markdown(found, "x"), latex(found)):
         assert "[scripted]" in text
         assert "gpt-x" not in text
-        assert "a scripted stand-in answered instead of a language model" in text
 
 
 def test_incomparable_runs_are_refused(runs: Path, tmp_path: Path) -> None:
@@ -261,25 +234,20 @@ def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: P
     comparison.published = Published({("BBO (12 trials)", "target-1"): (6.7, 2.03)}, "The Paper")
     files = write_tables(tmp_path, comparison, "All", ["one cell is missing"])
     assert {path.name for path in files} >= {"table.md", "table.csv", "table.tex", "contrasts.csv", "time-to.csv"}
-    text = (tmp_path / "table.md").read_text(encoding="utf-8")
+    text, tex = ((tmp_path / f"table.{form}").read_text(encoding="utf-8") for form in ("md", "tex"))
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(comparison.rows) == 4
     for row in rows:
-        assert f"{float(row['e_hv']):.2f} ({float(row['sigma_hv']):.2f})" in text
-    assert "6.70 (2.03)" in text
-    assert "The Paper" in text
-    assert "one cell is missing" in text
-    assert "no p is shown for them (the smallest p of 3 pairs is 0.25)" in text
-    table = re.findall(r"(?m)^\|.*$", text)
-    assert len(table) > len(rows)
-    assert all(line.endswith("|") for line in table)
-    tex = (tmp_path / "table.tex").read_text(encoding="utf-8")
+        cell = f"{float(row['e_hv']):.2f} ({float(row['sigma_hv']):.2f})"
+        assert cell in text
+        assert cell in tex
+    for words in ("6.70 (2.03)", "The Paper", "one cell is missing", "the smallest p of 3 pairs is 0.25"):
+        assert words in text
+    assert all(line.endswith("|") for line in re.findall(r"(?m)^\|.*$", text))
     columns, part = re.findall(r"(?s)\\begin\{tabular\}\{(\w+)\}(.*?)\\end\{tabular\}", tex)[0]
     assert {line.count("&") for line in part.splitlines() if line.endswith(r"\\")} == {len(columns) - 1}
     assert tex.count("{") == tex.count("}")
     assert "_" not in tex.replace(r"\_", "")
-    for row in rows:
-        assert f"{float(row['e_hv']):.2f} ({float(row['sigma_hv']):.2f})" in tex
 
 
 @pytest.mark.slow
@@ -312,11 +280,9 @@ def test_compare_command(runs: Path, tmp_path: Path) -> None:
     runner = CliRunner()
     result = runner.invoke(app, ["compare", str(runs), "--out", str(tmp_path / "out"), "--no-figures"])
     assert result.exit_code == 0, result.output
-    assert "## Differences" in result.output
     assert (tmp_path / "out" / "table.tex").is_file()
     listed = json.loads(runner.invoke(app, ["compare", "--list", str(runs), "--json"]).output)
-    assert len(listed) == 12
-    assert {run["state"] for run in listed} == {"finished"}
+    assert [run["state"] for run in listed] == ["finished"] * 12
     assert "random-4" in runner.invoke(app, ["compare", "--list", str(runs)]).output
 
 

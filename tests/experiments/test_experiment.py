@@ -33,6 +33,7 @@ from armwright.llm.model_options import ModelOptions
 from armwright.llm.recording_file import shipped_recordings
 from armwright.search.samplers import SAMPLERS
 from tests.support.chat_server import ChatServer
+from tests.torture.short import trials
 
 SMALL: dict[str, Any] = {
     "name": "small",
@@ -57,10 +58,10 @@ def file_of(folder: Path, **changes: Any) -> Path:
     return file
 
 
-def asking(server: ChatServer, **settings: Any) -> dict[str, Any]:
+def asking(server: ChatServer) -> dict[str, Any]:
     """Return a method that calls the local server."""
     named = {"model": "test-model", "base_url": server.url, "origin": "scripted"}
-    return {"label": "BBO/LLM+", "proposer": "llm", "n_step": 3, "model_options": named, **settings}
+    return {"label": "BBO/LLM+", "proposer": "llm", "n_step": 3, "model_options": named}
 
 
 def invoke(*arguments: str | Path) -> Any:
@@ -75,16 +76,13 @@ def run_here(file: Path, *options: str) -> Any:
 def test_paper_experiment_matches_the_paper() -> None:
     plan = builtin_experiments()["paper"]
     assert plan.task_list == ("target-1", "target-2", "target-3")
-    assert plan.seed_list == (0, 1, 2, 3, 4)
-    assert (plan.n_init, plan.n_total) == (10, 200)
+    assert (plan.seed_list, plan.n_init, plan.n_total) == ((0, 1, 2, 3, 4), 10, 200)
     asked = {key: method for key, method in plan.methods.items() if method.needs_a_model}
     steps = {key: method.n_step for key, method in asked.items() if method.model_options.prompt == "plus"}
     assert steps == {"llm-plus-5": 5, "llm-plus": 10, "llm-plus-50": 50}
-    assert all(method.model_options.temperature == 0 for method in plan.methods.values() if method.needs_a_model)
-    table = plan.published
-    assert table["bbo"]["target-1"] == (6.70, 2.03)
-    assert table["llm-minus"]["target-2"] == (13.87, 2.33)
-    assert table["llm-plus"]["target-3"] == (16.29, 1.53)
+    assert all(method.model_options.temperature == 0 for method in asked.values())
+    assert plan.published["bbo"]["target-1"] == (6.70, 2.03)
+    assert plan.published["llm-plus"]["target-3"] == (16.29, 1.53)
 
 
 def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> None:
@@ -104,30 +102,6 @@ def test_samplers_run_alone_and_with_rules(tmp_path: Path) -> None:
     assert not skipped
     seeds = Counter((cell.plan.sampler, cell.task_name) for cell in cells if cell.plan.proposer == "rules")
     assert seeds == {(name, task): 5 if name == "gp" else 20 for name in SAMPLERS for task in plan.task_list}
-
-
-def test_experiment_about_a_model_needs_one(tmp_path: Path) -> None:
-    plan = builtin_experiments()["n-step"]
-    cells, skipped = plan_cells(plan, tmp_path, tmp_path)
-    assert len({cell.method for cell in cells}) == 5
-    assert {one.cell.plan.proposer for one in skipped} == {"llm"}
-    cells, skipped = plan_cells(with_model(plan, ModelOptions(model="gpt-x")), tmp_path, tmp_path)
-    assert not skipped
-    assert sum(200 // cell.plan.n_step for cell in cells if cell.plan.needs_a_model) == 3 * 5 * (100 + 40 + 20 + 4)
-
-
-def test_builtin_experiments_run_with_few_trials(tmp_path: Path) -> None:
-    for name, methods in (
-        ("samplers", ["tpe", "random-rules", "nsga2-rules"]),
-        ("n-step", ["bbo", "rules-2", "rules-50"]),
-    ):
-        plan = with_only(with_seeds(builtin_experiments()[name], 1), methods, ["target-2"])
-        plan = plan.model_copy(update={"n_init": 4, "n_total": 6})
-        cells, _ = plan_cells(plan, tmp_path, tmp_path / name)
-        assert [run_cell(cell).fault for cell in cells] == ["", "", ""]
-        found = collect(plan, cells)
-        first = plan.methods[methods[0]].label
-        assert {(contrast.baseline, contrast.test.n) for contrast in found.contrasts} == {(first, 1)}
 
 
 @pytest.mark.parametrize(
@@ -156,12 +130,13 @@ def test_unknown_experiments_methods_and_tasks_are_refused(tmp_path: Path) -> No
         load_experiment("papr")
     with pytest.raises(SettingsError, match=r'has no method "rulez"\. Did you mean "rules"'):
         with_only(plan_of(), ["rulez"], [])
-    with pytest.raises(TaskError, match="unknown task"):
-        plan_cells(plan_of(tasks=["targt-1"]), tmp_path, tmp_path)
-    with pytest.raises(TaskError, match="there is no file"):
-        plan_cells(plan_of(tasks=["mine.yaml"]), tmp_path, tmp_path)
+    for task, words in (("targt-1", "unknown task"), ("mine.yaml", "there is no file")):
+        with pytest.raises(TaskError, match=words):
+            plan_cells(plan_of(tasks=[task]), tmp_path, tmp_path)
     with pytest.raises(SettingsError, match="--seeds: expected a whole number from 1 to 10000, got 0"):
         with_seeds(plan_of(), 0)
+    with pytest.raises(FailureError, match="no cell of the experiment is finished"):
+        collect(plan_of(), plan_cells(plan_of(), tmp_path, tmp_path)[0])
 
 
 def test_method_runs_its_share_of_the_seeds(tmp_path: Path) -> None:
@@ -198,21 +173,20 @@ def test_task_and_space_files_next_to_the_experiment_are_found(tmp_path: Path) -
     assert all(Path(cell.task).is_absolute() and Path(str(cell.space)).is_absolute() for cell in cells)
     outcome = run_cell(cells[0])
     assert not outcome.fault
-    assert (
-        len(json.loads((cells[0].folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()[0])["params"]) == 9
-    )
+    assert len(trials(cells[0].folder)[0]["params"]) == 9
 
 
 def test_cells_without_a_model_are_skipped_with_a_reason(tmp_path: Path) -> None:
-    methods = {**SMALL["methods"], "llm": {"label": "BBO/LLM", "proposer": "llm"}}
-    cells, skipped = plan_cells(plan_of(methods=methods), tmp_path, tmp_path)
-    assert {one.cell.method for one in skipped} == {"llm"}
-    assert len(skipped) == 4
+    plan = builtin_experiments()["n-step"]
+    cells, skipped = plan_cells(plan, tmp_path, tmp_path)
+    assert {one.cell.plan.proposer for one in skipped} == {"llm"}
     assert "no language model is configured" in skipped[0].reason
-    assert {cell.method for cell in cells} == {"bbo", "rules"}
-    cells, skipped = plan_cells(with_model(plan_of(methods=methods), ModelOptions(model="gpt-x")), tmp_path, tmp_path)
+    assert len({cell.method for cell in cells}) == 5
+    cells, skipped = plan_cells(with_model(plan, ModelOptions(model="gpt-x")), tmp_path, tmp_path)
     assert not skipped
-    assert {cell.plan.model_options.model for cell in cells if cell.method == "llm"} == {"gpt-x"}
+    asking = [cell for cell in cells if cell.plan.needs_a_model]
+    assert {cell.plan.model_options.model for cell in asking} == {"gpt-x"}
+    assert sum(200 // cell.plan.n_step for cell in asking) == 3 * 5 * (100 + 40 + 20 + 4)
 
 
 def test_replayed_methods_run_the_cells_with_a_recording(tmp_path: Path) -> None:
@@ -263,8 +237,9 @@ def test_tasks_are_checked_once_before_any_cell_runs(in_folder: Path) -> None:
 
 @pytest.mark.slow
 def test_changed_method_does_not_reuse_an_existing_run(in_folder: Path) -> None:
-    assert run_here(file_of(in_folder, seeds=1, tasks=["random-3"])).exit_code == 0
-    methods = {**SMALL["methods"], "rules": {**SMALL["methods"]["rules"], "n_step": 2}}
+    methods = {"rules": SMALL["methods"]["rules"]}
+    assert run_here(file_of(in_folder, seeds=1, tasks=["random-3"], methods=methods)).exit_code == 0
+    methods["rules"] = {**methods["rules"], "n_step": 2}
     result = run_here(file_of(in_folder, seeds=1, tasks=["random-3"], methods=methods))
     assert result.exit_code == 1
     assert "FAILED: BBO/rules, random-3, seed 0" in result.output
@@ -317,24 +292,15 @@ def test_printed_commands_make_the_same_runs(in_folder: Path) -> None:
 def test_recorded_experiment_replays_without_a_model(in_folder: Path, chat_server: ChatServer) -> None:
     settings: dict[str, Any] = {"tasks": ["random-3"], "methods": {"llm": asking(chat_server)}}
     file = file_of(in_folder, **settings)
-    first = run_here(file, "--out", "first")
-    assert first.exit_code == 0, first.output
-    assert f"2 of them ask test-model at {chat_server.url} for about 4 proposals in total" in first.output
+    done = run_here(file, "--out", "first")
+    assert done.exit_code == 0, done.output
+    assert f"2 of them ask test-model at {chat_server.url} for about 4 proposals in total" in done.output
     assert "[scripted]" in (in_folder / "first" / "table.md").read_text(encoding="utf-8")
     chat_server.requests.clear()
-    again = run_here(file, "--out", "again", "--replay", "first", "--seeds", "3")
-    assert again.exit_code == 0, again.output
+    done = run_here(file, "--out", "again", "--replay", "first", "--seeds", "3")
+    assert done.exit_code == 0, done.output
     assert not chat_server.requests
-    assert "skipped: BBO/LLM+, 1 cell: first has no recorded run of it" in again.output
+    assert "skipped: BBO/LLM+, 1 cell: first has no recorded run of it" in done.output
     for seed in range(2):
-        runs = [in_folder / place / f"runs/llm/random-3/seed{seed}/trials.jsonl" for place in ("first", "again")]
-        one, other = (
-            [json.loads(line)["params"] for line in run.read_text(encoding="utf-8").splitlines()] for run in runs
-        )
-        assert one == other
-
-
-def test_collect_without_finished_cells_is_refused(tmp_path: Path) -> None:
-    cells, _ = plan_cells(plan_of(), tmp_path, tmp_path)
-    with pytest.raises(FailureError, match="no cell of the experiment is finished"):
-        collect(plan_of(), cells)
+        first, again = (trials(in_folder / place / f"runs/llm/random-3/seed{seed}") for place in ("first", "again"))
+        assert [trial["params"] for trial in first] == [trial["params"] for trial in again]

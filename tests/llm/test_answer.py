@@ -9,12 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armwright import Problem, PromptOptions, load_task, paper_space
 from armwright.exceptions import DesignError
 from armwright.llm.answer import Answer, answer_schema, read_answer, read_text, written_answer
-from armwright.llm.model_options import PromptOptions
-from armwright.problem.problem import Problem
-from armwright.spaces.design_space import paper_space
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN
 
 PROBLEM = Problem(load_task("target-1"))
@@ -65,7 +62,6 @@ def test_schema_describes_accepted_answers(joints: int, reasoning: bool) -> None
     [
         changed(link_2="0.2", origin_z="-0.1"),
         changed(link_2="0.2 m", origin_z="−0.1m"),
-        changed(link_2=" +.2 ", origin_z="-1e-1"),
         changed(origin_x=0),
         changed(joint_1="y", joint_2=" p ", joint_3="'R'", joint_4='"P"'),
         changed(joint_1="yaw", joint_2="Pitch", joint_3="ROLL"),
@@ -74,7 +70,6 @@ def test_schema_describes_accepted_answers(joints: int, reasoning: bool) -> None
         {"origin": [0, 0.01, -0.1], "joints": ["Y", "P", "R", "P"], "links": [0.2, 0.2, 0.2, "0.2 m"]},
         {"ORIGIN": "(0, 0.01, -0.1)", "JOINTS": "YPRP", "LINKS": "0.2, 0.2, 0.2, 0.2"},
         changed(reason=None),
-        changed(reason=["a", "b"]),
     ],
 )
 def test_equivalent_forms_are_read_alike(content: dict[str, Any]) -> None:
@@ -86,8 +81,6 @@ def test_equivalent_forms_are_read_alike(content: dict[str, Any]) -> None:
     ("change", "message"),
     [
         ('"origin_x": NaN', "origin_x = nan is not a finite number [m]"),
-        ('"origin_x": "nan"', "origin_x = nan is not a finite number [m]"),
-        ('"origin_x": Infinity', "origin_x = inf is not a finite number [m]"),
         ('"origin_x": 1e999', "origin_x = inf is not a finite number [m]"),
         ('"origin_x": 1' + "0" * 400, "origin_x = inf is not a finite number [m]"),
         ('"origin_x": true', "origin_x = True is not a finite number [m]"),
@@ -95,31 +88,21 @@ def test_equivalent_forms_are_read_alike(content: dict[str, Any]) -> None:
         ('"origin_x": [[1]]', "origin_x = [[1]] is not a finite number [m]"),
         ('"origin_x": "0,1"', "origin_x = '0,1' is not a finite number [m]"),
         ('"origin_x": "0_1"', "origin_x = '0_1' is not a finite number [m]"),
-        ('"origin_x": "1 cm"', "origin_x = '1 cm' is not a finite number [m]"),
         ('"origin_x": 0.1, "origin_x": 0.2', "origin_x = '0.1 and 0.2' is not a finite number [m]"),
         ('"link_3": 1.4', "link_3 = 1.4 m is outside 0.03 <= link_3 <= 0.3 m"),
-        ('"link_3": "1.4 m"', "link_3 = 1.4 m is outside 0.03 <= link_3 <= 0.3 m"),
         ('"link_3": 0.30000000000000004', "link_3 = 0.30000000000000004 m is outside 0.03 <= link_3 <= 0.3 m"),
-        ('"link_3": -0.2', "link_3 = -0.2 m is outside"),
         ('"joint_2": "Z"', "joint_2 = 'Z' is not one of R, P, Y"),
-        ('"joint_2": "RP"', "joint_2 = 'RP' is not one of R, P, Y"),
         ('"joint_2": ["Y"]', "joint_2 = ['Y'] is not one of R, P, Y"),
-        ('"joint_2": null', "joint_2 = None is not one of R, P, Y"),
         ('"link_5": 0.2', 'unknown parameter "link_5"'),
         ('"lnk_4": 0.2', 'Did you mean "link_4"?'),
-        ('"link_4": "' + "9" * 5000 + '"', "link_4 = inf is not a finite number [m]"),
         ('"link_4": "' + "long " * 5000 + '"', "link_4 = 'long long"),
         ('"' + "k" * 50_000 + '": 1', 'unknown parameter "kkkk'),
         ('"two\\nlines\\u001b[31m": 1', 'unknown parameter "two lines"'),
     ],
 )
 def test_refusals_name_parameter_and_range(change: str, message: str) -> None:
-    text = JSON[:-1] + ", " + change + "}"
-    if change.split('"')[1] in GOOD_DESIGN and change.count(change.split('"')[1]) == 1:  # the value, not a second one
-        rest = {key: value for key, value in GOOD_DESIGN.items() if key != change.split('"')[1]}
-        text = json.dumps(rest)[:-1] + ", " + change + "}"
-    elif "and" in message:
-        text = text.replace('"origin_x": 0.0, ', "")
+    rest = {key: value for key, value in GOOD_DESIGN.items() if key != change.split('"')[1]}
+    text = f"{json.dumps(rest)[:-1]}, {change}}}"
     for form in (text, f"So:\n```json\n{text}\n```\nThat is all."):
         with pytest.raises(DesignError) as refusal:
             one(form)
@@ -134,8 +117,6 @@ def test_refusals_name_parameter_and_range(change: str, message: str) -> None:
         ("", "no design found"),
         ("I cannot help with that.", "no design found"),
         ("{}", "missing: origin_x, origin_y"),
-        ("[]", "no design found"),
-        ("null", "no design found"),
         ("{" * 100_000, "no design found"),
         (json.dumps({k: v for k, v in GOOD_DESIGN.items() if k != "link_4"}), "missing: link_4"),
         (LINES.replace("0.2)", "0.2, 0.2)"), 'unknown parameter "link_5"'),
@@ -144,11 +125,8 @@ def test_refusals_name_parameter_and_range(change: str, message: str) -> None:
         (LINES.replace(", P)", ")"), "missing: joint_4"),
         (LINES.replace("(Y,", "(Z,"), "joint_1 = 'Z' is not one of R, P, Y"),
         (LINES.replace("(0.2,", "(20 cm,"), "link_1 = '20 cm' is not a finite number [m]"),
-        (LINES.replace("(0.2,", "(2.5,"), "link_1 = 2.5 m is outside"),
-        (LINES.replace("(0.2,", "(nan,"), "link_1 = nan is not a finite number [m]"),
         (LINES.replace("(0.2,", "(0.2 ± 0.1,"), "missing: link_1"),
         (LINES.replace("(0.2,", "(0.1-0.2,"), "missing: link_1"),
-        (LINES.replace("(0.2,", "(1/5,"), "missing: link_1"),
         (LINES + "LINKS: (0.1, 0.2, 0.2, 0.2)", "link_1 = '0.2 and 0.1' is not"),
         (LINES + "ORIGIN: (0, 0, 0)", "missing: joint_1"),  # begun, not finished: never filled up from the one before
         (LINES + '{"origin_x": 0.3, "origin_y"', "the last JSON object is incomplete"),
@@ -184,31 +162,20 @@ def test_ambiguous_answers_are_refused(text: str, message: str) -> None:
         f'{{"reasoning": "</think> {{\\"origin_x\\": 1}} <think>", {JSON[1:]}',
         LINES,
         LINES.lower(),
-        LINES.replace("(", "[").replace(")", "]"),
-        LINES.replace("(", "").replace(")", ""),
         LINES.replace(": ", " = "),
         LINES.replace(":", ":\n"),
-        LINES.replace("\n", "\r\n"),
         LINES.replace("ORIGIN:", "- **ORIGIN:**").replace("JOINTS:", "* **JOINTS**:").replace("LINKS:", "3. `LINKS`:"),
-        LINES.replace("ORIGIN:", "### ORIGIN:").replace("JOINTS:", "> JOINTS:").replace("LINKS:", "• LINKS:"),
         LINES.replace(",", " m,").replace(" m, P", ", P").replace(" m, R", ", R").replace("2)", "2 m)"),
         LINES.replace("Y, P, R, P", "YPRP"),
-        LINES.replace("(Y, P, R, P)", "Y-P-R-P"),
         LINES.replace("(Y, P, R, P)", "Y P R P"),
-        LINES.replace("(Y, P, R, P)", "y, p, r, p"),
         LINES.replace("(Y, P, R, P)", "Yaw, pitch, Roll, pitch"),
         LINES.replace("(Y, P, R, P)", "(Y (yaw), P (pitch), R (roll), P (pitch))"),
         LINES.replace("(Y, P, R, P)", "joint_1 = Y, joint_2 = P, joint_3 = R, joint_4 = P"),
-        LINES.replace("-0.1", "−0.1"),
-        LINES.replace("-0.1", "-.1").replace("0.01", "1e-2"),
         LINES.replace("(0, 0.01, -0.1)", "$(0, 0.01, -0.1)\\,\\mathrm{m}$"),
         LINES.replace("(0, 0.01, -0.1)", "\\(0 \\, ; 0.01 ; -0.1\\)"),
         LINES.replace("(0, 0.01, -0.1)", "(0, 0.01, -0.1) m, a little below the centre"),
-        LINES.replace("(0, 0.01, -0.1)", "0, 0.01, -0.1 (a little below)"),
-        LINES.replace("(0, 0.01, -0.1)", "(x = 0, y = 0.01, z = -0.1)"),
         LINES.replace("(0, 0.01, -0.1)", "(origin_x, origin_y, origin_z) = (0, 0.01, -0.1)"),
         LINES.replace("(0.2, 0.2, 0.2, 0.2)", "link_4 = 0.2 m, link_2 = 0.2 m, link_1 = 0.2 m, link_3 = 0.2 m"),
-        LINES.replace("(0.2, 0.2, 0.2, 0.2)", "L1 = 0.2, L2 = 0.2, L3 = 0.2, L4 = 0.2"),
         LINES.replace("\n", "  "),
         f"ORIGIN: The targets lie about (0, 0, 0).\nJOINTS: Yaw first.\nLINKS: Long ones, 0.3 m at most.\n\n{LINES}",
         f"{LINES}\nREASON: It is good. LINKS = long, JOINTS = strong.",
@@ -275,28 +242,18 @@ def test_arbitrary_text_is_read_or_refused(text: str) -> None:
     [
         "{" * 100_000,
         '{"a":' * 20_000,
-        '{"origin_x":[' * 8_000,
-        "[" * 100_000,
-        '{"a": "' * 15_000,
         " \n" * 50_000,
-        "*" * 100_000,
         "- " * 50_000 + "ORIGIN",
-        "ORIGIN " * 15_000,
-        "ORIGIN:" + " " * 100_000,
         "ORIGIN: (" * 11_000,
         "ORIGIN: (" + "link_" * 20_000,
-        "ORIGIN: " + "1" * 100_000,
-        "ORIGIN: " + "1 " * 50_000,
         ("LINKS: (" + "link_a, " * 240 + "\n") * 50,
         "<think>" * 15_000,
-        "," * 100_000,
         "//" * 50_000,
-        "\\a" * 50_000,
         "JOINTS: " + "Y(" * 50_000,
         JSON * 400,
         '{"a": ' + "9" * 90_000 + "}",
     ],
-    ids=range(22),
+    ids=range(12),
 )
 def test_long_answers_are_read_quickly(text: str) -> None:
     started = time.process_time()

@@ -9,13 +9,11 @@ from typing import Any
 
 import pytest
 import yaml
-from pydantic import ValidationError
 
 import armwright as aw
 from armwright.exceptions import FailureError, ModelError, SettingsError
 from armwright.llm.draft import DRAFTS, Draft
 from armwright.llm.draft_prompt import MAX_DESCRIPTION_LENGTH, draft_prompt, draft_schema
-from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MAX_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.problem.objectives import OBJECTIVES
@@ -73,7 +71,9 @@ def drafted(
     else:
         answers = iter(answer)
         server.answer = lambda request: next(answers)
-    return aw.draft(DESCRIPTION, ModelOptions(model="test-model", base_url=server.url, **options), out=out, force=force)
+    return aw.draft(
+        DESCRIPTION, aw.ModelOptions(model="test-model", base_url=server.url, **options), out=out, force=force
+    )
 
 
 def files(folder: Path) -> set[str]:
@@ -90,7 +90,7 @@ def test_description_becomes_a_task_and_a_space(
         monkeypatch.setenv(name, value)
     chat_server.answer = lambda request: ANSWER
     model = wires.WIRES[wire]
-    options = ModelOptions(model=model or "test-model", base_url=None if model else chat_server.url, output=output)
+    options = aw.ModelOptions(model=model or "test-model", base_url=None if model else chat_server.url, output=output)
     draft = aw.draft(DESCRIPTION, options, out=tmp_path)
     assert [list(point) for point in draft.task.targets] == TASK["targets"]
     assert (draft.task.payload, draft.task.objectives) == (0.5, ("worst_error", "torque_utilisation", "price"))
@@ -118,17 +118,8 @@ def test_draft_files_state_their_origin(chat_server: ChatServer, tmp_path: Path)
         assert re.search(r"^# Drafted by test-model on \d{4}-\d\d-\d\d, armwright \d", text, re.MULTILINE)
         assert f"# Run it with:  {draft.command}\n" in text
         assert text.endswith(f"\n\n{body}")
-        assert "# Assumed: the wall stands 0.6 m in front of the cart\n" in text
-        assert "# Open question: how heavy is the cart?\n" in text
-    assert "\n- [0.6, -1.0, 0.4]\n" in task
     place = tmp_path / "new folder" / "wall"
     assert draft.command == f"armwright optimize '{place}.yaml' --space '{place}-space.yaml'"
-
-
-def test_draft_without_a_folder_writes_nothing(chat_server: ChatServer, in_folder: Path) -> None:
-    draft = drafted(chat_server, ANSWER)
-    assert (files(in_folder), draft.files) == (set(), ())
-    assert draft.command == "armwright optimize wall.yaml --space wall-space.yaml"
 
 
 @pytest.mark.parametrize(
@@ -151,12 +142,8 @@ def test_keys_with_default_values_are_omitted(chat_server: ChatServer, tmp_path:
 REFUSED = {
     "no task": ('{"reasoning": "I would rather talk about walls."}', "task: expected an object with the keys name"),
     "unknown key": (answer_with(task={"paylod": 1}), 'task: unknown key "paylod"'),
-    "not finite": (answer_with(task={"targets": [[float("nan"), 0, 0]]}), "targets[0][0]"),
     "payloads": (answer_with(task={"payload": [0.5, 0.5]}), "payload: expected 1 or 6 values [kg], got 2"),
-    "unknown actuator": (answer_with(space={"actuators": ["XM430-W351"]}), 'unknown actuator "XM430-W351"'),
     "actuators missing": (json.dumps({**FULL, "space": None}), "needs actuators"),
-    "price missing": (answer_with(space={"actuators": ["MG996R"]}), "objective price needs the price of every"),
-    "default's name": (answer_with(space={"name": "paper"}), "the space needs its own name"),
     "built-in name": (answer_with(task={"name": "shelf"}), '"shelf" is that of a built-in task'),
     "no provenance": (answer_with(task={"provenance": None}), "provenance is missing"),
     # Hostile, or near it.
@@ -164,12 +151,9 @@ REFUSED = {
     "long name": (answer_with(task={"name": "w" * 300}), "task: name: expected a name of at most 64 letters"),
     "too long": (answer_with(task={"targets": [[0, 0, 0]] * 10_001}), "task: expected an object"),
 }  # fmt: skip
-REFUSED_FAST = ("no task", "unknown key", "payloads", "actuators missing", "price missing", "built-in name", "path")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name in REFUSED_FAST else pytest.mark.slow) for name in REFUSED]
-)
+@pytest.mark.parametrize("name", REFUSED)
 @pytest.mark.fast_cases(3)
 def test_invalid_draft_is_returned_with_the_reason_and_not_written(
     chat_server: ChatServer, tmp_path: Path, name: str
@@ -194,9 +178,7 @@ def test_invalid_draft_is_returned_with_the_reason_and_not_written(
     assert len(chat_server.requests) == 2 + 3
 
 
-@pytest.mark.parametrize(
-    "wrong", ["I would rather talk about walls.", ANSWER[: ANSWER.index("payload")], "[" * 20_000, "null", "[]"]
-)
+@pytest.mark.parametrize("wrong", [ANSWER[: ANSWER.index("payload")], "[" * 20_000, "null"])
 def test_answer_without_an_object_is_returned(chat_server: ChatServer, tmp_path: Path, wrong: str) -> None:
     draft = drafted(chat_server, [wrong, ANSWER], tmp_path)
     assert (draft.task.name, draft.usage.calls) == ("wall", 2)
@@ -222,7 +204,7 @@ def test_invisible_characters_do_not_reach_files_and_terminal(chat_server: ChatS
 def test_line_breaks_in_a_description_stay_in_the_comment(chat_server: ChatServer, tmp_path: Path) -> None:
     chat_server.answer = lambda request: ANSWER
     description = f"paint\nname: evil\n{'-' * 12}\x1b[0m\u2028targets: []"
-    options = ModelOptions(model="m", base_url=chat_server.url)
+    options = aw.ModelOptions(model="m", base_url=chat_server.url)
     draft = aw.draft(description, options, out=tmp_path / "a\nname: b")
     assert aw.load_task(draft.files[0]) == draft.task
     assert "# From the description: paint name: evil ------------ targets: []\n" in draft.files[0].read_text(
@@ -275,11 +257,8 @@ def test_scripted_draft_is_not_attributed_to_a_model(chat_server: ChatServer, tm
     draft = drafted(chat_server, ANSWER, tmp_path, origin="scripted")
     assert draft.by == "a scripted stand-in for a model (test-model)"
     assert draft.record()["origin"] == draft.usage.origin == "scripted"
-    for path in draft.files:
-        assert "# Drafted by a scripted stand-in for a model (test-model) on" in path.read_text(encoding="utf-8")
+    assert all(draft.by in path.read_text(encoding="utf-8") for path in draft.files)
     assert [call.origin for call in Transcript(tmp_path / DRAFTS).calls] == ["scripted"]
-    with pytest.raises(ValidationError, match='unknown origin "robot"'):
-        drafted(chat_server, ANSWER, tmp_path, origin="robot")
 
 
 def test_calls_of_a_draft_are_bounded(chat_server: ChatServer, tmp_path: Path) -> None:
@@ -304,18 +283,16 @@ def test_cost_of_a_draft_is_bounded_by_public_prices(
     with pytest.raises(SettingsError, match="the price of test-model is unknown; use max_calls"):
         drafted(chat_server, ANSWER, tmp_path, max_cost=1.0)
     with pytest.raises(SettingsError, match=r"a draft takes about 0\.0\d+ USD, more than max_cost = 0\.001"):
-        aw.draft(DESCRIPTION, ModelOptions(model="openai-chat:gpt-4o", max_cost=0.001), out=tmp_path)
+        aw.draft(DESCRIPTION, aw.ModelOptions(model="openai-chat:gpt-4o", max_cost=0.001), out=tmp_path)
     assert chat_server.requests == []
     chat_server.answer = lambda request: ANSWER
-    draft = aw.draft(DESCRIPTION, ModelOptions(model="openai-chat:gpt-4o", max_cost=0.5), out=tmp_path)
+    draft = aw.draft(DESCRIPTION, aw.ModelOptions(model="openai-chat:gpt-4o", max_cost=0.5), out=tmp_path)
     assert draft.usage.cost_usd is not None
     assert 0.0 < draft.usage.cost_usd < 0.01
 
 
 def test_draft_without_a_model_says_what_to_do(in_folder: Path) -> None:
-    message = refused(2, "draft", DESCRIPTION)
-    for way in ("--model openai-chat:gpt-4o", "ARMWRIGHT_MODEL", "config.yaml", "armwright init my-task.yaml"):
-        assert way in message
+    assert "armwright init my-task.yaml" in refused(2, "draft", DESCRIPTION)
     assert files(in_folder) == set()
     with pytest.raises(SettingsError, match="a draft needs a language model"):
         aw.draft(DESCRIPTION)
@@ -323,7 +300,7 @@ def test_draft_without_a_model_says_what_to_do(in_folder: Path) -> None:
 
 @pytest.mark.parametrize("description", ["", " \n ", "\x1b[0m"])
 def test_empty_and_overlong_descriptions_are_refused(chat_server: ChatServer, description: str) -> None:
-    options = ModelOptions(model="m", base_url=chat_server.url)
+    options = aw.ModelOptions(model="m", base_url=chat_server.url)
     with pytest.raises(SettingsError, match="the description is empty"):
         aw.draft(description, options)
     with pytest.raises(SettingsError, match="expected at most 10,000"):
@@ -338,14 +315,9 @@ def test_draft_command_writes_files_and_json(chat_server: ChatServer, in_folder:
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert lines[0].startswith(f"asking test-model at {chat_server.url}, named by --model: about ")
-    assert lines[0].endswith("up to 3 times; on a local server")
-    assert "  6 targets [m]: (0.6, -1, 0.4) (0.6, 0, 0.4)" in done.stdout
-    assert "  origin_z: [0.3, 0.3]\n" in done.stdout
-    assert "  - the wall stands 0.6 m in front of the cart\n" in done.stdout
-    assert "  ? how heavy is the cart?\n" in done.stdout
-    assert "test-model: 1 call, 100 tokens in, 20 out, cost unknown" in done.stdout
-    assert "wrote wall.yaml and wall-space.yaml: a draft. Check and edit the numbers" in done.stdout
-    assert lines[-1] == "  armwright optimize wall.yaml --space wall-space.yaml"
+    assert "6 targets [m]" in done.stdout
+    assert ASSUMPTIONS[0] in done.stdout
+    assert "how heavy is the cart?" in done.stdout
     assert files(in_folder) == {"wall.yaml", "wall-space.yaml", DRAFTS}  # nothing was run
 
     short = ("--n-init", "2", "--n-total", "1", "--no-figures")
@@ -353,15 +325,10 @@ def test_draft_command_writes_files_and_json(chat_server: ChatServer, in_folder:
         assert armwright(*line.split()[1:], *more).returncode == 0
     taken = armwright("draft", DESCRIPTION, *server, "--json")
     assert (taken.returncode, taken.stdout) == (1, "")
-    asking, error = taken.stderr.splitlines()
-    assert asking.startswith("asking test-model")
-    assert "wall.yaml exists (--force replaces it)" in error
-    scripted = model_options(base_url=chat_server.url, origin="scripted")
-    forced = armwright("draft", DESCRIPTION, "--model", "test-model", "--force", "--json", *scripted)
-    record = json.loads(forced.stdout)
-    assert (record["files"], record["origin"], record["calls"]) == (["wall.yaml", "wall-space.yaml"], "scripted", 1)
+    assert "wall.yaml exists (--force replaces it)" in taken.stderr
+    record = json.loads(armwright("draft", DESCRIPTION, *server, "--force", "--json").stdout)
+    assert (record["files"], record["calls"]) == (["wall.yaml", "wall-space.yaml"], 1)
     assert (record["task"]["payload"], record["assumptions"]) == (0.5, ASSUMPTIONS)
-    assert "a scripted stand-in" in forced.stderr
 
 
 def test_draft_prompt_is_shown_without_a_model(in_folder: Path) -> None:
@@ -369,6 +336,10 @@ def test_draft_prompt_is_shown_without_a_model(in_folder: Path) -> None:
     shown = f"{draft_prompt(DESCRIPTION)}\n{json.dumps(draft_schema(), indent=2)}\n"
     assert (done.returncode, done.stderr, done.stdout) == (0, "", shown)
     assert files(in_folder) == set()
+
+
+def test_draft_without_a_folder_writes_nothing(chat_server: ChatServer, in_folder: Path) -> None:
+    assert (drafted(chat_server, ANSWER).files, files(in_folder)) == ((), set())
 
 
 @pytest.mark.parametrize("refused", [0, 1])

@@ -10,14 +10,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from armwright import Problem, load_task, optimize
 from armwright.exceptions import ModelError
 from armwright.llm import client as chat
 from armwright.llm.backend import FINAL, CallError, Question
 from armwright.llm.transcript import Transcript
-from armwright.problem.problem import Problem
 from armwright.study.progress import Progress, StudyResult
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import (
     GOOD_DESIGN,
     Answer,
@@ -35,57 +33,39 @@ from tests.support.wire_formats import WIRES, llm_proposer, proposer
 
 PROBLEM = Problem(load_task("target-1"))
 ENDLESS = ("slow first byte", "dripping body")
-FAST = {(("openai", "anthropic")[i % 2], next(iter(faults))) for i, faults in enumerate(FAULTS.values())}
 EVERY_FAULT = [
-    pytest.param(wire, kind, name, id=f"{wire}-{name}", marks=[] if (wire, name) in FAST else pytest.mark.slow)
+    pytest.param(wire, kind, name, id=f"{wire}-{name}")
     for wire in ("openai", "anthropic")
     for kind, faults in FAULTS.items()
     for name in faults
 ]
 
 both_formats = pytest.mark.parametrize("wire", ["openai", "anthropic"])
-every_wire = pytest.mark.parametrize("wire", WIRES)
 every_fault = pytest.mark.parametrize(("wire", "kind", "name"), EVERY_FAULT)
 
 
-@pytest.fixture(autouse=True)
-def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
+Ask = Callable[..., tuple[StudyResult, list[Progress]]]
 
 
 @pytest.fixture
-def ask(
-    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> Callable[..., tuple[StudyResult, list[Progress]]]:
+def ask(chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ask:
     """A short run in tmp_path/run, and all that it reported."""
 
     def run(
-        wire: str, n_total: int = 6, n_step: int = 3, slow_at: int | None = None, timeout: float = 120.0, **how: Any
+        wire: str, slow_at: int | None = None, timeout: float = 120.0, watch: Any = None, **how: Any
     ) -> tuple[StudyResult, list[Progress]]:
         shown: list[Progress] = []
         asked = proposer(wire, chat_server, monkeypatch, timeout=timeout)
 
-        also = how.pop("watch", None)
-
-        def watch(progress: Progress) -> None:
+        def watching(progress: Progress) -> None:
             shown.append(progress)
-            if also is not None:
-                also(progress)
+            if watch is not None:
+                watch(progress)
             if progress.number == slow_at and isinstance(asked.backend, chat.ModelClient):
                 asked.backend.timeout = 0.2
 
-        result = optimize(
-            PROBLEM,
-            proposer=asked,
-            n_init=4,
-            n_step=n_step,
-            n_total=n_total,
-            out=tmp_path / "run",
-            watch=watch,
-            verify=False,
-            **how,
-        )
-        return result, shown
+        settings = {"n_init": 4, "n_step": 3, "n_total": 6, "out": tmp_path / "run", "verify": False, **how}
+        return optimize(PROBLEM, proposer=asked, watch=watching, **settings), shown
 
     return run
 
@@ -108,7 +88,7 @@ def sources(run: StudyResult) -> Sequence[str]:
 @every_fault
 @pytest.mark.fast_cases(3)
 def test_fault_before_the_first_trial_is_a_one_line_error(
-    chat_server: ChatServer, ask: Callable[..., Any], tmp_path: Path, wire: str, kind: str, name: str
+    chat_server: ChatServer, ask: Ask, tmp_path: Path, wire: str, kind: str, name: str
 ) -> None:
     chat_server.answer = lambda request: FAULTS[kind][name]
     with pytest.raises(ModelError) as caught:
@@ -125,13 +105,7 @@ def test_fault_before_the_first_trial_is_a_one_line_error(
 @every_fault
 @pytest.mark.fast_cases(3)
 def test_later_fault_becomes_a_counted_black_box_trial(
-    chat_server: ChatServer,
-    monkeypatch: pytest.MonkeyPatch,
-    ask: Callable[..., Any],
-    tmp_path: Path,
-    wire: str,
-    kind: str,
-    name: str,
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Ask, tmp_path: Path, wire: str, kind: str, name: str
 ) -> None:
     chat_server.answer = after(3, FAULTS[kind][name])
     run, shown = ask(wire, slow_at=7 if name in ENDLESS else None)
@@ -151,22 +125,11 @@ def test_later_fault_becomes_a_counted_black_box_trial(
     assert told.note.startswith(failed.error)
 
 
-@pytest.mark.parametrize(("wire", "fault"), [("openai", ("server", "overloaded")), ("anthropic", ("key", "wrong key"))])
-def test_on_failure_continue_runs_without_the_model(
-    chat_server: ChatServer, ask: Callable[..., Any], wire: str, fault: tuple[str, str]
-) -> None:
-    chat_server.answer = lambda request: FAULTS[fault[0]][fault[1]]
-    run, shown = ask(wire, on_model_failure="continue")
-    assert sources(run) == ["bbo"] * 6
-    assert run.summary["proposer"]["failures"] == {fault[0]: 2}
-    assert any(progress.doing == "beginning" and "HTTP" in progress.note for progress in shown)
-
-
 @pytest.mark.parametrize(
     ("wire", "name"), [("own server", "wrong key"), ("openai", "quota gone"), ("anthropic", "unknown model")]
 )
 def test_permanent_fault_is_reported_once_and_ends_proposals(
-    chat_server: ChatServer, ask: Callable[..., Any], wire: str, name: str
+    chat_server: ChatServer, ask: Ask, wire: str, name: str
 ) -> None:
     kind = next(kind for kind, faults in FAULTS.items() if name in faults)
     chat_server.answer = after(3, FAULTS[kind][name])
@@ -179,13 +142,21 @@ def test_permanent_fault_is_reported_once_and_ends_proposals(
     assert sum("no more requests are made in this session" in progress.note for progress in shown) == 1
 
 
-@pytest.mark.parametrize("sent", [{"retry_after": "0"}, {"retry_after_ms": "5"}], ids=str)
+@pytest.mark.parametrize(
+    ("fault", "own_pause"),
+    [
+        (rate_limit(retry_after="0"), 1000.0),  # the server's word counts, not ours
+        (rate_limit(retry_after_ms="5"), 1000.0),
+        (FAULTS["server"]["overloaded"], 0.0),
+    ],
+    ids=["retry-after", "retry-after-ms", "overloaded"],
+)
 @both_formats
-def test_short_retry_after_is_respected(
-    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Callable[..., Any], wire: str, sent: dict[str, str]
+def test_transient_faults_are_retried_twice(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Ask, wire: str, fault: Answer, own_pause: float
 ) -> None:
-    monkeypatch.setattr(chat, "RETRY_SECONDS", 1000.0)  # the server's word counts, not ours
-    chat_server.answer = after(3, rate_limit(**sent), last=5)
+    monkeypatch.setattr(chat, "RETRY_SECONDS", own_pause)
+    chat_server.answer = after(3, fault, last=5)
     run, _ = ask(wire)
     assert sources(run) == ["llm", "bbo", "bbo"] * 2
     assert len(chat_server.requests) == 5 + 2
@@ -196,7 +167,7 @@ def test_short_retry_after_is_respected(
     ("wire", "retry_after"), [("openai", "100"), ("anthropic", "61"), ("openai", "Fri, 01 Jan 2100 00:00:00 GMT")]
 )
 def test_retry_after_beyond_the_deadline_fails_at_once(
-    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Callable[..., Any], wire: str, retry_after: str
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Ask, wire: str, retry_after: str
 ) -> None:
     chat_server.answer = after(3, rate_limit(retry_after=retry_after))
     run, _ = ask(wire, timeout=60.0)  # a test that waited for it would be seen
@@ -204,55 +175,16 @@ def test_retry_after_beyond_the_deadline_fails_at_once(
     assert len(chat_server.requests) == 4
 
 
-@both_formats
-def test_transient_faults_are_retried_twice(chat_server: ChatServer, ask: Callable[..., Any], wire: str) -> None:
-    chat_server.answer = after(3, FAULTS["server"]["overloaded"], last=5)
-    run, _ = ask(wire)
-    assert sources(run) == ["llm", "bbo", "bbo"] * 2
-    assert len(chat_server.requests) == 5 + 2
-
-
-@every_wire
-def test_model_is_used_again_after_an_outage(chat_server: ChatServer, ask: Callable[..., Any], wire: str) -> None:
+def test_model_is_used_again_after_an_outage(chat_server: ChatServer, ask: Ask) -> None:
     def watch(progress: Progress) -> None:
         if (progress.doing, progress.number) == ("proposing", 7):
             chat_server.stop()
         if (progress.doing, progress.number) == ("finished", 7):
             chat_server.start()
 
-    run, _ = ask(wire, n_total=9, watch=watch)
+    run, _ = ask("openai", n_total=9, watch=watch)
     assert sources(run) == ["llm", "bbo", "bbo", "bbo", "bbo", "bbo", "llm", "bbo", "bbo"]
     assert run.summary["proposer"]["failures"] == {"connection": 1}
-
-
-@pytest.mark.parametrize(
-    ("wire", "text", "kept"),
-    [
-        ("own server", "no JSON at all", "no JSON at all"),
-        ("openai", '{"link_1": 0.2, "lin', '{"link_1": 0.2, "lin'),
-        ("anthropic", '{"link_1": 7}', "7"),
-    ],
-)
-def test_raw_answers_of_failed_calls_are_recorded(
-    chat_server: ChatServer, ask: Callable[..., Any], tmp_path: Path, wire: str, text: str, kept: str
-) -> None:
-    chat_server.answer = after(4, text)
-    run, _ = ask(wire)
-    assert run.trials[7].fault == "answer"
-    failed = Transcript(tmp_path / "run" / "transcripts.jsonl").calls[-1]
-    assert kept in failed.answer
-    assert failed.requests == 3
-
-
-@pytest.mark.parametrize(("n_total", "flagged"), [(9, True), (10, False)])
-@pytest.mark.slow
-def test_run_with_more_than_a_tenth_of_fallbacks_is_flagged(
-    chat_server: ChatServer, ask: Callable[..., Any], n_total: int, flagged: bool
-) -> None:
-    chat_server.answer = after(3, FAULTS["rejected"]["rejected"], last=4)
-    run, _ = ask("own server", n_total=n_total, n_step=1)
-    assert run.summary["proposer"]["failures"] == {"rejected": 1}
-    assert run.summary["proposer"]["flagged"] is flagged
 
 
 @pytest.mark.parametrize("key", ["sk-planted-key\n", "sk-planted\nkey-in-two", "sk-planted-ключ"])

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from armwright.llm.model_options import ModelOptions
+from armwright import LlmProposer, ModelOptions
 from armwright.llm.servers import describe_server, server_of
-from armwright.proposers.llm import LlmProposer
 from tests.support.chat_server import GOOD_DESIGN, ChatServer
 from tests.support.command_line import armwright
 from tests.support.wire_formats import SERVER_KEY
@@ -32,43 +31,38 @@ def experiment(url: str) -> tuple[str, ...]:
     return "experiment", "plan.yaml", "--no-figures", "--out", "out"
 
 
-def sent_keys(server: ChatServer) -> set[str]:
-    assert server.headers
-    return {headers.get("authorization", "") for headers in server.headers}
+def ran(server: ChatServer, *command: str, key: str, **environment: str) -> str:
+    """What a command prints that sends this key alone."""
+    server.headers.clear()
+    done = armwright(*command, **KEY, **environment)
+    assert done.returncode == 0, done.stderr
+    assert {headers.get("authorization", "") for headers in server.headers} == {f"Bearer {key}"}
+    return done.stdout
 
 
 def test_file_of_an_experiment_gets_no_key(server: ChatServer, in_folder: Path) -> None:
-    done = armwright(*experiment(server.url), **KEY)
-    assert done.returncode == 0, done.stderr
-    assert sent_keys(server) == {"Bearer no-key"}
-    assert f"m at {server.url}, which plan.yaml names and which does not receive ARMWRIGHT_API_KEY" in done.stdout
-    assert f"set ARMWRIGHT_BASE_URL={server.url} to send it" in done.stdout
+    shown = ran(server, *experiment(server.url), key="no-key")
+    assert f"m at {server.url}, which plan.yaml names and which does not receive ARMWRIGHT_API_KEY" in shown
+    assert f"set ARMWRIGHT_BASE_URL={server.url} to send it" in shown
 
 
 def test_file_of_options_gets_no_key(server: ChatServer, in_folder: Path) -> None:
     Path("options.yaml").write_text(f"base_url: {server.url}\nanswer: one-step\n", encoding="utf-8")
-    done = armwright(*STUDY, "--model", "m", "--model-options", "options.yaml", **KEY)
-    assert done.returncode == 0, done.stderr
-    assert sent_keys(server) == {"Bearer no-key"}
-    assert f"m at {server.url}, which options.yaml names and which does not receive" in done.stdout
+    shown = ran(server, *STUDY, "--model", "m", "--model-options", "options.yaml", key="no-key")
+    assert f"m at {server.url}, which options.yaml names and which does not receive" in shown
 
 
 def test_address_of_the_environment_gets_the_key(server: ChatServer, in_folder: Path) -> None:
     for command in (experiment(server.url), (*STUDY, "--model", "m")):
-        done = armwright(*command, **KEY, ARMWRIGHT_BASE_URL=f"{server.url}/")
-        assert done.returncode == 0, done.stderr
-        assert sent_keys(server) == {f"Bearer {SERVER_KEY}"}
-        assert f"m at {server.url}" in done.stdout
-        assert "with ARMWRIGHT_API_KEY" in done.stdout
+        shown = ran(server, *command, key=SERVER_KEY, ARMWRIGHT_BASE_URL=f"{server.url}/")
+        assert f"m at {server.url}" in shown
+        assert "with ARMWRIGHT_API_KEY" in shown
 
 
 def test_address_of_the_command_line_gets_the_key(server: ChatServer, in_folder: Path) -> None:
     options = ("--model-options", json.dumps({"base_url": server.url}))
     for command in (experiment(server.url), (*STUDY, "--model", "m")):
-        done = armwright(*command, *options, **KEY)
-        assert done.returncode == 0, done.stderr
-        assert sent_keys(server) == {f"Bearer {SERVER_KEY}"}
-        assert f"m at {server.url}, with ARMWRIGHT_API_KEY" in done.stdout
+        assert f"m at {server.url}, with ARMWRIGHT_API_KEY" in ran(server, *command, *options, key=SERVER_KEY)
 
 
 def test_address_of_the_users_configuration_gets_the_key(
@@ -79,15 +73,13 @@ def test_address_of_the_users_configuration_gets_the_key(
     own.write_text(f"model: m\nbase_url: {server.url}\n", encoding="utf-8")
     monkeypatch.setenv("XDG_CONFIG_HOME", str(in_folder))
     for command in (experiment(server.url), STUDY):
-        done = armwright(*command, **KEY)
-        assert done.returncode == 0, done.stderr
-        assert sent_keys(server) == {f"Bearer {SERVER_KEY}"}
+        ran(server, *command, key=SERVER_KEY)
 
 
 def test_address_of_python_code_gets_the_key(server: ChatServer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMWRIGHT_API_KEY", SERVER_KEY)
     LlmProposer(ModelOptions(model="m", base_url=server.url)).client.check()
-    assert sent_keys(server) == {f"Bearer {SERVER_KEY}"}
+    assert {headers["authorization"] for headers in server.headers} == {f"Bearer {SERVER_KEY}"}
 
 
 def test_printed_commands_of_an_experiment_send_no_key(in_folder: Path) -> None:

@@ -7,23 +7,16 @@ from typing import Any
 
 import pytest
 
-from armwright.exceptions import ModelError
-from armwright.llm import client as chat
+from armwright import LlmProposer, ModelOptions, Problem, load_task, optimize
 from armwright.llm.backend import CallError, OutputFormat, Question
 from armwright.llm.client import ModelClient
-from armwright.llm.model_options import ModelOptions
 from armwright.llm.transport import MAX_RESPONSE
-from armwright.problem.problem import Problem
-from armwright.proposers.llm import LlmProposer
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, completion, wants_design
 from tests.support.wire_formats import environment
 
 ANSWER = {"answer": "ready"}
 QUESTION = Question("llm-0004", "answer", "Which?")
 FORMAT = OutputFormat({"type": "object", "properties": {"answer": {"type": "string"}}}, json.dumps)
-ADDRESS = "http://elsewhere.example/v1/chat/completions"
 PROXY_PAGE = "<html><head><title>Sign in</title></head><body>to the <b>network</b></body></html>"
 LEFT_OUT = object()
 
@@ -79,11 +72,6 @@ UNUSABLE: dict[str, tuple[Any, str]] = {
     ),
 }
 REASONING = {"reasoning_content": f"The answer is {json.dumps(ANSWER)}"}
-
-
-@pytest.fixture(autouse=True)
-def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
 
 
 def client(server: ChatServer, **options: Any) -> ModelClient:
@@ -258,10 +246,3 @@ def test_refused_design_returns_to_a_server_with_a_strict_template(
     proposer = LlmProposer(ModelOptions(model=model, output=output))
     run = optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_total=1, verify=False)
     assert (run.trials[4].source, run.trials[4].fault) == ("llm", None)
-
-
-def test_server_that_cannot_be_used_stops_a_run_in_one_line(chat_server: ChatServer) -> None:
-    chat_server.answer = lambda request: Response(status=307, headers={"Location": ADDRESS})
-    asked = LlmProposer(ModelOptions(model="m", base_url=chat_server.url))
-    with pytest.raises(ModelError, match=f"^m: the server redirects to {ADDRESS}, which is not followed"):
-        optimize(Problem(load_task("target-1")), proposer=asked, n_total=1)

@@ -8,19 +8,15 @@ from typing import Any
 import pytest
 
 from armwright.exceptions import ModelError
-from armwright.llm import client as chat
 from armwright.llm.backend import CallError, Question
 from armwright.llm.transcript import Transcript
-from armwright.problem.problem import Problem
 from armwright.study.progress import Progress, StudyResult
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer, is_check
-from tests.support.command_line import armwright
+from tests.support.controlled_runs import PROBLEM
+from tests.support.controlled_runs import run as short_run
 from tests.support.model_faults import FAULTS, anthropic_error, openai_error
-from tests.support.wire_formats import llm_proposer, model_options, proposer
+from tests.support.wire_formats import llm_proposer, proposer
 
-PROBLEM = Problem(load_task("target-1"))
 STRUCTURED = ("tools", "response_format", "output_config")  # the parts of a request that ask for structured output
 
 # As servers put it.
@@ -36,11 +32,6 @@ REFUSALS: dict[str, Answer] = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
-
-
 def refusing(*parts: str, with_: Answer = REFUSALS["either protocol"]) -> Callable[[Request], Answer]:
     """Answer with an error if a request has one of these parts."""
     return lambda request: with_ if request.keys() & set(parts) else designer(request)
@@ -52,8 +43,7 @@ def ignoring(*parts: str) -> Callable[[Request], Answer]:
 
 
 def run(asked: Any, out: Path | None, n_total: int = 4, seen: list[Progress] | None = None) -> StudyResult:
-    watch = None if seen is None else seen.append
-    return optimize(PROBLEM, proposer=asked, n_init=4, n_step=3, n_total=n_total, out=out, watch=watch, verify=False)
+    return short_run(out, asked, n_total=n_total, watch=None if seen is None else seen.append)
 
 
 @pytest.mark.parametrize("refusal", REFUSALS)
@@ -77,51 +67,36 @@ def test_plain_server_gets_the_schema_in_the_prompt(chat_server: ChatServer, tmp
 
 
 @pytest.mark.parametrize(
-    ("wire", "refused", "used"),
+    ("wire", "answer", "used", "n_asked"),
     [
-        ("own server", "response_format", "tool"),
-        ("openai", "tools", "native"),
-        ("anthropic", "tools", "native"),
-        ("anthropic", "x", "tool"),
-        ("own server", "x", "native"),
+        ("own server", refusing("x"), "native", 1),
+        ("anthropic", refusing("x"), "tool", 1),
+        ("own server", refusing("response_format"), "tool", 1),
+        ("openai", refusing("tools"), "native", 1),
+        ("anthropic", refusing("tools"), "native", 1),
+        ("own server", ignoring("response_format"), "tool", 2),  # the ignored ones cost something, too
+        ("own server", ignoring("response_format", "tools"), "prompted", 3),
+        ("openai", ignoring("tools"), "native", 2),
+        ("anthropic", ignoring("tools", "output_config"), "prompted", 3),
     ],
 )
-def test_first_accepted_mode_is_used(
-    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str, refused: str, used: str
-) -> None:
-    chat_server.answer = refusing(refused)
-    result = run(proposer(wire, chat_server, monkeypatch), None, n_total=1)
-    assert result.trials[4].source == "llm"
-    assert result.summary["proposer"]["output_mode"] == used
-
-
-@pytest.mark.parametrize(
-    ("wire", "ignored", "used"),
-    [
-        ("own server", ("response_format",), "tool"),
-        ("own server", ("response_format", "tools"), "prompted"),
-        ("openai", ("tools",), "native"),
-        ("anthropic", ("tools", "output_config"), "prompted"),
-    ],
-)
-def test_mode_that_the_server_ignores_is_not_used(
+def test_first_mode_that_the_server_heeds_is_used(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
     wire: str,
-    ignored: tuple[str, ...],
+    answer: Any,
     used: str,
+    n_asked: int,
 ) -> None:
-    chat_server.answer = ignoring(*ignored)
-    asked = proposer(wire, chat_server, monkeypatch)
+    chat_server.answer = answer
     seen: list[Progress] = []
-    result = run(asked, tmp_path / "run", seen=seen)
+    result = run(proposer(wire, chat_server, monkeypatch), tmp_path / "run", seen=seen)
     assert [trial.source for trial in result.trials[4:]] == ["llm", "bbo", "bbo", "llm"]
     assert result.summary["proposer"]["output_mode"] == used
-    assert [progress.note for progress in seen if f"this run uses output {used}" in progress.note] != []
+    assert n_asked == 1 or any(f"this run uses output {used}" in progress.note for progress in seen)
     check, *others = Transcript(tmp_path / "run" / "transcripts.jsonl").calls
-    assert (check.output_mode, check.requests) == (used, 1 + len(ignored))  # the ignored ones cost something, too
-    assert check.input_tokens == 100 * check.requests
+    assert (check.output_mode, check.requests, check.input_tokens) == (used, n_asked, 100 * n_asked)
     assert [call.requests for call in others] == [1] * 4
 
 
@@ -147,19 +122,6 @@ def test_model_without_json_in_the_check_is_used_and_reported(
     assert told in [progress.note for progress in seen]
     assert (result.trials[4].source, result.summary["proposer"]["output_mode"]) == ("llm", used)
     assert len(chat_server.requests) == (3 if output == "auto" else 1) + 2
-
-
-def test_doctor_states_the_mode_that_works(chat_server: ChatServer) -> None:
-    options = model_options(base_url=chat_server.url)
-    answers = {
-        "m does not support output native and tool; this run uses output prompted": ignoring(*STRUCTURED),
-        "m answered the check in another form than its JSON schema": lambda request: "ready",
-    }
-    for words, chat_server.answer in answers.items():
-        done = armwright("doctor", "--call", "--model", "m", *options)
-        assert done.returncode == 0
-        assert "(output prompted)" in done.stdout
-        assert words in done.stdout
 
 
 def test_resumed_run_keeps_its_mode(chat_server: ChatServer, tmp_path: Path) -> None:

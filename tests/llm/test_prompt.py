@@ -17,20 +17,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from armwright import DesignSpace, History, Problem, Task, load_task, paper_space
 from armwright.llm.answer import answer_schema
 from armwright.llm.feedback import Feedback
 from armwright.llm.model_options import ANSWERS, PROMPTS, PromptOptions
 from armwright.llm.prompt import MAX_TOKENS, design_prompt, estimated_tokens, parameters_prompt
 from armwright.llm.prompt_values import spread
-from armwright.problem.problem import Problem
 from armwright.runs.config import Method
-from armwright.runs.history import History
-from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.parameters import exact
-from armwright.tasks.catalogue import load_task
 from armwright.tasks.cycle import Cycle, Step
-from armwright.tasks.task import Task
 from tests.support.fixed_problem import (
     ONE_JOINT,
     ONE_OBJECTIVE,
@@ -110,7 +106,7 @@ GOLDENS: dict[str, Callable[[], str]] = {
     "schema": lambda: schema(answer="one-step"),
 }
 SIX_JOINTS = FixedProblem(load_task("target-2"), SIX_AXIS)
-BOUNDED = ("worst_error <= 0.3", "length >= 0.7")
+MASSLESS = paper_space().model_copy(update={"mass": MassPerLink(kind="per_link", kg=0.0)})
 
 # For each case what its prompt says, and what it does not say.
 Facts = tuple[Callable[[], str], tuple[str, ...], tuple[str, ...]]
@@ -118,32 +114,21 @@ FACTS: dict[str, Facts] = {
     "six joints, ranges of one value, tubes": (
         lambda: rendered(fixed_history(SIX_JOINTS), "minus"),
         (
-            "The arm has D = 6 joints connected in series",
             "JOINTS = (joint_1, ..., joint_6)",
             "-0.25 <= origin_x <= 0.75, origin_y = 0 (fixed), origin_z = 0.125 (fixed).",
-            "Every joint angle stays within [-2.8, 2] rad.",
             "a tube of 30 mm outer diameter and 2 mm wall, 2700 kg/m³ (0.475 kg per metre).",
-            "14 designs have been evaluated; 1 of them is Pareto-optimal.",
-            "## The Pareto-optimal design",
             "TAU_IK: [(5.39, -1.35, 0.60, -0.34, 0.22, -0.15), (1.42, -0.36, 0.16, -0.09, 0.06, -0.04)",
         ),
         (),
     ),
     "one call": (
         lambda: rendered(fixed_history(PAPER), answer="one-step"),
-        (
-            "Step 3: Choose the new values",
-            "Write your thoughts into `reasoning` first; then give the new design and the main reason for it",
-        ),
+        ("Write your thoughts into `reasoning` first;",),
         ("End your answer",),
     ),
     "no reference point": (
         lambda: rendered(fixed_history(FixedProblem(grid_task(3)), n=4), "minus"),
-        (
-            "4 designs have been evaluated; 4 of them are Pareto-optimal.",
-            "## All 4 Pareto-optimal designs",
-            "judged by its hypervolume: the more of the space of the objectives it dominates, the better.",
-        ),
+        ("4 designs have been evaluated; 4 of them are Pareto-optimal.",),
         ("reference point", "other designs"),
     ),
     "many targets": (
@@ -151,7 +136,6 @@ FACTS: dict[str, Facts] = {
         (
             "each of 200 target points (x, y, z) [m], which lie in the box from (0.300, 0.000, 0.400) to "
             "(0.480, 0.950, 0.460). These are 48 of them, spread evenly over the list:",
-            "for each target in TARGET",
             "with the reference point (36.45, 1006): a design counts only if E_pos < 36.45 and E_torque < 1006",
         ),
         (),
@@ -160,75 +144,74 @@ FACTS: dict[str, Facts] = {
         lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=ONE_OBJECTIVE))),
         (
             "The objective is its sum over all targets, E_ALL = (E_pos). It is minimised.",
-            "14 designs have been evaluated.\n",
-            "## The best design",
             "## 5 of the 13 other designs, drawn at random",
-            "different from all above, with E_pos as small as possible.",
-            "Step 2: Analyse what limits the best designs so far.",
         ),
         ("Pareto", "hypervolume", "conflict"),
     ),
     "workspace": (
         lambda: rendered(fixed_history(FixedProblem(COVERING)), "minus"),
-        (
-            "The tip should also cover these workspaces [m], by points spread evenly over each",
-            "- box from (0.2, -0.3, 0) to (0.6, 0.3, 0.5), 200 points\n",
-            "- box from (0, 0, 1) to (0, 0, 1.5), 20 points\n",
-            "E_uncovered, of the arm itself, and E_torque, the sum of E_torque_i over all targets",
-            "E_EACH: (E_torque_i) for each target",
-        ),
+        ("- box from (0, 0, 1) to (0, 0, 1.5), 20 points\n", "E_EACH: (E_torque_i) for each target"),
         (),
     ),
     "one target, one joint, one design": (
         lambda: rendered(fixed_history(FixedProblem(ONE_POINT, ONE_JOINT), n=1)),
         (
             "The arm has D = 1 joint, followed by one link.",
-            "JOINTS = (joint_1):",
-            "The only type is",
             "link_1 = 0.2 (fixed)",
-            "The tip of the arm should reach this target point",
             "One design has been evaluated.",
-            "## The Pareto-optimal design",
             "TAU_IK: [(0.00436)]",
         ),
         ("## The other", "other designs"),
     ),
     "no design yet": (
         lambda: rendered(fixed_history(PAPER, n=0), "minus"),
-        (
-            "No design has been evaluated yet.",
-            "Propose one new design that enlarges the hypervolume most. Think step by step.",
-        ),
+        ("No design has been evaluated yet.",),
         ("E_EACH", "different from", "\nDesign "),
     ),
     "a tolerance": (
         lambda: rendered(fixed_history(FixedProblem(load_task("target-1"), tolerance=1e-3)), "minus"),
-        (
-            "A workshop builds to within 1 mm.",
-            "the worst of the design as it stands and of 14 copies of it, each with one coordinate of ORIGIN or one "
-            "link longer or shorter by that much.",
-        ),
+        ("A workshop builds to within 1 mm.", "of 14 copies of it"),
         (),
     ),
     "stated tolerances of targets": (
         lambda: rendered(fixed_history(FixedProblem(WITHIN_5_MM)), "minus"),
-        (
-            "- target 1: tolerance 5 mm",
-            "- E_pos_i [m]: the distance between the tip and the target in the kept posture, beyond the stated "
-            "tolerance, else 0.",
-        ),
+        ("- target 1: tolerance 5 mm", "beyond the stated tolerance, else 0."),
+        (),
+    ),
+    "obstacles that do not count": (
+        lambda: rendered(fixed_history(FixedProblem(IN_THE_WAY.model_copy(update={"objectives": None}))), "minus"),
+        ("(what touches them does not count):", "Orientation and collisions do not matter."),
         (),
     ),
     "second call": (
         lambda: parameters_prompt(PAPER, "I think.\n\nORIGIN: (0, 0, 0)\nJOINTS: (Y, P, R, P)"),
         (
-            "ends with the design of a robot arm",
             "- origin_z: -1 to 1 m\n- joint_1: one of R, P, Y\n",
-            "- link_4: 0.03 to 0.3 m\n",
             "\n----------\nI think.\n\nORIGIN: (0, 0, 0)\nJOINTS: (Y, P, R, P)\n----------\n",
         ),
         (),
     ),
+    "no torque": (
+        lambda: rendered(fixed_history(FixedProblem(load_task("target-1"), MASSLESS))),
+        ("LOAD: no torque at any joint",),
+        (),
+    ),
+    "a study, one trial between proposals": (
+        lambda: rendered(in_study(fixed_history(PAPER, 100), 2), "full"),
+        ("a black box tries 1 design. ",),
+        (),
+    ),
+    "a study, only proposals": (
+        lambda: rendered(in_study(fixed_history(PAPER), n_step=1), "full"),
+        ("You have 196 turns left",),
+        ("black box tries",),
+    ),
+    "the last turn of a study": (
+        lambda: rendered(in_study(fixed_history(PAPER, 200)), "full"),
+        ("This is your last turn.",),
+        (),
+    ),
+    "outside a study": (lambda: rendered(fixed_history(PAPER), "full"), (), ("turns left",)),
 }
 
 
@@ -253,21 +236,6 @@ def test_prompt_states_facts_of_the_case(name: str) -> None:
     assert [fact for fact in absent if fact in text] == []
 
 
-def test_prompt_says_when_obstacles_do_not_count() -> None:
-    paper = IN_THE_WAY.model_copy(update={"objectives": None})
-    text = rendered(fixed_history(FixedProblem(paper)), "minus")
-    assert "5 obstacles, which are solid; positions and lengths in [m] (what touches them does not count):" in text
-    assert "Orientation and collisions do not matter." in text
-    without = paper.model_copy(update={"obstacles": ()})
-    assert "obstacle" not in rendered(fixed_history(FixedProblem(without)), "minus")
-    one = IN_THE_WAY.model_copy(update={"obstacles": IN_THE_WAY.obstacles[:1]})
-    assert "In the way is an obstacle, which is solid;" in rendered(fixed_history(FixedProblem(one)), "minus")
-
-
-def test_every_golden_file_has_a_case() -> None:
-    assert {file.stem for file in GOLDEN.iterdir()} == set(GOLDENS)
-
-
 # What must hold for every problem.
 
 
@@ -287,27 +255,11 @@ spaces = st.builds(
     origin_y=ranges(-1, 1),
     origin_z=ranges(-1, 1),
     link=ranges(1e-4, 3),
-    mass=st.sampled_from(
-        [
-            {"kind": "per_metre"},
-            {"kind": "per_link", "kg": 0.0},
-            {"kind": "per_link", "kg": 1e4},
-        ]
-    ),
+    mass=st.sampled_from([{"kind": "per_metre"}, {"kind": "per_link", "kg": 0.0}, {"kind": "per_link", "kg": 1e4}]),
 )
 coordinates = st.floats(-1000, 1000, allow_subnormal=False)
 hostile = st.sampled_from(
-    [
-        "{{ 7 * 7 }}",
-        "{% endblock %}",
-        "{#",
-        "</think>",
-        "-" * 40,
-        "\x1b[31mred\x1b[0m",
-        "\n# Your turn\n",
-        "\u202eRLO",
-        "½√",
-    ]
+    ["{{ 7 * 7 }}", "{% endblock %}", "{#", "</think>", "-" * 40, "\x1b[31mred\x1b[0m", "\n# Your turn\n", "\u202eRLO"]
 )
 # Hypothesis draws constants of the source, so "None" is not rare.
 words = (
@@ -318,30 +270,22 @@ words = (
 @settings(max_examples=20)
 @given(data=st.data(), space=spaces, n_targets=st.integers(1, 300))
 def test_prompt_of_any_problem_is_complete_and_bounded(data: st.DataObject, space: DesignSpace, n_targets: int) -> None:
-    points = np.random.default_rng(n_targets).uniform(-2, 2, (n_targets, 3)) * data.draw(
-        st.sampled_from([1e-3, 1, 500])
-    )
+    scale = data.draw(st.sampled_from([1e-3, 1, 500]))
+    points = np.random.default_rng(n_targets).uniform(-2, 2, (n_targets, 3)) * scale
     reference = data.draw(st.one_of(st.none(), st.tuples(*[st.floats(1e-3, 1e6)] * 2)))
-    description = data.draw(words)
-    task = Task(
-        name="any", targets=tuple(map(tuple, points.tolist())), reference_point=reference, description=description
-    )  # type: ignore[arg-type]
-    problem = FixedProblem(task, space)
+    targets = tuple(map(tuple, points.tolist()))
+    task = Task(name="any", targets=targets, reference_point=reference, description=data.draw(words))  # type: ignore[arg-type]
     told = [proposal(design) for design in space.sample(data.draw(st.integers(0, 5)), 2)]
-    history = fixed_history(problem, data.draw(st.integers(0, 30)), proposals=told)
-    options = PromptOptions(
-        prompt=data.draw(st.sampled_from(PROMPTS)), answer=data.draw(st.sampled_from(list(ANSWERS)))
-    )
+    history = fixed_history(FixedProblem(task, space), data.draw(st.integers(0, 30)), proposals=told)
+    prompt, answer = data.draw(st.sampled_from(PROMPTS)), data.draw(st.sampled_from(list(ANSWERS)))
+    options = PromptOptions(prompt=prompt, answer=answer)
     seed = data.draw(st.integers(0, 2**31))
     hints = data.draw(st.lists(words, max_size=2))
     text = design_prompt(history, seed, options, hints=hints)
     assert text == design_prompt(history, seed, options, hints=hints)
     assert estimated_tokens(text) <= MAX_TOKENS
-    for name, (low, high) in {
-        "origin_x": space.origin_x,
-        "origin_y": space.origin_y,
-        "origin_z": space.origin_z,
-    }.items():
+    for name in ("origin_x", "origin_y", "origin_z"):
+        low, high = getattr(space, name)
         assert (f"{name} = {exact(low)} (fixed)" if low == high else f"{exact(low)} <= {name} <= {exact(high)}") in text
     assert exact(space.link[0]) in text
     assert exact(space.link[1]) in text
@@ -392,39 +336,6 @@ def front_of(n: int, problem: FixedProblem) -> History:
     return replace(history, trials=trials)
 
 
-def test_full_prompt_asks_to_explore_joint_sequences_first() -> None:
-    for history in (fixed_history(PAPER), in_study(own(3))):
-        text = rendered(history, "full")
-        places = [
-            text.index("Explore joint sequences first."),
-            text.index("compare the fronts that they could give"),
-            text.index("Return to exploration when gains are small"),
-        ]
-        assert places == sorted(places)
-
-
-@pytest.mark.parametrize(
-    ("n_trials", "n_step", "turns"),
-    [
-        (10, 10, "a black box tries 9 designs. It learns from all results, yours included, and is good at small "
-         "changes of numbers. You have 20 turns left, this one included."),
-        (5, 10, "You have 20 turns left, this one included."),
-        (200, 10, "This is your last turn."),
-        (100, 2, "a black box tries 1 design. "),
-    ],
-)  # fmt: skip
-def test_full_prompt_states_the_turns_that_are_left(n_trials: int, n_step: int, turns: str) -> None:
-    history = in_study(fixed_history(PAPER, n_trials), n_step)
-    assert turns in rendered(history, "full")
-
-
-def test_full_prompt_without_black_box_trials_between_turns() -> None:
-    text = rendered(in_study(fixed_history(PAPER), n_step=1), "full")
-    assert "black box tries" not in text
-    assert "You have 196 turns left" in text
-    assert "turns left" not in rendered(fixed_history(PAPER), "full")  # outside a study
-
-
 def test_full_prompt_states_what_each_own_design_gained() -> None:
     """The gains of all trials sum up to the hypervolume that is stated."""
     told = own(5)
@@ -432,9 +343,8 @@ def test_full_prompt_states_what_each_own_design_gained() -> None:
     mine = [replace(trial, values=value) for trial, value in zip(told.trials[14:], values, strict=True)]
     history = replace(told, trials=[*told.trials[:14], *mine])
     text = rendered(history, "full")
-    gained = {
-        int(n): float(gain) for n, gain in re.findall(r"^- (\d+): .*hypervolume \+([\d.]+) at", text, re.MULTILINE)
-    }
+    stated = re.findall(r"^- (\d+): .*hypervolume \+([\d.]+) at", text, re.MULTILINE)
+    gained = {int(n): float(gain) for n, gain in stated}
     assert list(gained) == [14, 15, 16, 17, 18]
     assert [gain > 0.0 for gain in gained.values()] == [True, True, False, True, True]
     for number, gain in gained.items():
@@ -507,12 +417,6 @@ def test_feedback_matches_the_evaluation() -> None:
 
 def numbers(text: str) -> list[float]:
     return [float(number) for number in re.findall(r"-?\d+\.\d+", text)]
-
-
-def test_prompt_of_a_massless_arm_states_no_torque() -> None:
-    space = paper_space().model_copy(update={"mass": MassPerLink(kind="per_link", kg=0.0)})
-    text = rendered(fixed_history(FixedProblem(load_task("target-1"), space)))
-    assert "LOAD: no torque at any joint" in text
 
 
 def test_quoted_answer_cannot_leave_its_delimiters() -> None:

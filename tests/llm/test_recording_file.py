@@ -1,6 +1,5 @@
 """Recordings of runs with a language model: packing, reading, damage."""
 
-import json
 import lzma
 from pathlib import Path
 
@@ -60,8 +59,3 @@ def test_a_folder_of_the_same_name_precedes_a_shipped_recording(in_folder: Path)
     assert find_recording("target-1-plus-seed0") is not None
     (in_folder / "target-1-plus-seed0").mkdir()
     assert find_recording("target-1-plus-seed0") is None
-
-
-def test_headers_state_the_settings_of_their_run() -> None:
-    header = json.loads(lines_of("target-2-plus-n5-seed0")[0])
-    assert (header["config"]["method"]["n_step"], header["config"]["task"]["name"]) == (5, "target-2")

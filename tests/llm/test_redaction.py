@@ -16,10 +16,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armwright import Problem, load_task, optimize
 from armwright.llm.redaction import PART, redacted
-from armwright.problem.problem import Problem
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 from armwright.text import map_text
 from tests.support import wire_formats as wires
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, is_check, wants_design

@@ -9,26 +9,27 @@ from typing import Any
 import optuna
 import pytest
 
-from armwright.exceptions import AnswerPendingError, SettingsError
+from armwright import (
+    LlmProposer,
+    ManualProposer,
+    ProposalCallback,
+    ReplayProposer,
+    StudyLlmProposer,
+    optimize,
+)
+from armwright.exceptions import AnswerPendingError
 from armwright.llm.backend import Turn
 from armwright.llm.conversation import RESULTS, conversation, new_part
 from armwright.llm.model_options import PROMPTS, ModelOptions, PromptOptions
 from armwright.llm.prompt import design_prompt
 from armwright.llm.transcript import Call, Transcript
-from armwright.problem.problem import Problem
-from armwright.proposers.for_optuna.callback import ProposalCallback
-from armwright.proposers.for_optuna.llm import StudyLlmProposer
-from armwright.proposers.llm import LlmProposer
-from armwright.proposers.manual import ManualProposer
-from armwright.proposers.replay import ReplayProposer
 from armwright.study.progress import Progress, StudyResult
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, is_check, wants_design
+from tests.support.controlled_runs import PROBLEM, cut
+from tests.support.controlled_runs import run as short_run
 from tests.support.model_faults import FAULTS, openai_error
 from tests.support.wire_formats import llm_proposer, proposer
 
-PROBLEM = Problem(load_task("target-1"))
 Message = dict[str, Any]
 
 # As servers put it.
@@ -58,13 +59,8 @@ def server(chat_server: ChatServer) -> ChatServer:
     return chat_server
 
 
-def run(
-    asked: Any, out: Path | None = None, n_total: int = 9, seen: list[Progress] | None = None, n_step: int = 3
-) -> StudyResult:
-    watch = None if seen is None else seen.append
-    return optimize(
-        PROBLEM, proposer=asked, n_init=4, n_step=n_step, n_total=n_total, out=out, watch=watch, verify=False
-    )
+def run(asked: Any, out: Path | None = None, seen: list[Progress] | None = None, **schedule: int) -> StudyResult:
+    return short_run(out, asked, watch=None if seen is None else seen.append, **schedule)
 
 
 def chat(server: ChatServer, **options: Any) -> LlmProposer:
@@ -138,15 +134,13 @@ def test_anthropic_is_asked_to_cache_the_conversation(server: ChatServer, monkey
     assert cached == [False, *[True, False] * 3, *[False] * 7]  # check, then reasoning and values
 
 
-@pytest.mark.parametrize(("kept_calls", "kept_trials"), [(1, 4), (2, 4), (3, 4), (3, 6), (4, 7), (5, 7), (6, 10)])
+@pytest.mark.parametrize(("kept_calls", "kept_trials"), [(1, 4), (2, 4), (3, 6), (5, 7), (6, 10)])
 def test_killed_run_resumes_with_the_same_conversation(
     server: ChatServer, tmp_path: Path, kept_calls: int, kept_trials: int
 ) -> None:
     whole = run(chat(server), tmp_path / "run")
     sent = conversations(server, free)
-    for name, lines in (("transcripts.jsonl", kept_calls), ("trials.jsonl", kept_trials)):
-        file = tmp_path / "run" / name
-        file.write_text("".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:lines]), encoding="utf-8")
+    cut(tmp_path / "run", transcripts=kept_calls, trials=kept_trials)
     server.requests.clear()
     again = run(chat(server), tmp_path / "run")
     assert [trial.values for trial in again.trials] == [trial.values for trial in whole.trials]
@@ -190,23 +184,24 @@ def test_oldest_turns_are_dropped_beyond_the_context(server: ChatServer, tmp_pat
     assert [(call.prompt, call.fault) for call in played] == [(call.prompt, call.fault) for call in calls]
 
 
-def test_dropping_stays_within_the_requests_of_a_question(server: ChatServer, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("options", "n_total", "turns", "last"),
+    [
+        ({}, 12, [10, 5, 3, 2, 1], None),  # three tries, then the next question finds a shorter conversation
+        ({"max_calls": 23}, 11, [10], "context"),  # 21 calls were made; after the check, one try is left
+    ],
+    ids=["requests", "budget"],
+)
+def test_dropping_stays_within_the_requests_of_a_question(
+    server: ChatServer, tmp_path: Path, options: dict[str, int], n_total: int, turns: list[int], last: str | None
+) -> None:
     run(chat(server), tmp_path / "run", n_total=10, n_step=1)
     server.requests.clear()
     server.answer = limited(1, TOO_LONG["openai"])
-    result = run(chat(server), tmp_path / "run", n_total=12, n_step=1)
-    turns = [len(messages) // 2 for messages in conversations(server, free)]
-    assert turns == [10, 5, 3, 2, 1]  # three tries, then the next question finds a shorter conversation
-    assert [trial.fault for trial in result.trials[-2:]] == ["context", None]
-
-
-def test_dropping_stays_within_the_budget(server: ChatServer, tmp_path: Path) -> None:
-    run(chat(server), tmp_path / "run", n_total=10, n_step=1)
-    server.requests.clear()
-    server.answer = limited(1, TOO_LONG["openai"])
-    result = run(chat(server, max_calls=23), tmp_path / "run", n_total=11, n_step=1)  # 21 were made
-    assert len(server.requests) == 2  # the check and one try
-    assert result.trials[-1].fault == "context"
+    result = run(chat(server, **options), tmp_path / "run", n_total=n_total, n_step=1)
+    assert [len(messages) // 2 for messages in conversations(server, free)] == turns
+    assert result.trials[14].fault == "context"
+    assert result.trials[-1].fault == last
 
 
 def test_question_too_long_for_the_first_turn_fails_once(server: ChatServer) -> None:
@@ -227,11 +222,6 @@ def test_failed_proposals_are_no_turns(server: ChatServer) -> None:
     sent = conversations(server, free)
     assert [len(messages) for messages in sent] == [1, 1, 3]
     assert all("# Task" in messages[0]["content"] for messages in sent)
-
-
-def test_chat_does_not_overlap(server: ChatServer) -> None:
-    with pytest.raises(SettingsError, match="in_flight does not go with the proposer llm with memory chat"):
-        optimize(PROBLEM, proposer=chat(server), n_total=1, in_flight=2)
 
 
 def test_manual_questions_of_a_chat_contain_what_is_new(tmp_path: Path) -> None:
@@ -296,11 +286,9 @@ def test_forecast_of_input_grows_with_the_square(server: ChatServer, tmp_path: P
     assert of(1, "chat") == of(1, "none")
     once, twice = (of(n, "chat") - of(n, "none") for n in (10, 20))
     assert 3.5 < twice / once < 4.5
-    # A resumed run forecasts the rest of its conversation.
-    run(chat(server), tmp_path / "run")
+    run(chat(server), tmp_path / "run")  # a resumed run forecasts the rest of its conversation
     seen: list[Progress] = []
     run(chat(server), tmp_path / "run", n_total=12, seen=seen)
-    assert seen[0].note.startswith("1 proposals: about 3 calls, ")
     assert tokens(seen[0].note) > 2 * of(1, "chat")
 
 

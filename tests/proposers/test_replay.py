@@ -2,26 +2,21 @@
 
 import json
 import threading
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from armwright import Problem, ReplayProposer, StudyResult, load_task, optimize
 from armwright.exceptions import ReplayError, RunFolderError, SettingsError
-from armwright.llm.model_options import ModelOptions
 from armwright.llm.recording_file import find_recording
 from armwright.llm.transcript import Call, Transcript
-from armwright.problem.problem import Problem
 from armwright.proposers import prompted
 from armwright.proposers.factory import choose_proposer
-from armwright.proposers.replay import ReplayProposer
-from armwright.study.progress import Progress, StudyResult
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.command_line import PATIENCE
+from tests.support.controlled_runs import after, interrupt
 from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
@@ -47,6 +42,10 @@ def recorded(server: ChatServer, out: Path, asking: dict[str, Any] | None = None
     return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
 
 
+def replayed(run: Path, out: Path | None = None, strict: bool = False, **settings: Any) -> StudyResult:
+    return optimize(PROBLEM, proposer=ReplayProposer(run, strict=strict), out=out, **{**SETTINGS, **settings})
+
+
 def lines(folder: Path) -> list[dict[str, Any]]:
     trials = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()
     return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
@@ -56,30 +55,23 @@ def lines(folder: Path) -> list[dict[str, Any]]:
 def test_replay_equals_its_recording(varied: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
     first = recorded(varied, tmp_path / "first", asking)
     varied.requests.clear()
-    again = optimize(
-        PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), out=tmp_path / "again", **SETTINGS
-    )
+    again = replayed(tmp_path / "first", tmp_path / "again", strict=True)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
     assert not varied.requests
     # the account is the recorded one, and the origin stays what it was
-    proposer = again.summary["proposer"]
-    assert {key: proposer[key] for key in ("name", "calls", "tokens", "origin")} == {
-        key: first.summary["proposer"][key] for key in ("name", "calls", "tokens", "origin")
-    }
-    assert (proposer["origin"], proposer["replay"], proposer["differing_prompts"]) == (
-        "scripted", str(tmp_path / "first"), 0,
-    )  # fmt: skip
+    own = again.summary["proposer"]
+    told = first.summary["proposer"]
+    assert all(own[key] == told[key] for key in ("name", "calls", "tokens", "origin"))
+    assert (own["origin"], own["replay"], own["differing_prompts"]) == ("scripted", str(tmp_path / "first"), 0)
     # and so a replay can be replayed
-    third = optimize(
-        PROBLEM, proposer=ReplayProposer(tmp_path / "again", strict=True), out=tmp_path / "third", **SETTINGS
-    )
+    third = replayed(tmp_path / "again", tmp_path / "third", strict=True)
     assert lines(tmp_path / "third") == lines(tmp_path / "first")
-    assert third.summary["proposer"]["calls"] == proposer["calls"]
+    assert third.summary["proposer"]["calls"] == own["calls"]
 
 
 def test_overlapped_run_is_replayed_with_its_arrivals(varied: ChatServer, tmp_path: Path) -> None:
     recorded(varied, tmp_path / "first", in_flight=2)
-    optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), out=tmp_path / "again", **SETTINGS)
+    replayed(tmp_path / "first", tmp_path / "again", strict=True)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
 
 
@@ -93,51 +85,29 @@ def test_late_answers_are_replayed_when_they_arrived(chat_server: ChatServer, tm
             late.wait(PATIENCE)
         return json.dumps({**next(designs).params} if "response_format" in request else {"answer": "ready"})
 
-    def watch(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == 8:
-            late.set()
-
     chat_server.answer = answer
     settings = {"n_total": 24, "in_flight": 4}
-    run = recorded(chat_server, tmp_path / "first", {"answer": "one-step"}, watch=watch, **settings)
+    run = recorded(chat_server, tmp_path / "first", {"answer": "one-step"}, watch=after(8, late.set), **settings)
     proposals = [trial for trial in run.trials if trial.proposal]
     assert len(proposals) == 8
     assert proposals[0].number - (proposals[0].feedback or 0) >= 5
     assert len({trial.asked or trial.number for trial in proposals}) == 8
     chat_server.requests.clear()
-    again = optimize(
-        PROBLEM,
-        proposer=ReplayProposer(tmp_path / "first", strict=True),
-        out=tmp_path / "again",
-        **{**SETTINGS, **settings},
-    )
+    again = replayed(tmp_path / "first", tmp_path / "again", strict=True, **settings)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
     assert again.summary["proposer"]["overlap"] == run.summary["proposer"]["overlap"]
     assert not chat_server.requests
 
 
-def test_failures_are_replayed(varied: ChatServer, tmp_path: Path) -> None:
+@pytest.mark.parametrize("asking", [{}, {"max_calls": 5}], ids=["faults", "budget"])
+def test_failures_are_replayed(varied: ChatServer, tmp_path: Path, asking: dict[str, int]) -> None:
     good = varied.answer
     varied.answer = lambda request: good(request) if len(varied.requests) not in (4, 5) else (400, "{}")
-    run = recorded(varied, tmp_path / "first")
-    assert sum(trial.fault is not None for trial in run.trials) == 2
-    again = optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", **SETTINGS)
+    run = recorded(varied, tmp_path / "first", asking)
+    assert sum(trial.fault is not None for trial in run.trials) == (3 if asking else 2)
+    again = replayed(tmp_path / "first", tmp_path / "again")
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
     assert again.summary["proposer"]["failures"] == run.summary["proposer"]["failures"]
-
-
-def test_exhausted_budget_is_replayed(varied: ChatServer, tmp_path: Path) -> None:
-    recorded(varied, tmp_path / "first", {"max_calls": 5})
-    optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", **SETTINGS)
-    assert lines(tmp_path / "again") == lines(tmp_path / "first")
-
-
-def interrupted_at(stop: int) -> Callable[[Progress], None]:
-    def watch(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == stop:
-            raise KeyboardInterrupt
-
-    return watch
 
 
 @pytest.mark.parametrize("stop", [4, 6])
@@ -145,11 +115,9 @@ def interrupted_at(stop: int) -> Callable[[Progress], None]:
 def test_interrupted_replay_resumes(varied: ChatServer, tmp_path: Path, stop: int) -> None:
     """No recorded call is used twice."""
     first = recorded(varied, tmp_path / "first")
-    for watch in (interrupted_at(stop), None):
+    for watch in (after(stop, interrupt), None):
         with suppress(KeyboardInterrupt):
-            optimize(
-                PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", watch=watch, **SETTINGS
-            )
+            replayed(tmp_path / "first", tmp_path / "again", watch=watch)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
     played = [call for call in Transcript(tmp_path / "again" / "transcripts.jsonl").calls if call.proposal]
     assert len(played) == first.summary["proposer"]["calls"] - 1  # the check
@@ -159,14 +127,9 @@ def test_proposals_beyond_the_recording_are_missing(varied: ChatServer, tmp_path
     """They are counted and reported once, and the run is flagged."""
     recorded(varied, tmp_path / "first")
     notes: list[str] = []
-    longer = {**SETTINGS, "n_total": 20}
-    for settings in (SETTINGS, longer):
-        again = optimize(
-            PROBLEM,
-            proposer=ReplayProposer(tmp_path / "first"),
-            out=tmp_path / "again",
-            watch=lambda progress: notes.append(progress.note),
-            **settings,
+    for n_total in (12, 20):
+        again = replayed(
+            tmp_path / "first", tmp_path / "again", n_total=n_total, watch=lambda progress: notes.append(progress.note)
         )
     assert lines(tmp_path / "again")[:16] == lines(tmp_path / "first")
     assert [trial.number for trial in again.trials if trial.fault == "missing"] == [16, 19, 22]
@@ -180,20 +143,13 @@ def test_proposals_of_a_truncated_recording_are_missing(
     varied: ChatServer, tmp_path: Path, in_flight: int | None
 ) -> None:
     with pytest.raises(KeyboardInterrupt):
-        recorded(varied, tmp_path / "first", watch=interrupted_at(8), in_flight=in_flight)
+        recorded(varied, tmp_path / "first", watch=after(8, interrupt), in_flight=in_flight)
     there = len(lines(tmp_path / "first"))
-    again = optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", **SETTINGS)
+    again = replayed(tmp_path / "first", tmp_path / "again")
     assert lines(tmp_path / "again")[:there] == lines(tmp_path / "first")
     turns = [trial for trial in again.trials if trial.proposal or trial.fault]
     assert len(turns) == 4
     assert {trial.fault for trial in turns if trial.number >= there} == {"missing"}
-
-
-def test_replay_uses_no_prompt_options(chat_server: ChatServer, tmp_path: Path) -> None:
-    recorded(chat_server, tmp_path / "first", n_total=1)
-    for option in ({"memory": "chat"}, {"prompt": "minus"}, {"answer": "one-step"}):
-        with pytest.raises(SettingsError, match=f"does not use {next(iter(option))} = .*; leave it out"):
-            choose_proposer(f"replay:{tmp_path / 'first'}", ModelOptions(**option))
 
 
 def test_differing_prompt_is_reported_or_refused_when_strict(varied: ChatServer, tmp_path: Path) -> None:
@@ -203,12 +159,11 @@ def test_differing_prompt_is_reported_or_refused_when_strict(varied: ChatServer,
         file.read_text(encoding="utf-8").replace("You are an expert", "You are a layman", 1), encoding="utf-8"
     )
     notes: list[str] = []
-    proposer = ReplayProposer(tmp_path / "first")
-    run = optimize(PROBLEM, proposer=proposer, **SETTINGS, watch=lambda progress: notes.append(progress.note))
+    run = replayed(tmp_path / "first", watch=lambda progress: notes.append(progress.note))
     assert [note for note in notes if note] == ["the prompt for scripted-0004 differs from the recorded one"]
     assert run.summary["proposer"]["differing_prompts"] == 1
     with pytest.raises(ReplayError, match="reasoning prompt for scripted-0004 differs"):
-        optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), **SETTINGS)
+        replayed(tmp_path / "first", strict=True)
 
 
 def test_recording_with_other_settings_is_reported(varied: ChatServer, tmp_path: Path) -> None:
@@ -216,9 +171,7 @@ def test_recording_with_other_settings_is_reported(varied: ChatServer, tmp_path:
     recorded(varied, tmp_path / "first")
     (tmp_path / "first" / "trials.jsonl").unlink()
     notes: list[str] = []
-    settings = {**SETTINGS, "n_init": 5}
-    replayed = ReplayProposer(tmp_path / "first")
-    run = optimize(PROBLEM, proposer=replayed, **settings, watch=lambda p: notes.append(p.note))
+    run = replayed(tmp_path / "first", n_init=5, watch=lambda progress: notes.append(progress.note))
     assert run.trials[5].fault == "missing"
     assert "holds no proposal for trial 5; check n_init and n_step" in "".join(notes)
     assert run.summary["proposer"]["flagged"]
@@ -246,8 +199,6 @@ def test_invalid_recordings_are_refused(tmp_path: Path) -> None:
         ReplayProposer(tmp_path / "run")
     with pytest.raises(SettingsError, match="needs a run: replay:PATH"):
         choose_proposer("replay:")
-    with pytest.raises(SettingsError, match="rules does not use replay_strict"):
-        choose_proposer("rules", ModelOptions(replay_strict=True))
 
 
 def test_recording_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
@@ -256,7 +207,7 @@ def test_recording_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
     file = tmp_path / "first" / "transcripts.jsonl"
     file.write_text(file.read_text(encoding="utf-8") + '{"proposal": "llm-00', encoding="utf-8")
     before = file.read_bytes()
-    optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), **SETTINGS)
+    replayed(tmp_path / "first")
     assert file.read_bytes() == before
     assert len(Transcript(file, read_only=True).calls) == 9
 
@@ -278,15 +229,9 @@ def test_shipped_recording_reaches_its_recorded_hypervolume(name: str, mean: flo
     recording = find_recording(name)
     assert recording is not None
     study = recording.config.study
-    run = optimize(
-        recording.config.problem,
-        proposer=ReplayProposer(name),
-        n_init=study.n_init,
-        n_step=study.n_step,
-        n_total=study.n_total,
-        seed=recording.config.seed,
-        verify=False,
-    )
+    schedule = {"n_init": study.n_init, "n_step": study.n_step, "n_total": study.n_total}
+    settings = {**schedule, "seed": recording.config.seed, "verify": False}
+    run = optimize(recording.config.problem, proposer=ReplayProposer(name), **settings)
     proposed = [trial for trial in run.trials if trial.source == "llm"]
     assert [trial.proposal for trial in proposed] == [call.proposal for call in recording.calls]
     assert all(trial.reason for trial in proposed)

@@ -12,20 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from armwright import arrays, files
+from armwright import Problem, arrays, files, find_front, load_task, optimize, write_report
 from armwright.exceptions import RunFolderError
 from armwright.existing.compare_arms import read_existing_arms
 from armwright.experiments.run_list import list_runs
 from armwright.llm.transcript import Transcript
-from armwright.page.page import write_report
-from armwright.problem.problem import Problem
 from armwright.proof.results import read_summary
 from armwright.runs.control import add_hint, read_control, read_status
 from armwright.runs.folder import RunFolder, is_held, read_run
 from armwright.sheet.design_sheet import design_sheet
-from armwright.study.front.front_run import find_front
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 
 HUGE = 3 * 1024**3  # [bytes] of zeros, which take no room on the disk
 MOST = 400 * 1024**2  # [bytes] of memory at once

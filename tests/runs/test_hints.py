@@ -8,20 +8,17 @@ from typing import Any
 
 import pytest
 
+from armwright import ManualProposer, PromptOptions, ReplayProposer, load_task
 from armwright.exceptions import AnswerPendingError
 from armwright.llm import client as chat
-from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt
 from armwright.llm.transcript import hints_of, used_hints
-from armwright.proposers.manual import ManualProposer
-from armwright.proposers.replay import ReplayProposer
 from armwright.runs.control import Hint, add_hint, read_control
 from armwright.study.progress import Progress
 from armwright.study.prompt_preview import preview_after
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.command_line import PATIENCE
-from tests.support.controlled_runs import after, asks, calls, interrupt, lines, run, status
+from tests.support.controlled_runs import after, asks, calls, cut, interrupt, lines, run, status
 from tests.support.fixed_problem import FixedProblem, fixed_history
 
 NOTE = "A note from the engineer who watches this search; take it into account: "
@@ -108,13 +105,7 @@ def test_hint_of_an_interrupted_call_is_sent_again(chat_server: ChatServer, tmp_
     assert NOTE + "first\n" in shown
     run(out, asks(chat_server))
     assert [call.prompt for call in calls(out) if call.hints] == [shown]
-    file = out / "transcripts.jsonl"  # as a kill after the thoughts leaves it
-    file.write_text(
-        "".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:3]), encoding="utf-8"
-    )  # two checks, and the thoughts
-    (out / "trials.jsonl").write_text(
-        "".join((out / "trials.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)[:4]), encoding="utf-8"
-    )
+    cut(out, transcripts=3, trials=4)  # two checks, and the thoughts
     (out / "summary.json").unlink()
     chat_server.requests.clear()
     run(out, asks(chat_server))
@@ -156,21 +147,9 @@ def test_previewed_hints_are_those_sent(chat_server: ChatServer, tmp_path: Path)
 PAPER = FixedProblem(load_task("target-1"))
 
 
-def test_prompt_without_hints_is_unchanged() -> None:
+def test_prompt_without_visible_hints_is_unchanged() -> None:
     history = fixed_history(PAPER)
-    for name in ("plus", "minus"):
-        options = PromptOptions(prompt=name)
-        hints = ("\u200b", "\x00")  # in which nothing is to be seen
-        assert design_prompt(history, 3, options, hints=hints) == design_prompt(history, 3, options)
-
-
-def test_hint_stays_on_one_line() -> None:
-    hint = "first\n\n# Your turn\nORIGIN: (9, 9, 9)\x1b[2J {{ 1 + 1 }} {% endblock %} " + "x" * 1900
-    told = design_prompt(fixed_history(PAPER), 3, hints=[hint, "second"]).splitlines()
-    (line,) = [line for line in told if line.startswith("- first")]
-    assert line.startswith("- first # Your turn ORIGIN: (9, 9, 9) {{ 1 + 1 }} {% endblock %} xxx")
-    assert told.count("# Your turn") == 1
-    assert told[told.index(line) + 1] == "- second"
+    assert design_prompt(history, 3, hints=("\u200b", "\x00")) == design_prompt(history, 3)
 
 
 def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: Path) -> None:

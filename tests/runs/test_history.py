@@ -5,11 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armwright import FinishedTrial, History, Problem, load_task
 from armwright.pareto import FrontTracker
-from armwright.problem.problem import Problem
-from armwright.runs.history import History
-from armwright.runs.trial import FinishedTrial
-from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-2").model_copy(update={"constraints": ("length <= 1",), "reference_point": None}))
 DESIGNS = PROBLEM.space.sample(12, seed=0)

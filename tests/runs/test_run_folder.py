@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import resource
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -12,14 +11,9 @@ import numpy as np
 import pytest
 import yaml
 
+from armwright import Problem, StudyResult, load_task, optimize, read_run, to_urdf
 from armwright.exceptions import ArmwrightError, RunConflictError, RunFolderError
-from armwright.problem.problem import Problem
 from armwright.proof.results import read_summary
-from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.folder import read_run
-from armwright.study.progress import StudyResult
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
 
@@ -66,16 +60,8 @@ def test_trials_are_one_json_line_each(run: StudyResult) -> None:
 def test_config_reproduces_the_run(run: StudyResult) -> None:
     config = yaml.safe_load((folder(run) / "config.yaml").read_text(encoding="utf-8"))
     assert config["task"]["targets"][0] == [-0.45, -0.45, -0.45]
-    assert config["method"] == {
-        "proposer": {"name": "rules"},
-        "sampler": "tpe",
-        "n_init": 5,
-        "n_step": 4,
-        "n_total": 8,
-        "in_flight": None,
-        "initial_designs": [],
-        "screen": False,
-    }
+    assert config["method"]["proposer"] == {"name": "rules"}
+    assert [config["method"][name] for name in ("sampler", "n_init", "n_step", "n_total")] == ["tpe", 5, 4, 8]
     assert config["seed"] == 0
     assert {"armwright", "optuna", "warp-lang", "python"} <= set(config["versions"])
     read, history = read_run(folder(run))
@@ -87,34 +73,17 @@ def test_summary_has_the_documented_keys(run: StudyResult) -> None:
     summary = json.loads((folder(run) / "summary.json").read_text(encoding="utf-8"))
     assert summary == read_summary(folder(run)) == run.summary
     assert list(summary) == [
-        "task",
-        "seed",
-        "n_trials",
-        "by_source",
-        "hypervolume",
-        "front_gap",
-        "front_size",
-        "verification",
-        "duplicates",
-        "attribution",
-        "proposer",
-        "proposer_bias",
-        "seconds",
-        "versions",
+        *("task", "seed", "n_trials", "by_source", "hypervolume", "front_gap", "front_size", "verification"),
+        *("duplicates", "attribution", "proposer", "proposer_bias", "seconds", "versions"),
     ]
     assert summary["by_source"] == {"random": 5, "rules": 2, "bbo": 6}
     assert list(summary["hypervolume"]) == ["reference_point", "final", "mean", "history"]
     assert len(summary["hypervolume"]["history"]) == 8
-    assert summary["proposer"]["name"] == "rules"
     assert summary["front_size"] == len(run.front)
     assert list(summary["attribution"]) == ["random", "rules", "bbo"]
-    assert all(
-        list(brought) == ["trials", "front", "hypervolume_gained"] for brought in summary["attribution"].values()
-    )
     gained = [brought["hypervolume_gained"] for brought in summary["attribution"].values()]
     assert sum(gained) == pytest.approx(summary["hypervolume"]["final"])
     assert list(summary["proposer_bias"]) == ["proposer", "black_box"]
-    assert 0.0 <= summary["proposer_bias"]["proposer"]["equal_neighbours"] <= 1.0
 
 
 def test_front_designs_are_written_with_their_values(run: StudyResult) -> None:
@@ -134,16 +103,6 @@ def test_front_designs_are_written_with_their_values(run: StudyResult) -> None:
         assert [target["target"] for target in record["targets"]] == [list(t) for t in PROBLEM.task.targets]
         assert {len(target["q"]) for target in record["targets"]} == {4}
         assert (place / "arm.urdf").read_text(encoding="utf-8") == to_urdf(member.arm, name=f"target-1-{member.number}")
-
-
-def test_csv_tables_match_the_run(run: StudyResult) -> None:
-    with open(folder(run) / "trials.csv", newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 13
-    assert list(rows[0])[:5] == ["number", "source", "origin_x", "origin_y", "origin_z"]
-    assert [float(row["torque"]) for row in rows] == [trial.values[1] for trial in run.trials]
-    with open(folder(run) / "front.csv", newline="", encoding="utf-8") as file:
-        assert {int(row["number"]) for row in csv.DictReader(file)} == {member.number for member in run.front}
 
 
 def test_designs_that_left_the_front_are_removed(tmp_path: Path) -> None:
@@ -170,7 +129,10 @@ def test_derived_files_are_rewritten(run: StudyResult, tmp_path: Path) -> None:
         (folder(run) / name).unlink()
     short(tmp_path / "run")
     assert (folder(run) / "summary.json").read_bytes() == summary
-    assert (folder(run) / "front.csv").exists()
+    with open(folder(run) / "trials.csv", newline="", encoding="utf-8") as file:
+        assert [float(row["torque"]) for row in csv.DictReader(file)] == [trial.values[1] for trial in run.trials]
+    with open(folder(run) / "front.csv", newline="", encoding="utf-8") as file:
+        assert {int(row["number"]) for row in csv.DictReader(file)} == {member.number for member in run.front}
 
 
 @pytest.mark.parametrize(
@@ -178,12 +140,9 @@ def test_derived_files_are_rewritten(run: StudyResult, tmp_path: Path) -> None:
     [
         (lambda lines: [*lines[:3], b"{broken}\n", *lines[4:]], "line 4 is damaged"),
         (lambda lines: [*lines[:3], *lines[4:]], "line 4 is damaged (expected trial number 3, found 4)"),
-        (lambda lines: [*lines[:3], lines[2], *lines[3:]], "line 4 is damaged (expected trial number 3, found 2)"),
         (lambda lines: [*lines[:3], lines[3].replace(b'"values": [', b'"values": [NaN, '), *lines[4:]], "line 4"),
         (lambda lines: [*lines[:3], lines[3].replace(b'"link_1": 0.', b'"link_1": 7.'), *lines[4:]], "link_1 = 7."),
         (lambda lines: [*lines[:3], lines[3].replace(b'"params"', b'"parms"'), *lines[4:]], "params: Field required"),
-        (lambda lines: [b"\x00\xff\n", *lines[1:]], "line 1 is damaged"),
-        (lambda lines: [b"3\n", *lines[1:]], "line 1 is damaged"),
         (lambda lines: [b"[" * 100_000 + b"\n", *lines[1:]], "line 1 is damaged"),
         (lambda lines: [lines[0].replace(b'"values": [', b'"values": [1' + b"0" * 400 + b", "), *lines[1:]], "line 1"),
         (lambda lines: [lines[0].replace(b'"proposal": null', b'"proposal": 5'), *lines[1:]], "proposal"),
@@ -209,17 +168,20 @@ def test_damaged_config_is_reported(run: StudyResult, tmp_path: Path) -> None:
         short(tmp_path / "run")
 
 
-def test_results_without_trials_are_not_overwritten(run: StudyResult, tmp_path: Path) -> None:
-    (folder(run) / "trials.jsonl").unlink()
-    with pytest.raises(RunConflictError, match=r"holds results of a run .* but no trial in trials.jsonl"):
+@pytest.mark.parametrize(
+    ("name", "fault", "words"),
+    [
+        ("trials.jsonl", RunConflictError, r"holds results of a run .* but no trial in trials.jsonl"),
+        ("config.yaml", RunFolderError, r"cannot read .*config\.yaml"),
+    ],
+)
+def test_results_without_trials_or_config_are_not_overwritten(
+    run: StudyResult, tmp_path: Path, name: str, fault: type[Exception], words: str
+) -> None:
+    (folder(run) / name).unlink()
+    with pytest.raises(fault, match=words):
         short(tmp_path / "run")
     assert (folder(run) / "summary.json").exists()
-
-
-def test_trials_without_a_config_are_not_overwritten(run: StudyResult, tmp_path: Path) -> None:
-    (folder(run) / "config.yaml").unlink()
-    with pytest.raises(RunFolderError, match=r"cannot read .*config\.yaml"):
-        short(tmp_path / "run")
 
 
 @pytest.mark.parametrize("name", ["figures/mine.png", "notes.txt", "config.yaml", "designs/0001/arm.urdf"])
@@ -237,18 +199,3 @@ def test_folder_without_a_run_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(RunFolderError, match="cannot write"):
         short(tmp_path / "file")
-
-
-def test_full_disk_is_reported_and_written_trials_are_kept(tmp_path: Path) -> None:
-    """A limit on the size of files stands in for the full disk: the write that crosses it is cut short."""
-    whole = short(tmp_path / "whole")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, hard))
-    try:
-        with pytest.raises(RunFolderError, match=r"cannot write .*trials.jsonl.*What was written before is safe"):
-            short(tmp_path / "run")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    again = short(tmp_path / "run")
-    assert 0 < again.resumed < 13
-    assert [trial.values for trial in again.trials] == [trial.values for trial in whole.trials]

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armwright import Problem, load_space, load_task, paper_space
 from armwright.pareto import front_mask, hypervolume
-from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
 from armwright.search.front.front_search import (
     CAPACITIES,
@@ -21,9 +21,7 @@ from armwright.search.front.front_search import (
 )
 from armwright.search.front.selection import best_of_each, leaders, ranks, survivors
 from armwright.search.front.variation import RARE_SHARE, _parents, offspring
-from armwright.spaces.design_space import load_space, paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
-from armwright.tasks.catalogue import load_task
 
 SPACE = paper_space()
 MIXED = (
@@ -217,12 +215,6 @@ def test_side_pools_come_early_while_nothing_counts():
         assert search.evaluations < 10_000
     assert search.state()["side_age"] == 0  # it joined at once
     assert np.any(np.all(search.state()["values"] < 1.1, axis=1))
-
-
-def test_front_outside_reference_box_moves_into_it():
-    search = FrontSearch(MIXED, lambda rows: 5.0 + dtlz2(2)(rows), [5.9, 5.9], seed=0)
-    assert len(stepped(search, 1).values) == 0 or search.hypervolume >= 0.0
-    assert stepped(search, 30).hypervolume > 0.0
 
 
 def test_survivors_keep_most_hypervolume():

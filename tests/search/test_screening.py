@@ -5,15 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from armwright import Problem, load_task
 from armwright.pareto import feasible_mask, total_violation
 from armwright.problem.estimates import lower_bounds
-from armwright.problem.problem import Problem
 from armwright.proof.front_gap import known_front
 from armwright.search.encoding import DesignEncoding
 from armwright.search.front.screening import CANDIDATES, NEAR_MISSES, REJECTED_SHARE, REMEMBERED, Screen
 from armwright.search.front.variation import offspring
 from armwright.spaces.design_space import default_space
-from armwright.tasks.catalogue import load_task
 
 TASK, SPACE = load_task("dispensing"), default_space("dispensing")
 PROBLEM = Problem(TASK, SPACE)

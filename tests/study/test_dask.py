@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,14 @@ import yaml
 
 import armwright as aw
 from armwright.exceptions import ClusterError, EvaluatorError, SettingsError, StoppedError
-from armwright.experiments.cells import Cell, plan_cells
+from armwright.experiments.cells import plan_cells
 from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.runner import _outcome_of
 from armwright.problem.objective import Objective
 from armwright.runs.control import stop_study
-from armwright.study.progress import Progress
 from armwright.study.workers.cluster import Finished
 from tests.support.command_line import start
+from tests.support.controlled_runs import after
 from tests.support.dask_processes import (
     TASK,
     Bench,
@@ -74,6 +74,10 @@ def on(shell: ShellCluster, n_workers: int | None = None) -> aw.Workers:
     return aw.Workers(n_workers, shell.address)
 
 
+def begin_search(bench: Bench, out: Path, *more: str) -> subprocess.Popen[str]:
+    return start("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--out", out, *more)
+
+
 def numbers(run: Path) -> list[int]:
     return [trial["number"] for trial in trials(run)]
 
@@ -85,10 +89,9 @@ def numbers(run: Path) -> list[int]:
     "settings",
     [
         {"problem": PAPER, "sampler": "tpe"},
-        {"problem": PAPER, "sampler": "nsga2"},
         {"problem": MANY, "sampler": "random"},
     ],
-    ids=["tpe", "nsga2", "many quantities"],
+    ids=["tpe", "many quantities"],
 )
 def test_one_worker_gives_the_in_process_run(tmp_path: Path, shell: ShellCluster, settings: dict[str, Any]) -> None:
     """Runs are bit-identical, apart from seconds."""
@@ -147,12 +150,8 @@ def test_stop_lets_designs_in_flight_finish(tmp_path: Path, shell: ShellCluster,
     shell.only(2)
     out = tmp_path / "run"
 
-    def watch(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == 2:
-            stop_study(out)
-
     with pytest.raises(StoppedError):
-        aw.optimize(bench.problem(), **SHORT, out=out, workers=on(shell), watch=watch)
+        aw.optimize(bench.problem(), **SHORT, out=out, workers=on(shell), watch=after(2, lambda: stop_study(out)))
     assert 3 <= len(trials(out)) == bench.counts.total() < N_TRIALS
     aw.optimize(bench.problem(), **SHORT, out=out, workers=on(shell))
     assert numbers(out) == list(range(N_TRIALS))
@@ -187,20 +186,14 @@ def test_design_of_a_killed_shell_worker_is_reevaluated(tmp_path: Path, shell: S
 
 
 @pytest.mark.slow
-def test_killed_local_workers_and_search_are_resumed(tmp_path: Path, bench: Bench) -> None:
-    """The same command goes on each time, and leaves no process behind."""
+@pytest.mark.parametrize(("more", "n"), [(("--workers", "2"), 2), (("--evaluation-timeout", "1000"), 1)])
+def test_killed_search_leaves_no_process_and_is_resumed(
+    tmp_path: Path, bench: Bench, more: tuple[str, str], n: int
+) -> None:
     out = tmp_path / "run"
-    command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", "--workers", "2", *ASKED, "--out", out)
-
-    def begin() -> subprocess.Popen[str]:
-        """Two more designs are held by two workers."""
-        before = len(bench.evaluated)
-        bench.ask("hold")
-        process = start(*command)
-        wait_until(lambda: len(bench.evaluated) == before + 2)
-        return process
-
-    search = begin()
+    bench.ask("hold")
+    search = begin_search(bench, out, *more)
+    wait_until(lambda: len(bench.evaluated) == n)
     started = descendants(search.pid)
     assert {pid for pid, _ in bench.evaluated} <= {process.pid for process in started}
     search.kill()
@@ -208,25 +201,8 @@ def test_killed_local_workers_and_search_are_resumed(tmp_path: Path, bench: Benc
     assert all_ended(started)
     bench.release("hold")
     assert trials(out) == []
-
-    search = begin()
-    started = descendants(search.pid)
-    search.send_signal(signal.SIGINT)
-    said, complained = search.communicate()
-    assert (search.returncode, complained) == (130, "")
-    assert "Resume with:" in said
-    assert all_ended(started)
-    bench.release("hold")
-
-    search = begin()
-    started = descendants(search.pid)
-    os.kill(bench.evaluated[-1][0], signal.SIGKILL)
-    wait_until(lambda: len({pid for pid, _ in bench.evaluated[4:]}) == 3)  # the worker that takes its place
-    bench.release("hold")
-    said, complained = search.communicate()
-    assert (search.returncode, complained) == (0, "")
-    assert said.count("a worker was lost; trial ") == 1
-    assert all_ended(started)
+    search = begin_search(bench, out, *more)
+    assert (search.communicate()[1], search.returncode) == ("", 0)
     assert numbers(out) == list(range(N_TRIALS))
 
 
@@ -261,8 +237,7 @@ def test_version_mismatch_and_lost_scheduler_are_one_line(tmp_path: Path, bench:
         other.kill()
         cluster.add_worker()
         bench.ask("hold")
-        command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--out", out)
-        search = start(*command, "--scheduler", cluster.address)
+        search = begin_search(bench, out, "--scheduler", cluster.address)
         wait_until(lambda: bool(bench.evaluated))
         cluster.scheduler.kill()
         said, complained = search.communicate()
@@ -291,16 +266,11 @@ def test_worker_evaluator_exception_has_its_traceback_and_design(
         return aw.optimize(problem, **SHORT, out=tmp_path / "run", workers=on(shell))
 
     bench.ask("fail")
-    with pytest.raises(
-        EvaluatorError, match=r"^the first 5 evaluations all failed: ValueError: no licence \("
-    ) as raised:
+    with pytest.raises(EvaluatorError, match=r"^the first 5 evaluations all failed: ValueError: no lic") as raised:
         search()
     words = str(raised.value)
     assert json.loads(words[words.index("{") : words.index("}") + 1]).keys() >= {"origin_x", "joint_1", "link_1"}
-    assert words.endswith(". Fix the evaluator and rerun the same command, or go on with --allow-failures")
     (trace,) = raised.value.__notes__
-    assert trace.startswith("Traceback (most recent call last):\n")
-    assert trace.count("File ") == 1
     assert 'in measure\n    raise ValueError("no licence")\nValueError: no licence' in trace
     bench.release("fail")
     assert len(search().trials) == N_TRIALS
@@ -309,12 +279,10 @@ def test_worker_evaluator_exception_has_its_traceback_and_design(
 @pytest.mark.slow
 def test_command_line_shows_the_evaluator_traceback(tmp_path: Path, bench: Bench) -> None:
     bench.ask("fail")
-    command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--out", tmp_path / "run")
-    search = start(*command)
-    _, complained = search.communicate()
+    search = begin_search(bench, tmp_path / "run")
+    trace, cause, line = search.communicate()[1].rsplit("\n", 3)[:3]
     assert search.returncode == 1
-    *trace, cause, line = complained.splitlines()
-    assert trace[0] == "Traceback (most recent call last):"
+    assert trace.startswith("Traceback (most recent call last):\n")
     assert cause == "ValueError: no licence"
     assert line.startswith("armwright: the first 5 evaluations all failed: ValueError: no licence (sim.py, line ")
 
@@ -338,19 +306,6 @@ def test_hanging_evaluation_is_ended_on_a_worker(tmp_path: Path, shell: ShellClu
     ]
 
 
-@pytest.mark.slow
-def test_process_of_an_evaluator_ends_with_a_killed_search(tmp_path: Path, bench: Bench) -> None:
-    bench.ask("hold")
-    command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--evaluation-timeout", "1000")
-    search = start(*command, "--out", tmp_path / "run")
-    wait_until(lambda: len(bench.evaluated) == 1)
-    started = descendants(search.pid)
-    search.kill()
-    search.communicate()
-    assert started
-    assert all_ended(started)
-
-
 def test_worker_objective_exception_has_its_traceback(shell: ShellCluster) -> None:
     shell.only(1)
 
@@ -364,37 +319,28 @@ def test_worker_objective_exception_has_its_traceback(shell: ShellCluster) -> No
 
 
 @pytest.mark.parametrize(
-    ("ask", "fault", "words"),
+    ("settings", "fault", "words"),
     [
-        (lambda: aw.Workers(), SettingsError, "expected a number of workers or the address of a Dask scheduler"),
-        (lambda: aw.Workers(0), SettingsError, "expected 1 to 10,000 workers, got 0"),
-        (
-            lambda: aw.optimize(PAPER, proposer="rules", in_flight=1, workers=aw.Workers(1)),
-            SettingsError,
-            "in_flight does not go with --workers",
-        ),
-        (
-            lambda: aw.optimize(PAPER, workers=aw.Workers(scheduler="tcp://127.0.0.1:9")),
-            ClusterError,
-            r"no Dask scheduler answers at tcp://127\.0\.0\.1:9",
-        ),
-        (
-            lambda: aw.optimize(unpicklable(), workers=aw.Workers(1)),
-            SettingsError,
-            "the problem cannot be sent to workers: TypeError: cannot pickle '_thread.lock' object",
-        ),
+        ({}, SettingsError, "expected a number of workers or the address of a Dask scheduler"),
+        ({"n": 0}, SettingsError, "expected 1 to 10,000 workers, got 0"),
+        ({"n": 1, "in_flight": 1}, SettingsError, "in_flight does not go with --workers"),
+        ({"scheduler": "tcp://127.0.0.1:9"}, ClusterError, r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"),
     ],
 )
 def test_invalid_worker_settings_are_one_line(
-    monkeypatch: pytest.MonkeyPatch, ask: Callable[[], object], fault: type[Exception], words: str
+    monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any], fault: type[Exception], words: str
 ) -> None:
     monkeypatch.setattr("armwright.study.workers.cluster.CONNECT_SECONDS", 0.5)
+
+    def search(n: int | None = None, scheduler: str | None = None, in_flight: int | None = None) -> None:
+        aw.optimize(PAPER, proposer="rules", in_flight=in_flight, workers=aw.Workers(n, scheduler))
+
     with pytest.raises(fault, match=words) as raised:
-        ask()
+        search(**settings)
     assert "\n" not in str(raised.value)
 
 
-def unpicklable() -> aw.Problem:
+def test_problem_that_cannot_be_pickled_is_one_line() -> None:
     lock = threading.Lock()
 
     @aw.evaluator("energy [J]")
@@ -402,36 +348,33 @@ def unpicklable() -> aw.Problem:
         with lock:
             return 1.0
 
-    return aw.Problem(TASK, evaluator=measure)
+    words = "^the problem cannot be sent to workers: TypeError: cannot pickle '_thread.lock' object"
+    with pytest.raises(SettingsError, match=words):
+        aw.optimize(aw.Problem(TASK, evaluator=measure), workers=aw.Workers(1))
 
 
 # --- cells of an experiment -------------------------------------------------------------------------------------------
 
 
-def two_cells(folder: Path, n_total: int) -> tuple[ExperimentPlan, list[Cell]]:
-    """An experiment of two cells."""
+def test_cell_that_kills_workers_reports_its_failure(tmp_path: Path) -> None:
+    (cell, _) = plan_cells(two_cells(n_total=1), tmp_path, tmp_path)[0]
+    assert _outcome_of(Finished(cell, is_lost=True)).fault.startswith("3 workers were lost over it")
+
+
+def two_cells(n_total: int) -> ExperimentPlan:
     method = {"label": "BBO", "proposer": "none", "sampler": "random"}
     content = {"name": "two", "tasks": ["random-3"], "seeds": 2, "n_init": 4, "n_total": n_total}
-    plan = ExperimentPlan.model_validate({**content, "methods": {"bbo": method}})
-    return plan, plan_cells(plan, folder, folder)[0]
-
-
-def have_begun(cells: list[Cell]) -> bool:
-    return all(n_lines(cell.folder / "trials.jsonl") for cell in cells)
-
-
-def test_cell_that_kills_workers_reports_its_failure(tmp_path: Path) -> None:
-    _, (cell, _) = two_cells(tmp_path, n_total=1)
-    assert _outcome_of(Finished(cell, is_lost=True)).fault.startswith("3 workers were lost over it")
+    return ExperimentPlan.model_validate({**content, "methods": {"bbo": method}})
 
 
 @pytest.mark.slow
 def test_ctrl_c_ends_an_experiment_and_its_workers(tmp_path: Path) -> None:
-    plan, cells = two_cells(tmp_path / "out", n_total=10_000)
+    plan = two_cells(n_total=10_000)
+    cells = plan_cells(plan, tmp_path, tmp_path / "out")[0]
     file = tmp_path / "two.yaml"
     file.write_text(yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True)), encoding="utf-8")
     process = start("experiment", file, "--workers", "2", "--out", tmp_path / "out")
-    wait_until(lambda: have_begun(cells))
+    wait_until(lambda: all(n_lines(cell.folder / "trials.jsonl") for cell in cells))
     started = descendants(process.pid)
     process.send_signal(signal.SIGINT)
     said, complained = process.communicate()

@@ -1,9 +1,6 @@
 """Repeated designs are recorded without another evaluation."""
 
-from armwright.problem.problem import Problem
-from armwright.spaces.design_space import DesignSpace
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
+from armwright import DesignSpace, Problem, load_task, optimize
 
 
 def test_repeated_design_is_evaluated_once_and_counted() -> None:

@@ -8,22 +8,16 @@ import mujoco
 import numpy as np
 import pytest
 
+from armwright import Problem, Task, find_front, load_task, optimize, read_run, write_figures
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
 from armwright.pareto import front_mask, hypervolume
-from armwright.pictures.figures import write_figures
-from armwright.problem.problem import Problem
 from armwright.proof.front_gap import known_front
 from armwright.proof.results import read_summary, verify_run
-from armwright.runs.folder import read_run
 from armwright.search.front.front_search import LATE_SHARE, SMALLEST_BATCH, FrontSearch
 from armwright.search.front.screening import CANDIDATES
 from armwright.spaces.design_space import default_space, paper_space
 from armwright.study.front.direct_search import SHORT_FIRST_BATCH, FrontRun
-from armwright.study.front.front_run import find_front
-from armwright.study.front.search_budget import SearchProgress
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
-from armwright.tasks.task import Task
+from tests.support.controlled_runs import interrupt_at
 
 PROBLEM = Problem(load_task("target-1"))
 
@@ -72,15 +66,8 @@ def test_front_run_writes_summary_and_designs(done: FrontRun) -> None:
 
 @pytest.mark.slow
 def test_resumed_front_run_equals_uninterrupted_one(done: FrontRun, tmp_path: Path) -> None:
-    class StopError(Exception):
-        pass
-
-    def stop(progress: SearchProgress) -> None:
-        if progress.evaluations >= 3000:
-            raise StopError
-
-    with pytest.raises(StopError):
-        find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path / "run", watch=stop)
+    with pytest.raises(KeyboardInterrupt):
+        find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path / "run", watch=interrupt_at(3000))
     assert read_summary(tmp_path / "run") is None
     run = find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path / "run")
     assert 3000 <= run.resumed < 6000
@@ -96,17 +83,10 @@ def test_resumed_front_run_equals_uninterrupted_one(done: FrontRun, tmp_path: Pa
 
 @pytest.mark.slow
 def test_resumed_front_run_of_a_cycle_is_screened_identically(tmp_path: Path) -> None:
-    class StopError(Exception):
-        pass
-
-    def stop(progress: SearchProgress) -> None:
-        if progress.evaluations == 600:
-            raise StopError
-
     problem = Problem(load_task("dispensing"), default_space("dispensing"))
     whole = find_front(problem, evaluations=650, seed=1)
-    with pytest.raises(StopError):
-        find_front(problem, evaluations=650, seed=1, out=tmp_path / "run", watch=stop)
+    with pytest.raises(KeyboardInterrupt):
+        find_front(problem, evaluations=650, seed=1, out=tmp_path / "run", watch=interrupt_at(600))
     run = find_front(problem, evaluations=650, seed=1, out=tmp_path / "run")
     assert run.resumed == 600
     assert np.array_equal(run.history.values, whole.history.values)
@@ -162,17 +142,6 @@ def test_damaged_search_state_is_reported(tmp_path: Path) -> None:
         state.write_bytes(content)
         with pytest.raises(RunFolderError, match=r"search\.npz is damaged"):
             find_front(PROBLEM, evaluations=600, seed=1, out=tmp_path / "run")
-    # One wrong byte anywhere: numpy, zipfile, zlib and tokenize each complain in their own way.
-    find_front(PROBLEM, evaluations=300, seed=1, out=tmp_path / "other")
-    whole = (tmp_path / "other" / "search.npz").read_bytes()
-    refused = 0
-    for place in range(0, len(whole), len(whole) // 30):
-        state.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
-        try:
-            find_front(PROBLEM, evaluations=300, seed=1, out=tmp_path / "run")
-        except RunFolderError:
-            refused += 1
-    assert refused > 0
     before = read_run(tmp_path / "run")[1]
     state.unlink()
     anew = find_front(PROBLEM, evaluations=600, seed=1, out=tmp_path / "run")

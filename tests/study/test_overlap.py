@@ -3,23 +3,15 @@
 import random
 import threading
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import pytest
 
+from armwright import History, Problem, Proposal, Proposer, load_task, optimize
 from armwright.exceptions import ProposalError
-from armwright.llm.transcript import Transcript
-from armwright.problem.problem import Problem
-from armwright.proposers.llm import LlmProposer
-from armwright.proposers.proposer import Proposal, Proposer
-from armwright.runs.history import History
 from armwright.study.progress import Progress, StudyResult
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
-from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import PATIENCE
-from tests.support.wire_formats import llm_proposer
+from tests.support.controlled_runs import after, interrupt
 
 PROBLEM = Problem(load_task("target-1"))
 N_INIT = 4
@@ -78,40 +70,34 @@ class Releasing(threading.Thread):
 
 
 def search(proposer: Proposer, n_step: int = 5, n_total: int = 20, in_flight: int = 1, **settings: Any) -> StudyResult:
-    return optimize(
-        PROBLEM,
-        proposer=proposer,
-        sampler="random",
-        n_init=N_INIT,
-        n_step=n_step,
-        n_total=n_total,
-        in_flight=in_flight,
-        verify=False,
-        **settings,
-    )
+    schedule = {"n_init": N_INIT, "n_step": n_step, "n_total": n_total, "in_flight": in_flight}
+    return optimize(PROBLEM, proposer=proposer, sampler="random", verify=False, **{**schedule, **settings})
+
+
+def released(proposer: Held, seed: int, *schedule: int) -> StudyResult:
+    """A search whose answers are released in an order drawn from the seed."""
+    releasing = Releasing(proposer, seed)
+    releasing.start()
+    run = search(proposer, *schedule)
+    releasing.over.set()
+    return run
 
 
 def test_answer_becomes_the_next_trial_after_its_arrival() -> None:
     proposer = Held()
 
     def watch(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == 6:
-            proposer.release(4)  # asked when trial 4 was due
-        elif progress.doing == "finished" and progress.number == 10:
-            proposer.release(9)
+        after(6, lambda: proposer.release(4))(progress)  # asked when trial 4 was due
+        after(10, lambda: proposer.release(9))(progress)
 
     run = search(proposer, n_total=10, watch=watch)
     assert [trial.number for trial in run.trials if trial.source == "held"] == [7, 11]
     first, second = run.trials[7], run.trials[11]
     assert (first.proposal, first.asked, first.feedback) == ("held-4.0", 4, 4)
     assert (second.proposal, second.asked, second.feedback) == ("held-9.0", 9, 9)
-    assert run.summary["proposer"]["overlap"] == {
-        "in_flight": 1,
-        "ratio_planned": 0.2,
-        "ratio": 0.2,
-        "ratio_with_failures": 0.2,
-        "feedback_age": {"mean": 2.5, "max": 3},
-    }
+    ratios = dict.fromkeys(("ratio_planned", "ratio", "ratio_with_failures"), 0.2)
+    age = {"mean": 2.5, "max": 3}
+    assert run.summary["proposer"]["overlap"] == {"in_flight": 1, **ratios, "feedback_age": age}
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -123,10 +109,7 @@ def test_ratio_does_not_depend_on_the_order_of_answers(
     seed: int, n_step: int, n_total: int, in_flight: int, per_call: int
 ) -> None:
     proposer = Held(per_call)
-    releasing = Releasing(proposer, seed)
-    releasing.start()
-    run = search(proposer, n_step, n_total, in_flight)
-    releasing.over.set()
+    run = released(proposer, seed, n_step, n_total, in_flight)
     sources = [trial.source for trial in run.trials[N_INIT:]]
     planned = -(-n_total // n_step)
     assert Counter(sources) == Counter({"held": planned, "bbo": n_total - planned}) - Counter(bbo=0)
@@ -144,11 +127,7 @@ def test_ratio_does_not_depend_on_the_order_of_answers(
 
 
 def test_failed_call_becomes_a_black_box_trial() -> None:
-    proposer = Held(faulty=(9,))
-    releasing = Releasing(proposer, 0)
-    releasing.start()
-    run = search(proposer)
-    releasing.over.set()
+    run = released(Held(faulty=(9,)), 0)
     assert [trial.asked or trial.number for trial in run.trials if trial.fault] == [9]
     assert Counter(trial.source for trial in run.trials[N_INIT:]) == {"bbo": 17, "held": 3}
     assert run.summary["proposer"]["failures"] == {"timeout": 1}
@@ -160,11 +139,7 @@ def test_failed_call_becomes_a_black_box_trial() -> None:
 @pytest.mark.parametrize(("in_flight", "per_call"), [(1, 3), (2, 3), (4, 2)])
 @pytest.mark.fast_cases(3)
 def test_further_designs_of_an_answer_wait_for_their_blocks(seed: int, in_flight: int, per_call: int) -> None:
-    proposer = Held(per_call)
-    releasing = Releasing(proposer, seed)
-    releasing.start()
-    run = search(proposer, 4, 36, in_flight)
-    releasing.over.set()
+    run = released(Held(per_call), seed, 4, 36, in_flight)
     entered = [trial for trial in run.trials if trial.proposal]
     assert len(entered) == 9
     asked: list[int] = []
@@ -214,13 +189,8 @@ def test_interrupt_waits_for_answers_being_recorded() -> None:
 
     proposer = Keeping()
 
-    def interrupt(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == N_INIT:
-            proposer.asked.wait(PATIENCE)
-            raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        search(proposer, watch=interrupt)
+        search(proposer, watch=after(N_INIT, lambda: (proposer.asked.wait(PATIENCE), interrupt())))
     assert proposer.kept.is_set()
 
 
@@ -233,51 +203,3 @@ def test_proposer_exception_ends_the_study() -> None:
 
     with pytest.raises(ZeroDivisionError, match="a bug of its own"):
         search(Broken())
-
-
-@pytest.mark.parametrize("stop", [6, 13])
-@pytest.mark.slow
-def test_interrupted_run_pays_for_no_answer_twice(chat_server: ChatServer, tmp_path: Path, stop: int) -> None:
-    def proposer() -> LlmProposer:
-        return llm_proposer(chat_server.url)
-
-    def interrupt(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == stop:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        search(proposer(), 3, 18, 2, out=tmp_path / "run", watch=interrupt)
-    run = search(proposer(), 3, 18, 2, out=tmp_path / "run")
-    calls = [call for call in Transcript(tmp_path / "run" / "transcripts.jsonl").calls if call.proposal]
-    answered = Counter((call.proposal, call.step) for call in calls if call.fault is None)
-    assert set(answered.values()) == {1}
-    assert Counter(trial.source for trial in run.trials[N_INIT:]) == {"llm": 6, "bbo": 12}
-    assert sorted(p for p, step in answered if step == "parameters") == sorted(
-        trial.proposal for trial in run.trials if trial.proposal
-    )
-
-
-def test_interrupt_cancels_calls_in_flight(chat_server: ChatServer) -> None:
-    """The server still withholds its answers."""
-    released = threading.Event()
-
-    def answer(request: Request) -> Answer:
-        if len(chat_server.requests) > 1:
-            released.wait(PATIENCE)
-        return designer(request)
-
-    def interrupt(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == N_INIT + 1:
-            asking.extend(thread for thread in threading.enumerate() if thread.name.startswith("armwright-request"))
-            raise KeyboardInterrupt
-
-    asking: list[threading.Thread] = []
-    chat_server.answer = answer
-    with pytest.raises(KeyboardInterrupt):
-        search(llm_proposer(chat_server.url), in_flight=3, watch=interrupt)
-    assert asking
-    for thread in asking:
-        thread.join(PATIENCE)
-        assert not thread.is_alive()
-    assert not released.is_set()
-    released.set()

@@ -8,16 +8,13 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from armwright import Problem, Proposer, StudyResult, load_task, optimize
 from armwright.cli.app import app
 from armwright.exceptions import ArmwrightError
 from armwright.llm.transcript import Call, Transcript
-from armwright.problem.problem import Problem
-from armwright.proposers.proposer import Proposer
-from armwright.study.progress import Progress, StudyResult
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import PATIENCE
+from tests.support.controlled_runs import after, cut, interrupt
 from tests.support.fixed_problem import SIX_AXIS
 from tests.support.wire_formats import llm_proposer, model_options
 
@@ -33,24 +30,9 @@ def shown(*args: str, what: str | int = "next") -> tuple[str, str]:
     return result.stdout, result.stderr
 
 
-def run(
-    out: Path,
-    n_total: int,
-    proposer: str | Proposer,
-    problem: Problem = PROBLEM,
-    in_flight: int | None = None,
-) -> StudyResult:
-    return optimize(
-        problem,
-        proposer=proposer,
-        n_init=4,
-        n_step=3,
-        n_total=n_total,
-        seed=5,
-        out=out,
-        in_flight=in_flight,
-        verify=False,
-    )
+def run(out: Path, n_total: int, proposer: str | Proposer, problem: Problem = PROBLEM, **more: Any) -> StudyResult:
+    asked = {"n_init": 4, "n_step": 3, "n_total": n_total, "seed": 5, "out": out, "verify": False, **more}
+    return optimize(problem, proposer=proposer, **asked)
 
 
 def asked(out: Path) -> list[Call]:
@@ -100,11 +82,6 @@ def test_prompt_after_a_run_without_a_model(in_folder: Path) -> None:
     assert shown("run", what=4)[0] != told
 
 
-def test_preview_is_of_the_next_request(chat_server: ChatServer, in_folder: Path) -> None:
-    run(in_folder / "run", 2, llm_proposer(chat_server.url))
-    assert shown("run")[1].endswith("for trial 7\n")
-
-
 def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: Path) -> None:
     run(in_folder / "run", 7, llm_proposer(chat_server.url), in_flight=2)
     calls = asked(in_folder / "run")
@@ -112,17 +89,6 @@ def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: P
     for call in calls:
         number = call.proposal.rpartition("-")[2]
         assert shown("run", what=number)[0] == call.prompt
-
-
-def interrupted(out: Path, stop: int, server: ChatServer, in_flight: int | None) -> None:
-    def interrupt(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == stop:
-            raise KeyboardInterrupt
-
-    proposer = llm_proposer(server.url)
-    with pytest.raises(KeyboardInterrupt):
-        optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=9, seed=5, out=out, in_flight=in_flight,
-                 watch=interrupt)  # fmt: skip
 
 
 def test_prompt_after_an_interrupt_is_the_next_one_sent(chat_server: ChatServer, in_folder: Path) -> None:
@@ -135,7 +101,8 @@ def test_prompt_after_an_interrupt_is_the_next_one_sent(chat_server: ChatServer,
         return designer(request)
 
     chat_server.answer = answer
-    interrupted(in_folder / "run", 5, chat_server, 2)
+    with pytest.raises(KeyboardInterrupt):
+        run(in_folder / "run", 9, llm_proposer(chat_server.url), in_flight=2, watch=after(5, interrupt))
     answered.set()
     told, words = shown("run")
     assert words.endswith("tokens; for trial 4\n")
@@ -148,9 +115,7 @@ def test_prompt_after_the_reasoning_requests_the_parameters(
     chat_server: ChatServer, in_folder: Path, in_flight: int | None
 ) -> None:
     run(in_folder / "run", 1, llm_proposer(chat_server.url), in_flight=in_flight)
-    for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 2)):  # as a kill after the first answer leaves it
-        file = in_folder / "run" / name
-        file.write_text("".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:lines]), encoding="utf-8")
+    cut(in_folder / "run", trials=4, transcripts=2)  # as a kill after the first answer leaves it
     told, words = shown("run")
     assert words.endswith("tokens; for trial 4\n")
     run(in_folder / "run", 1, llm_proposer(chat_server.url), in_flight=in_flight)
@@ -174,8 +139,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["target-9"], 'unknown task "target-9"'),
         (["target-1", "--print-prompt", "4"], "--print-prompt 4: expected a run folder, got target-1"),
         (["target-1", "--print-prompt", "al"], '--print-prompt "al": expected next, schema, or'),
-        (["target-1", "--prompt", "pluss"], 'unknown prompt "pluss". Did you mean "plus"?'),
-        (["target-1", *model_options(answer="two")], 'unknown answer "two"'),
         (["run", "--space", "space.yaml"], "--space space.yaml is for a new run; run has its own"),
         (["run", "--print-prompt", "5"], "trial 5: the proposals of run were requested for trials 4"),
         (["run", *model_options(memory="all")], 'unknown memory "all"'),

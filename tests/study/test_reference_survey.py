@@ -7,9 +7,8 @@ import pytest
 import armwright as aw
 from armwright.problem.problem import Outcomes, Problem
 from armwright.study.front.reference_survey import ReferenceSurvey
-from armwright.tasks.task import Task
 
-TASK = Task.model_validate(
+TASK = aw.Task.model_validate(
     {
         "name": "near",
         "targets": [[0.3, 0.1, 0.2]],

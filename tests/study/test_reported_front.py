@@ -6,16 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from armwright import DesignSpace, Problem, Task, find_front
 from armwright.exceptions import TaskError
 from armwright.pareto import front_mask, hypervolume
-from armwright.problem.problem import Problem
 from armwright.problem.reduction import reduced
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_config
-from armwright.spaces.design_space import DesignSpace
-from armwright.study.front.front_run import find_front
 from armwright.study.front.reported_front import reported_front
-from armwright.tasks.task import Task
 
 SPACE = {
     "name": "plane",

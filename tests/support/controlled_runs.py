@@ -9,6 +9,7 @@ from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.proposers.proposer import Proposer
 from armwright.runs.control import Status, read_status
+from armwright.study.front.search_budget import SearchProgress
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
@@ -46,6 +47,23 @@ def after(number: int, act: Callable[[], object]) -> Callable[[Progress], None]:
 
 def interrupt() -> None:
     raise KeyboardInterrupt
+
+
+def cut(folder: Path, **kept: int) -> None:
+    """Keep the first lines of a run's files, as a kill leaves them: cut(folder, trials=4)."""
+    for name, n in kept.items():
+        file = folder / f"{name}.jsonl"
+        file.write_bytes(b"".join(file.read_bytes().splitlines(keepends=True)[:n]))
+
+
+def interrupt_at(evaluations: int) -> Callable[[SearchProgress], None]:
+    """Watches a direct search, and interrupts it after so many evaluations."""
+
+    def watch(progress: SearchProgress) -> None:
+        if progress.evaluations >= evaluations:
+            interrupt()
+
+    return watch
 
 
 def status(folder: Path) -> Status:

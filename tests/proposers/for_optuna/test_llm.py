@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +10,11 @@ import pytest
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.samplers import NSGAIISampler, TPESampler
 from optuna.trial import TrialState, create_trial
-from pydantic import ValidationError
 
+from armwright import ModelOptions, PromptOptions, ProposalCallback, StudyLlmProposer
 from armwright.exceptions import ModelError, ProposalError, SettingsError
-from armwright.llm.model_options import ModelOptions, PromptOptions
 from armwright.llm.prompt import MAX_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
-from armwright.proposers.for_optuna.callback import ProposalCallback
-from armwright.proposers.for_optuna.llm import StudyLlmProposer
 from armwright.proposers.for_optuna.parameters import observed_space, study_parameters
 from armwright.proposers.for_optuna.prompt import study_prompt
 from armwright.proposers.for_optuna.study_view import best_trials
@@ -26,14 +22,6 @@ from tests.support.chat_server import Answer, ChatServer, Request
 
 GOOD = {"kernel": "RBF", "C": "10.0", "gamma": 0.01, "degree": None, "shrinking": "true"}
 DESCRIPTION = "A support vector machine for letters; few samples, many features."
-
-
-@pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
-    before = optuna.logging.get_verbosity()
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    yield
-    optuna.logging.set_verbosity(before)
 
 
 def objective(trial: optuna.Trial) -> float:
@@ -78,11 +66,8 @@ def test_model_parameters_are_evaluated_unchanged(chat_server: ChatServer, tmp_p
     for number in (9, 19):
         trial = study.trials[number]
         assert trial.params == {"kernel": "rbf", "C": 10.0, "gamma": 0.01, "shrinking": True}
-        assert trial.user_attrs == {
-            "source": "scripted",
-            "proposal": f"scripted-{number:04d}",
-            "reason": "a usual start",
-        }
+        own = {"source": "scripted", "proposal": f"scripted-{number:04d}", "reason": "a usual start"}
+        assert trial.user_attrs == own
         assert trial.state is TrialState.COMPLETE
     assert (callback.proposed, callback.faults) == (2, {})
     calls = Transcript(tmp_path / "calls.jsonl").calls
@@ -100,20 +85,10 @@ def test_prompt_states_problem_parameters_and_results(chat_server: ChatServer) -
     study = study_of(20, ProposalCallback(proposer(chat_server), every=10))
     thinking, extracting = chat_server.prompts()[2:4]
     assert DESCRIPTION in thinking
-    for line in (
-        "- kernel: one of rbf, poly, linear\n",
-        "- C: number, 0.001 to 1000, on a log scale\n",
-        "- shrinking: one of true, false\n",
-        "- value: maximised\n",
-        "19 trials are complete.",
-        "improves the best value most",
-    ):
-        assert line in thinking
-    gamma = next(line for line in thinking.splitlines() if line.startswith("- gamma"))
+    assert "- C: number, 0.001 to 1000, on a log scale\n" in thinking
+    assert "- value: maximised\n" in thinking
     n = sum("gamma" in trial.params for trial in study.trials[:19])
-    assert gamma.endswith(
-        f"conditional: in {n} of 19 trials, always with kernel = rbf. Leave it out where it plays no part"
-    )
+    assert f"conditional: in {n} of 19 trials, always with kernel = rbf." in thinking
     assert thinking.count("\nTrial ") == 10
     best = max(study.trials[:19], key=lambda trial: trial.value)
     first = thinking.split("\nTrial ")[1]
@@ -143,8 +118,6 @@ def test_prompt_names_objectives_and_constraints(chat_server: ChatServer) -> Non
     assert "- cost__EUR_ (cost [EUR]): minimised\n- accuracy: maximised\n" in prompt
     assert "A trial is feasible where each of these is <= 0: too wide." in prompt
     assert "infeasible, by too wide = 0.05" in prompt.split("## Some of the other trials")[1]
-    assert "8 trials are complete; 1 pruned early for poor prospects." in prompt
-    assert "enlarges the hypervolume" in prompt
     assert study.trials[9].params == {"x": 0.25}
 
 
@@ -156,24 +129,15 @@ def test_one_step_answer_needs_one_call(chat_server: ChatServer) -> None:
     assert study.trials[9].user_attrs["source"] == "scripted"
 
 
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        ({"C": 1e9}, "C = 1000000000 is outside 0.001 <= C <= 1000"),
-        ({"kernel": "cosine"}, "kernel = 'cosine' is not one of rbf, poly, linear"),
-        ({"degree": 3}, "degree = 3 is between the steps of 2 <= degree <= 6 in steps of 2"),
-    ],
-)
-def test_refused_answer_is_returned_with_the_reason(chat_server: ChatServer, wrong: dict[str, Any], words: str) -> None:
-    right, refused = answering(), answering({**GOOD, **wrong})
+def test_refused_answer_is_returned_with_the_reason(chat_server: ChatServer) -> None:
+    right, refused = answering(), answering({**GOOD, "degree": 3})
     chat_server.answer = lambda request: (refused if len(request["messages"]) == 1 else right)(request)
     callback = ProposalCallback(proposer(chat_server), every=10)
-    # The degree is known only once a trial had it.
     study = study_of()
-    study.enqueue_trial({"kernel": "poly"})
+    study.enqueue_trial({"kernel": "poly"})  # the degree is known only once a trial had it
     study.optimize(objective, n_trials=10, callbacks=[callback])
     assert study.trials[9].user_attrs["source"] == "scripted"
-    assert words in chat_server.prompts()[-1]
+    assert "degree = 3 is between the steps of 2 <= degree <= 6 in steps of 2" in chat_server.prompts()[-1]
     assert callback.faults == {}
 
 
@@ -208,12 +172,6 @@ def test_given_space_needs_no_trial_and_narrows_the_observed_one(chat_server: Ch
     assert "C = 6 is outside 1 <= C <= 5" in chat_server.prompts()[-1]
 
 
-def test_no_space_gives_no_proposal(chat_server: ChatServer) -> None:
-    with pytest.raises(ProposalError, match="no trial has shown a parameter yet") as fault:
-        proposer(chat_server).propose(study_of(), 0, 0)
-    assert fault.value.kind == "space"
-
-
 def test_parameter_names_invalid_for_vendors_get_plain_keys(chat_server: ChatServer) -> None:
     chat_server.answer = answering({"layer_1_units": 4})
     study = optuna.create_study(sampler=TPESampler(seed=0))
@@ -227,14 +185,6 @@ def test_given_space_of_another_kind_is_refused(chat_server: ChatServer) -> None
     llm = proposer(chat_server, space={"C": IntDistribution(1, 9)})
     with pytest.raises(SettingsError, match="C is whole number, 1 to 9; in the study's trials it is number"):
         llm.propose(study_of(2), 0, 2)
-
-
-@pytest.mark.parametrize(
-    "settings", [{"memory": "all"}, {"answer": "three-step"}, {"answer": "text"}, {"transcript": "no/where.jsonl"}]
-)
-def test_invalid_settings_are_refused(chat_server: ChatServer, settings: dict[str, str]) -> None:
-    with pytest.raises((SettingsError, ValidationError), match=next(iter(settings))):
-        proposer(chat_server, **settings)
 
 
 def shown(study: optuna.Study, seed: int) -> str:
@@ -290,9 +240,8 @@ def test_prompt_states_the_latest_range() -> None:
 def test_prompt_lists_pending_proposals() -> None:
     study = study_of(5)
     for number in (5, 6):
-        study.enqueue_trial(
-            {"kernel": "linear", "C": number}, user_attrs={"source": "llm", "proposal": f"llm-{number}"}
-        )
+        own = {"source": "llm", "proposal": f"llm-{number}"}
+        study.enqueue_trial({"kernel": "linear", "C": number}, user_attrs=own)
     study.ask()
     under_way = shown(study, 0).split("## Proposals under way, without results yet\n\n")[1]
     assert under_way.startswith("PARAMETERS: kernel = linear, C = 5\nPARAMETERS: kernel = linear, C = 6\n\n")

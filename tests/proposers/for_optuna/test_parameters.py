@@ -15,7 +15,6 @@ from armwright.proposers.for_optuna.answer import answer_schema, read_answer, wr
 from armwright.proposers.for_optuna.parameter_values import (
     checked_value,
     choice_texts,
-    describe,
     json_value,
     read_value,
 )
@@ -101,24 +100,17 @@ def test_plain_name_is_its_own_key() -> None:
     ("distribution", "written", "value"),
     [
         (IntDistribution(1, 9), "3", 3),
-        (IntDistribution(1, 9), 3.0, 3),
         (IntDistribution(16, 64, step=16), " 48 ", 48),
         (FloatDistribution(1e-5, 1.0, log=True), "1e-3", 1e-3),
-        (FloatDistribution(0.0, 1.0), 1, 1.0),
         (FloatDistribution(0.0, 1.0, step=0.1), 0.3, 0.3),
         (FloatDistribution(0.0, 1.0, step=0.1), 0.70000001, 0.7000000000000001),
         (CategoricalDistribution(["rbf", "poly"]), "RBF", "rbf"),
-        (CategoricalDistribution(["rbf", "poly"]), "'rbf'", "rbf"),
         (CategoricalDistribution([True, False]), "True", True),
-        (CategoricalDistribution([True, False]), False, False),
         (CategoricalDistribution([None, 5, 10]), None, None),
-        (CategoricalDistribution([None, 5, 10]), "None", None),
         (CategoricalDistribution([None, 5, 10]), "null", None),
         (CategoricalDistribution([None, 5, 10]), "10.0", 10),
-        (CategoricalDistribution([0.5, 1.0]), 1, 1.0),
         (CategoricalDistribution(["1", 1]), "1", 1),
         (CategoricalDistribution(["1", 1]), "'1'", "1"),
-        (CategoricalDistribution([1, 2]), "2", 2),
     ],
 )
 def test_values_are_read_in_the_intended_type(distribution: BaseDistribution, written: Any, value: Any) -> None:
@@ -131,18 +123,12 @@ def test_values_are_read_in_the_intended_type(distribution: BaseDistribution, wr
     ("distribution", "written", "words"),
     [
         (IntDistribution(1, 9), 10, "x = 10 is outside 1 <= x <= 9"),
-        (IntDistribution(1, 9), 2.5, "x = 2.5 is not a whole number"),
         (IntDistribution(1, 9), True, "x = True is not a whole number"),
-        (IntDistribution(1, 9), "many", "x = 'many' is not a whole number"),
         (IntDistribution(1, 9), 10**400, "a number beyond 64 bits"),
         (IntDistribution(16, 64, step=16), 40, "x = 40 is between the steps of 16 <= x <= 64 in steps of 16"),
         (FloatDistribution(1e-5, 1.0, log=True), 0.0, "x = 0 is outside 1e-05 <= x <= 1"),
         (FloatDistribution(0.0, 1.0), float("nan"), "x = nan is not a finite number"),
-        (FloatDistribution(0.0, 1.0), "inf", "x = inf is not a finite number"),
-        (FloatDistribution(0.0, 1.0), 10**400, "not a finite number"),
-        (FloatDistribution(0.0, 1.0), True, "x = True is not a finite number"),
         (FloatDistribution(0.0, 1.0), [0.5], "not a finite number"),
-        (FloatDistribution(0.0, 1.0, step=0.1), 0.35, "x = 0.35 is between the steps of 0 <= x <= 1 in steps of 0.1"),
         (CategoricalDistribution(["rbf", "poly"]), "rfb", "x = 'rfb' is not one of rbf, poly. Did you mean \"rbf\""),
         (CategoricalDistribution([1, 2]), True, "x = True is not one of 1, 2"),
         (CategoricalDistribution(["a", "b"]), {"a": 1}, "is not one of a, b"),
@@ -166,12 +152,6 @@ def test_choices_with_equal_text_are_distinguished() -> None:
     assert choice_texts(CategoricalDistribution(["", "a"])) == ["''", "'a'"]
 
 
-def test_distribution_is_described_by_kind_and_range() -> None:
-    assert describe(IntDistribution(2, 8, step=2)) == "whole number, 2 to 8 in steps of 2"
-    assert describe(FloatDistribution(1e-5, 0.1, log=True)) == "number, 1e-05 to 0.1, on a log scale"
-    assert describe(CategoricalDistribution(["a", True])) == "one of a, true"
-
-
 PARAMETERS = [
     Parameter("kernel", "kernel", CategoricalDistribution(["rbf", "linear"])),
     Parameter("C", "C", FloatDistribution(1e-2, 1e2, log=True)),
@@ -187,16 +167,11 @@ def test_conditional_parameters_may_be_left_out() -> None:
     assert schema["properties"]["parameters"]["required"] == ["kernel", "C"]
 
 
-def test_answer_without_the_parameters_object_is_read() -> None:
-    answer = read_answer({"KERNEL": "rbf", "c": "2.5", "reason": "a  try\n"}, PARAMETERS)
-    assert answer == ({"kernel": "rbf", "C": 2.5}, "a try")
-
-
-def test_missing_reason_is_empty() -> None:
+def test_answer_without_parameters_object_or_reason_is_read() -> None:
     """A missing reason is not the word None, and invisible characters are dropped."""
-    parameters = [Parameter("C", "C", FloatDistribution(0.0, 9.0))]
-    assert read_answer({"C": 1, "reason": None}, parameters)[1] == ""
-    assert read_answer({"C": 1, "reason": "so\x1b[2J\u200b it is"}, parameters)[1] == "so it is"
+    for reason, read in ((None, ""), ("so\x1b[2J\u200b it\n is", "so it is")):
+        answer = read_answer({"KERNEL": "rbf", "c": "2.5", "reason": reason}, PARAMETERS)
+        assert answer == ({"kernel": "rbf", "C": 2.5}, read)
 
 
 def test_parameter_may_be_named_reason() -> None:

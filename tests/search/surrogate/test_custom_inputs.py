@@ -7,8 +7,6 @@ import pytest
 
 import armwright as aw
 from armwright.exceptions import SpaceError
-from armwright.problem.problem import Problem
-from armwright.search.surrogate import candidates
 from armwright.search.surrogate.custom_inputs import CustomInputs
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
@@ -46,24 +44,13 @@ def columns_of(space: aw.DesignSpace, n: int, **values: list[float | str]) -> di
     return dict(zip(names, CustomInputs(space)(space.normalised(matrix)).T, strict=True))
 
 
-@pytest.fixture(autouse=True)
-def _few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(candidates, "RANDOM", 100)
-    monkeypatch.setattr(candidates, "NEAR_FRONT", 50)
-    monkeypatch.setattr(candidates, "FRONT_EVALUATIONS", 600)
-
-
-def test_numbers_are_on_their_scales() -> None:
-    columns = columns_of(space_of(), 3, kp=[1, 10, 100], cells=[1, 4, 1], gear_2=[2.0, 3.0, 1.0])
+def test_numbers_are_on_their_scales_and_choices_are_indicators() -> None:
+    belts = ["gt2", "htd3", "flat"]
+    columns = columns_of(space_of(), 3, kp=[1, 10, 100], cells=[1, 4, 1], gear_2=[2.0, 3.0, 1.0], belt=belts)
     assert columns["kp"] == pytest.approx([-1.0, 0.0, 1.0])
     assert columns["cells"].tolist() == [-1.0, 1.0, -1.0]
     assert columns["gear_2"].tolist() == [0.0, 1.0, -1.0]
-
-
-def test_choices_are_indicators() -> None:
-    columns = columns_of(space_of(), 3, belt=["gt2", "htd3", "flat"])
-    table = np.column_stack([columns[f"belt {choice}"] for choice in ("gt2", "htd3", "flat")])
-    assert np.array_equal(table, np.eye(3))
+    assert np.array_equal(np.column_stack([columns[f"belt {choice}"] for choice in belts]), np.eye(3))
 
 
 def test_parameters_of_joints_that_do_not_exist_are_zero() -> None:
@@ -79,7 +66,7 @@ def test_space_without_custom_parameters_has_no_custom_inputs() -> None:
 
 
 def test_objective_of_a_custom_parameter_is_predicted_with_the_physics() -> None:
-    problem = Problem(TASK, space_of({"kp": CUSTOM["kp"]}), evaluator=lag)
+    problem = aw.Problem(TASK, space_of({"kp": CUSTOM["kp"]}), evaluator=lag)
     designs = problem.space.sample(40, 1)
     values = np.array([lag(problem.arm(design), TASK, design) for design in designs])
     matrix, none = problem.space.matrix(designs), np.zeros(20, dtype=bool)

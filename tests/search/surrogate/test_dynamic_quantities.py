@@ -7,8 +7,6 @@ import pytest
 
 import armwright as aw
 from armwright.arrays import Array
-from armwright.problem.evaluation import Evaluation
-from armwright.robot.arm import Arm
 from armwright.search.surrogate.dynamic_quantities import QUANTITIES, dynamic_quantities
 from armwright.spaces.design_space import default_space
 
@@ -16,12 +14,12 @@ TARGETS = np.array([[0.3, 0.1, 0.2], [0.1, -0.3, 0.3], [-0.2, 0.2, 0.1]])
 SOFT = 1e-5  # of the stiffness that the oracle's springs have, so that they yield in the first order [N m/rad]
 
 
-def arms_of(task: str, n: int) -> list[Arm]:
+def arms_of(task: str, n: int) -> list[aw.Arm]:
     space = default_space(task)
     return [space.arm(design) for design in space.sample(n, seed=4)]
 
 
-def quantities(arm: Arm) -> tuple[Evaluation, dict[str, float]]:
+def quantities(arm: aw.Arm) -> tuple[aw.Evaluation, dict[str, float]]:
     evaluation = aw.evaluate(arm, TARGETS)
     return evaluation, dict(zip(QUANTITIES, dynamic_quantities(evaluation)[0].tolist(), strict=True))
 

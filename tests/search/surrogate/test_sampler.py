@@ -13,22 +13,14 @@ from rich.console import Console
 import armwright as aw
 from armwright.cli.show_results import show_result
 from armwright.exceptions import SettingsError
-from armwright.problem.evaluators import Evaluator
-from armwright.problem.problem import Problem
 from armwright.proof.results import read_summary
 from armwright.runs.history import BBO, RANDOM, History
-from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for, sampler_name
-from armwright.search.surrogate import candidates
 from armwright.search.surrogate.left_out_errors import left_out_errors
-from armwright.search.surrogate.sampler import surrogate_sampler
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
-from armwright.spaces.design_space import DesignSpace, load_space, paper_space
 from armwright.spaces.optuna_distributions import distributions
-from armwright.spaces.parameters import Design
-from armwright.tasks.catalogue import load_task
 
-TASK = load_task("target-1")
+TASK = aw.load_task("target-1")
 
 
 @aw.evaluator("height [m]", "span [m]")
@@ -37,19 +29,12 @@ def measure(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
     return abs(arm.base[2]), 0.1 + sum(link.length for link in arm.links)
 
 
-@pytest.fixture(autouse=True)
-def _few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(candidates, "RANDOM", 100)
-    monkeypatch.setattr(candidates, "NEAR_FRONT", 50)
-    monkeypatch.setattr(candidates, "FRONT_EVALUATIONS", 600)
-
-
-def problem(space: DesignSpace | None = None, evaluator: Evaluator = measure, **changes: object) -> Problem:
+def problem(space: aw.DesignSpace | None = None, evaluator: aw.Evaluator = measure, **changes: object) -> aw.Problem:
     task = TASK.model_copy(update={"reference_point": None, **changes})
-    return Problem(task, space or paper_space(), evaluator=evaluator)
+    return aw.Problem(task, space or aw.paper_space(), evaluator=evaluator)
 
 
-def observed(problem: Problem, n: int, pending: int = 0) -> Observations:
+def observed(problem: aw.Problem, n: int, pending: int = 0) -> Observations:
     designs = problem.space.sample(n + pending, 5)
     values = np.array([measure(problem.arm(design), problem.task) for design in designs[:n]])
     matrix = problem.space.matrix(designs)
@@ -61,7 +46,7 @@ def test_gain_is_bounded_by_what_is_stated_else_by_the_worst_values() -> None:
     seen.failed[2] = True
     worst = np.delete(seen.values, 2, axis=0).max(axis=0)
     assert Surrogate(problem()).reference_point(seen) == pytest.approx(worst)
-    stated = Surrogate(Problem(TASK.model_copy(update={"reference_point": (0.4, 1.3)})))
+    stated = Surrogate(aw.Problem(TASK.model_copy(update={"reference_point": (0.4, 1.3)})))
     assert stated.reference_point(seen) == pytest.approx([0.4, 1.3])
 
 
@@ -85,15 +70,16 @@ def test_summary_and_terminal_state_the_errors_of_predictions(tmp_path: Path) ->
     assert summary["surrogate"] == left_out_errors(Surrogate(problem()), run.history)
     output = io.StringIO()
     show_result(Console(file=output, width=200), run, [])
-    assert "leave-one-out error of the surrogate over 12 designs, in standard deviations: height " in output.getvalue()
     assert f", span {summary['surrogate']['errors']['span']:.2g}\n" in output.getvalue()
 
 
-def history_of(problem: Problem, values: np.ndarray) -> History:
+def history_of(problem: aw.Problem, values: np.ndarray) -> History:
     """Return random trials of designs with these values (N, M)."""
     designs = problem.space.sample(len(values), 3)
     pairs = enumerate(zip(designs, values.tolist(), strict=True))
-    return History(problem, [FinishedTrial(i, RANDOM, design, tuple(row)) for i, (design, row) in pairs], len(values))
+    return History(
+        problem, [aw.FinishedTrial(i, RANDOM, design, tuple(row)) for i, (design, row) in pairs], len(values)
+    )
 
 
 @pytest.mark.slow
@@ -107,20 +93,17 @@ def test_errors_tell_what_is_predictable_from_what_is_not() -> None:
     assert found["errors"]["height"] > 0.8
 
 
-def test_constant_objective_has_no_error() -> None:
+def test_constant_objective_and_few_designs_have_no_error() -> None:
+    assert left_out_errors(Surrogate(problem()), history_of(problem(), np.ones((9, 2)))) is None
     values = np.column_stack([np.full(12, 3.0), np.random.default_rng(8).uniform(1.0, 2.0, 12)])
     found = left_out_errors(Surrogate(problem()), history_of(problem(), values))
     assert found is not None
     assert found["errors"]["height"] is None
 
 
-def test_few_designs_have_no_errors() -> None:
-    assert left_out_errors(Surrogate(problem()), history_of(problem(), np.ones((9, 2)))) is None
-
-
 def test_repeated_designs_do_not_count() -> None:
     whole = history_of(problem(), np.random.default_rng(7).uniform(1.0, 2.0, (12, 2)))
-    copies = [FinishedTrial(12 + i, RANDOM, whole.trials[0].design, (1.0, 1.0), duplicate_of=0) for i in range(3)]
+    copies = [aw.FinishedTrial(12 + i, RANDOM, whole.trials[0].design, (1.0, 1.0), duplicate_of=0) for i in range(3)]
     more = History(whole.problem, [*whole.trials, *copies], 12)
     assert left_out_errors(Surrogate(problem()), more) == left_out_errors(Surrogate(problem()), whole)
 
@@ -136,11 +119,11 @@ def test_memory_changes_no_choice() -> None:
 
 def test_auto_is_the_surrogate_for_evaluators_only() -> None:
     assert sampler_name(sampler_for(problem(), "auto")) == "surrogate"
-    assert sampler_for(Problem(TASK), "auto") == "tpe"
+    assert sampler_for(aw.Problem(TASK), "auto") == "tpe"
     assert sampler_for(problem(), "nsga2") == "nsga2"
 
 
-def longest_link(design: Design) -> list[float]:
+def longest_link(design: aw.Design) -> list[float]:
     return [max(design.links)]
 
 
@@ -154,21 +137,16 @@ def test_custom_features_are_inputs() -> None:
 
 def test_features_of_optimize_are_those_of_the_surrogate() -> None:
     run = aw.optimize(problem(), proposer="none", features=longest_link, n_init=6, n_total=1)
-    same = surrogate_sampler(problem(), features=longest_link)
+    same = aw.surrogate_sampler(problem(), features=longest_link)
     other = aw.optimize(problem(), proposer="none", sampler=same, n_init=6, n_total=1)
     assert run.config.study.sampler == sampler_name(same)
     assert [trial.design for trial in run.trials] == [trial.design for trial in other.trials]
 
 
-@pytest.mark.parametrize("sampler", ["tpe", "random", surrogate_sampler(problem())])
+@pytest.mark.parametrize("sampler", ["tpe", "random", aw.surrogate_sampler(problem())])
 def test_features_with_another_sampler_are_refused(sampler: str | SamplerFactory) -> None:
     with pytest.raises(SettingsError, match=r'features: expected the sampler "surrogate".*try sampler="surrogate"'):
         aw.optimize(problem(), proposer="none", sampler=sampler, features=longest_link)
-
-
-def test_features_that_are_no_function_are_refused() -> None:
-    with pytest.raises(SettingsError, match="expected a function of a design, got 3"):
-        sampler_for(problem(), "surrogate", 3)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("value", [[np.nan], [np.inf, 1.0], [[1.0]], "long", {"length": 1.0}, [1.0, [2.0]], [None]])
@@ -178,7 +156,7 @@ def test_features_that_are_not_finite_numbers_are_refused(value: Any) -> None:
 
 
 def test_features_of_varying_length_are_refused() -> None:
-    p = problem(load_space("desk-sorting"))
+    p = problem(aw.load_space("desk-sorting"))
     matrix = p.space.matrix(p.space.sample(20, 0))
     with pytest.raises(SettingsError, match=r"expected \d finite numbers for every design"):
         Surrogate(p, lambda design: design.links).describe(matrix)
@@ -218,7 +196,7 @@ def test_choice_beats_random_designs() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n_objectives", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("n_objectives", [1, 5])
 def test_one_to_five_objectives(n_objectives: int) -> None:
     @aw.evaluator(*(f"f{i}" for i in range(n_objectives)))
     def several(arm: aw.Arm, task: aw.Task) -> tuple[float, ...]:
@@ -231,7 +209,7 @@ def test_one_to_five_objectives(n_objectives: int) -> None:
 
 @pytest.mark.slow
 def test_conditional_parameters_and_motors() -> None:
-    space = load_space("desk-sorting")
+    space = aw.load_space("desk-sorting")
     run = aw.optimize(problem(space), proposer="none", sampler="surrogate", n_init=8, n_total=5)
     assert all(space.design(trial.design.params) == trial.design for trial in run.trials)
     assert len({trial.design for trial in run.trials}) == 13
@@ -275,24 +253,13 @@ def test_rare_success_is_sought_among_its_likes() -> None:
             raise ValueError("too long")
         return arm.length, abs(arm.base[2])
 
-    failures = {
-        sampler: [
-            trial.failure is not None
-            for seed in range(3)
-            for trial in aw.optimize(
-                problem(evaluator=short),
-                sampler=sampler,
-                proposer="none",
-                n_init=10,
-                n_total=20,
-                seed=seed,
-                allow_failures=True,
-            ).trials[20:]
-        ]
-        for sampler in ("surrogate", "random")
-    }
-    assert sum(failures["random"]) > 22  # of 30
-    assert sum(failures["surrogate"]) < 15
+    def failures(sampler: str) -> int:
+        asked: Any = {"sampler": sampler, "proposer": "none", "n_init": 10, "n_total": 20, "allow_failures": True}
+        runs = [aw.optimize(problem(evaluator=short), **asked, seed=seed) for seed in range(3)]
+        return sum(trial.failure is not None for run in runs for trial in run.trials[20:])
+
+    assert failures("random") > 22  # of 30
+    assert failures("surrogate") < 15
 
 
 def test_failed_trials_of_a_script_are_not_learned_from() -> None:
@@ -303,12 +270,12 @@ def test_failed_trials_of_a_script_are_not_learned_from() -> None:
         state = TrialState.FAIL if number == 3 else TrialState.COMPLETE
         values = None if number == 3 else [design.links[0], -design.links[1]]
         study.add_trial(create_trial(params=dict(design.params), distributions=space, values=values, state=state))
-    study.sampler = surrogate_sampler(p)(0)
+    study.sampler = aw.surrogate_sampler(p)(0)
     trial = study.ask(space)
     assert p.space.design(trial.params)
 
 
 def test_first_trials_of_a_study_are_random() -> None:
     p = problem()
-    box, plain = BlackBox(p.space, surrogate_sampler(p), 0), BlackBox(p.space, "random", 0)
+    box, plain = BlackBox(p.space, aw.surrogate_sampler(p), 0), BlackBox(p.space, "random", 0)
     assert box.draw(0, BBO)[1] == plain.draw(0, BBO)[1]
