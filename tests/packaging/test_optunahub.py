@@ -13,7 +13,7 @@ import yaml
 
 import armwright as aw
 from tests import ROOT
-from tests.proposers.for_optuna.test_callback import quiet as quiet
+from tests.proposers.for_optuna.conftest import _quiet as _quiet
 
 REGISTRY = ROOT / "optunahub" / "package"
 NAME = "callbacks/armwright_proposals"
