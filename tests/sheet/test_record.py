@@ -296,7 +296,7 @@ def test_command_writes_html_and_json(run: Path) -> None:
     assert {file.parent for file in files} == {run / "designs" / f"{NUMBER:04d}"}
     record = json.loads(files[1].read_text(encoding="utf-8"))
     assert record["design"] == NUMBER
-    assert record["units"]["reach"] == "m"
+    assert record["facts"]["reach"]["unit"] == "m"
     assert files[0].read_text(encoding="utf-8").startswith("<!doctype html>")
 
 
