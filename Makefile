@@ -13,7 +13,7 @@ demo: .venv/.run  ## replay a language model's proposals, then design an arm wit
 	$(BIN)/armwright pick runs/demo-arm --robust --by cycle_time
 	$(BIN)/armwright simulate runs/demo-arm
 
-test: .venv/.test  ## the fast tests: two minutes on two cores, without browser and other processes
+test: .venv/.test  ## the fast tests: three minutes on two cores, without browser and other processes
 	$(BIN)/python -m pytest -m "not slow"
 
 test-all: .venv/.test package docs  ## what `make test` leaves out: browser, kills, fuzz, documentation, packages
