@@ -90,7 +90,7 @@ def test_motions_of_a_step_with_approach_are_named() -> None:
 
 def test_cycle_that_the_arm_follows_has_no_faults() -> None:
     assert describe_faults(driven(SWEEP), 0) == ""
-    assert "clearance" in describe_path(path_record(driven(SWEEP), 0)["path"])
+    assert "clearance" in describe_path(path_extremes(driven(SWEEP).paths, 0))
 
 
 def test_tasks_without_a_cycle_have_nothing_to_report() -> None:

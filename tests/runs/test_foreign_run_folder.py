@@ -9,18 +9,24 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from armwright import Problem, arrays, files, find_front, load_task, optimize, write_report
+from armwright import Problem, arrays, files, find_front, load_space, load_task, optimize, write_report
 from armwright.exceptions import RunFolderError
 from armwright.existing.compare_arms import read_existing_arms
 from armwright.experiments.run_list import list_runs
 from armwright.llm.transcript import Transcript
+from armwright.problem.facts import describe_supply
+from armwright.proof.cycle_faults import describe_path
+from armwright.proof.design_record import read_records
 from armwright.proof.results import read_summary
+from armwright.proof.selection import pick_from
 from armwright.runs.control import add_hint, read_control, read_status
 from armwright.runs.folder import RunFolder, is_held, read_run
 from armwright.sheet.design_sheet import design_sheet
+from tests import ROOT
 
 HUGE = 3 * 1024**3  # [bytes] of zeros, which take no room on the disk
 MOST = 400 * 1024**2  # [bytes] of memory at once
@@ -68,6 +74,59 @@ def test_huge_files_are_not_read_whole(run: Path, name: str) -> None:
     list_runs([run])
     with suppress(RunFolderError):
         write_report(run)
+
+
+@pytest.fixture(scope="module")
+def assembly(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder, examples = tmp_path_factory.mktemp("assembly") / "run", ROOT / "examples"
+    space = load_space(examples / "2-assembly-space.yaml")
+    find_front(Problem(load_task(examples / "2-assembly-task.yaml"), space), evaluations=600, out=folder)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"facts": {}},
+        {"facts": {"price": {"label": "Price", "unit": "USD", "explanation": "x", "value": float("nan")}}},
+        {"facts": {"mass": {"label": "Mass", "unit": "m", "explanation": "x", "value": 1.7e308}}},
+        {"facts": {"voltage": None}},
+        {"path": {"clearance": [], "jumps": {}}},
+        {"way": {"seconds": [], "q": []}},
+        {"way": {"seconds": [1e400], "q": [[[0.0]]]}},
+        {
+            "loads": {
+                "seconds": 1.0,
+                **{key: [] for key in ("torque", "speed", "slides", "peak", "continuous", "no_load")},
+            }
+        },
+        {"number": 1e30},
+        {"params": {}},
+    ],
+)
+def test_records_that_do_not_fit_their_design_are_computed_again(
+    assembly: Path, tmp_path: Path, change: dict[str, Any]
+) -> None:
+    """What shows a run takes neither numbers that are none nor parts that do not belong together."""
+    run = Path(shutil.copytree(assembly, tmp_path / "run"))
+    _, history = read_run(run)
+    numbers = [member.number for member in history.front]
+    expected = read_records(assembly, history, numbers)
+    for file in (run / "designs").glob("*/design.json"):
+        record = json.loads(file.read_text(encoding="utf-8"))
+        for key, value in change.items():
+            is_part = key == "facts" and value
+            record[key] = {**record[key], **value} if is_part else value
+        file.write_text(json.dumps(record), encoding="utf-8")
+    found = read_records(run, history, numbers)
+    assert {n: one.facts for n, one in found.items()} == {
+        n: {name: fact for name, fact in one.facts.items() if name in found[n].facts} for n, one in expected.items()
+    }
+    assert [one.way for one in found.values()] == [one.way for one in expected.values()]
+    write_report(run)
+    _, members, records = pick_from(run, by="mass")
+    assert describe_path(records[members[0].number].path)
+    assert describe_supply(records[members[0].number].facts)
 
 
 def test_trials_and_calls_are_refused_beyond_their_limits(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import to_jsonable_python
 from rich.console import Console
 from rich.text import Text
 
@@ -45,7 +46,7 @@ def picked_records(
     for member in picked:
         record = {"number": member.number, "source": member.source, **quantities[member.number]}
         path = records[member.number].path
-        record |= {"joints": member.design.joints} | ({} if path is None else {"path": path})
+        record |= {"joints": member.design.joints} | ({} if path is None else {"path": to_jsonable_python(path)})
         yield record | ({"survival": survival[member.number]} if member.number in survival else {})
 
 

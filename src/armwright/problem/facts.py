@@ -7,11 +7,12 @@ and sheets read them.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import ConfigDict, Field
 
-from armwright.arrays import Array, finite_or_none
+from armwright.arrays import LARGEST_OBJECTIVE, Array, finite_or_none
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import MASS, QUANTITIES
@@ -43,10 +44,12 @@ _SHOWN: Mapping[str, tuple[str, float]] = {  # unit in texts, and how many of it
 class Fact:
     """A quantity of an arm."""
 
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(allow_inf_nan=False)  # of files, which may be a stranger's
+
     label: str
     unit: str
     explanation: str
-    value: float | None = None
+    value: Annotated[float, Field(ge=-LARGEST_OBJECTIVE, le=LARGEST_OBJECTIVE)] | None = None
     reason: str = ""  # why the value is None
     digits: int = 3  # significant ones that texts show
 
@@ -84,12 +87,11 @@ def facts_of(
         known: Returns values or the reason why they are not known, as `Objective.known`.
     """
     columns = [(quantity, *known(quantity, evaluation)) for quantity in QUANTITIES.values()]
-    currents = [_voltage(evaluation, row) for row in range(len(evaluation))]
     return [
         {
             **{q.name: fact_of(q, finite_or_none(values[row]), reason) for q, values, reason in columns},
             MASS.name: fact_of(MASS, arm.mass),  # which arrays have in the precision of the kernels
-            VOLTAGE: currents[row],
+            VOLTAGE: _voltage(evaluation, row),
         }
         for row, arm in enumerate(arms)
     ]

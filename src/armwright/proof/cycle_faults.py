@@ -3,9 +3,10 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from pydantic import ConfigDict
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
@@ -37,6 +38,8 @@ _SHOWN: Mapping[str, tuple[str, str, float]] = {
 @dataclass(frozen=True)
 class Extreme:
     """The worst value of a quantity along a cycle."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(allow_inf_nan=False)
 
     value: float  # the value [m], [rad] or [m³]
     step: int  # the number of the step, from 1
@@ -87,10 +90,10 @@ def path_record(evaluation: Evaluation, row: int) -> dict[str, Any]:
     return {"path": {**extremes, "jumps": jumping_steps(paths, row)}}
 
 
-def describe_path(path: Mapping[str, Any] | None) -> str:
+def describe_path(path: Mapping[str, Extreme | list[int]] | None) -> str:
     """Describe on one line where an arm is worst along its cycle, from `path` of its record; empty without one."""
-    found = {name: Extreme(**path[name]) for name in _SHOWN if name in path} if path else {}
-    return "; ".join(_describe(name, extreme) for name, extreme in found.items())
+    found = ((name, (path or {}).get(name)) for name in _SHOWN)
+    return "; ".join(_describe(name, extreme) for name, extreme in found if isinstance(extreme, Extreme))
 
 
 def describe_faults(evaluation: Evaluation, row: int) -> str:

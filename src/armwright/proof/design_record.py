@@ -9,10 +9,10 @@ import json
 import shutil
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, model_validator
 
 from armwright.arrays import Array
 from armwright.exceptions import UnknownQuantityError
@@ -20,12 +20,12 @@ from armwright.files import MAX_DERIVED, read_text
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.facts import Fact, Facts, alike, as_json, facts_of, reach_facts
+from armwright.problem.facts import VOLTAGE, Fact, Facts, alike, as_json, facts_of, reach_facts
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.over_reach import reach_lines
 from armwright.problem.unreached_reason import unreached_reason
 from armwright.proof.cycle_export import cycle_files, trajectory_of
-from armwright.proof.cycle_faults import path_record
+from armwright.proof.cycle_faults import Extreme, path_record
 from armwright.robot.arm import Arm, Joint
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import RunFolder
@@ -43,14 +43,14 @@ INSTANTS = 160  # of a cycle, between which the largest load of each joint count
 LOAD_DIGITS = 4
 
 
-class Way(BaseModel):
+class Way(BaseModel, allow_inf_nan=False):
     """The way of a design through the cycle of its task."""
 
     seconds: list[float]  # of each motion
     q: list[list[list[float]]]  # of each motion: points at equal shares, of each the joint values [rad] or [m]
 
 
-class Loads(BaseModel):
+class Loads(BaseModel, allow_inf_nan=False):
     """What the moving joints of a design bear along the cycle; torques with the safety factor."""
 
     seconds: float  # duration of the cycle
@@ -61,13 +61,24 @@ class Loads(BaseModel):
     continuous: list[float | None]
     no_load: list[float | None]
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Check that all lists are of the same joints, and of the same times."""
+        joints = {
+            len(each) for each in (self.slides, self.peak, self.continuous, self.no_load, self.torque, self.speed)
+        }
+        times = set(map(len, [*self.torque, *self.speed]))
+        if len(joints) > 1 or len(times) != 1 or times == {0}:
+            raise ValueError("expected torques and speeds of all joints at the same times")
+        return self
+
 
 class DesignRecord(BaseModel, extra="allow"):
     """What `design.json` says, as far as others read it."""
 
     number: int
     facts: dict[str, Fact]
-    path: dict[str, Any] | None = None  # where it is worst along the cycle (cycle_faults.py)
+    path: dict[str, Extreme | list[int]] | None = None  # where it is worst along the cycle (cycle_faults.py)
     way: Way | None = None
     loads: Loads | None = None  # of recommended designs
 
@@ -134,10 +145,19 @@ def compute_facts(history: History, numbers: Sequence[int]) -> dict[int, Facts]:
 
 
 def _is_of(record: DesignRecord, history: History, number: int) -> bool:
-    """Return whether a record is of this design, whose number another may have had, and has all quantities of today."""
+    """Return whether a record is of this design, whose number another may have had, and states all that it should."""
     params = (record.model_extra or {}).get("params")
     is_design = record.number == number and params == dict(history.trials[number].design.params)
-    return is_design and record.facts.keys() >= QUANTITIES.keys()
+    return is_design and record.facts.keys() >= {*QUANTITIES, VOLTAGE} and _leads_through(record.way, history, number)
+
+
+def _leads_through(way: Way | None, history: History, number: int) -> bool:
+    """Return whether a way has each motion of the task's cycle and each joint of the design."""
+    plan, joints = history.problem.scenes[0].plan, len(history.member(number).arm.joints)
+    if plan is None or way is None:
+        return plan is None and way is None
+    is_whole = len(way.seconds) == len(way.q) == len(plan.motions)
+    return is_whole and all(len(points) > 1 and all(len(q) == joints for q in points) for points in way.q)
 
 
 def _alike(history: History, numbers: Sequence[int]) -> list[list[int]]:
