@@ -215,7 +215,7 @@ def test_page_shows_existing_arms_beside_the_recommended_designs(tmp_path: Path,
         design, held = designs[name], designs[name].value("payload_at_full_reach")
         assert held is not None
         assert stated[name]["Reach"] == design.facts["reach"].text
-        assert stated[name]["Payload there"] == f"{held:.3g} kg"
+        assert stated[name]["Payload at full reach"] == f"{held:.3g} kg"
         assert stated[name]["Deflection"] == design.facts["deflection"].text
     tab.page.locator("#existing button").last.click()
     assert tab.page.locator("#existing tr.chosen button").inner_text() == shown[-1]

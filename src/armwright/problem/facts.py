@@ -104,7 +104,7 @@ def reach_facts(farthest: ReachLine) -> Facts:
     return {
         REACH: Fact("Reach", "m", FARTHEST, farthest.distance),
         PAYLOAD_AT_FULL_REACH: Fact(
-            "Payload there",
+            "Payload at full reach",
             "kg",
             "The mass that the actuators hold at that distance in every posture found, with the safety factor.",
             held,

@@ -9,7 +9,7 @@ from pydantic_core import to_jsonable_python
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.problem.conditions import Condition
-from armwright.problem.facts import Fact, Facts
+from armwright.problem.facts import Facts
 from armwright.problem.objectives import QUANTITIES
 from armwright.proof.design_record import DesignRecord, compute_facts, facts_by_number, read_records
 from armwright.proof.infeasibility import describe_infeasibility
@@ -156,15 +156,17 @@ def quantities_of_front(
         if name not in known and quantities:
             facts = compute_facts(history, list(quantities)) if facts is None else facts
             for number, numbers in quantities.items():
-                numbers[name] = _value(name, facts[number][name])
+                numbers[name] = _value(name, facts[number])
     return quantities
 
 
-def _value(name: str, fact: Fact) -> float:
-    """Return the value of a fact; SettingsError if it is not known."""
-    if fact.value is None:
-        raise SettingsError(f"{name} is not known: {fact.reason}")
-    return fact.value
+def _value(name: str, facts: Facts) -> float:
+    """Return the value of a fact; SettingsError with those that are known if it is not."""
+    value = facts[name].value
+    if value is None:
+        known = [other for other, fact in facts.items() if fact.value is not None and other in QUANTITIES]
+        raise SettingsError(f"{name} is not known: {facts[name].reason}; known: {', '.join(known)}")
+    return value
 
 
 def _units(history: History) -> dict[str, str]:

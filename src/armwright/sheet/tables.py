@@ -56,12 +56,12 @@ def key_figures(sheet: DataSheet) -> Table:
     held = asked[PAYLOAD_AT_FULL_REACH].value
     note = " (the actuators do not hold the arm itself)" if held == 0.0 else ""
     rows = [
-        ("base", NOT_STATED if sheet.base_position is None else _base(sheet.base_position, sheet.base_yaw or 0.0)),
-        ("payload of the task", "none" if sheet.payload is None else f"{significant(sheet.payload)} kg"),
+        ("Base", NOT_STATED if sheet.base_position is None else _base(sheet.base_position, sheet.base_yaw or 0.0)),
+        ("Payload of the task", "none" if sheet.payload is None else f"{significant(sheet.payload)} kg"),
         *((fact.label, fact.text + note * (name == PAYLOAD_AT_FULL_REACH)) for name, fact in asked.items()),
     ]
     others = ((name, one) for name, one in sheet.objectives.items() if name not in asked)
-    rows += [("objective " + name, _objective(value, unit)) for name, (value, unit) in others]
+    rows += [("Objective " + name, _objective(value, unit)) for name, (value, unit) in others]
     return Table("Key figures", (), tuple(rows), (0, 1))
 
 
