@@ -92,8 +92,8 @@ def assembly(tmp_path_factory: pytest.TempPathFactory) -> Path:
         {"facts": {"mass": {"label": "Mass", "unit": "m", "explanation": "x", "value": 1.7e308}}},
         {"facts": {"voltage": None}},
         {"path": {"clearance": [], "jumps": {}}},
-        {"way": {"seconds": [], "q": []}},
-        {"way": {"seconds": [1e400], "q": [[[0.0]]]}},
+        {"motion": {"seconds": [], "q": []}},
+        {"motion": {"seconds": [1e400], "q": [[[0.0]]]}},
         {
             "loads": {
                 "seconds": 1.0,
@@ -122,7 +122,7 @@ def test_records_that_do_not_fit_their_design_are_computed_again(
     assert {n: one.facts for n, one in found.items()} == {
         n: {name: fact for name, fact in one.facts.items() if name in found[n].facts} for n, one in expected.items()
     }
-    assert [one.way for one in found.values()] == [one.way for one in expected.values()]
+    assert [one.motion for one in found.values()] == [one.motion for one in expected.values()]
     write_report(run)
     _, members, records = pick_from(run, by="mass")
     assert describe_path(records[members[0].number].path)

@@ -130,7 +130,7 @@ class RunContent:
             "designs_from": designs_from,
             "front": front,
             "arms": {number: _selectable(self.history, number, records[number].facts) for number in front},
-            "cycles": {number: _cycle(record) for number, record in records.items() if record.way is not None},
+            "cycles": {number: _cycle(record) for number, record in records.items() if record.motion is not None},
             "proposals": _proposals(self.history, designs_from),
             "failures": _failures(self.history, designs_from),
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
@@ -176,9 +176,9 @@ def _selectable(history: History, number: int, facts: Facts) -> dict[str, float]
 
 
 def _cycle(record: DesignRecord) -> dict[str, Any]:
-    """Return the way of a design through the cycle, and its currents in words."""
-    way = {} if record.way is None else record.way.model_dump()
-    return {**way, "supply": describe_supply(record.facts)}
+    """Return the motion of a design through the cycle, and its currents in words."""
+    motion = {} if record.motion is None else record.motion.model_dump()
+    return {**motion, "supply": describe_supply(record.facts)}
 
 
 def _cycle_motions(task: Task) -> list[dict[str, Any]]:

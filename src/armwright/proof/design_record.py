@@ -1,7 +1,7 @@
 """The record of a design of the front: what is known of it, computed once and read by everything that shows it.
 
 designs/NNNN/arm.urdf     for simulators
-designs/NNNN/design.json  the record: facts, postures, errors and torques at every target, the way through a cycle
+designs/NNNN/design.json  the record: facts, postures, errors and torques at every target, the motion through a cycle
 designs/NNNN/arm.xml, trajectory.csv  with a cycle: its model for MuJoCo, and its motion (cycle_export.py)
 """
 
@@ -43,8 +43,8 @@ INSTANTS = 160  # of a cycle, between which the largest load of each joint count
 LOAD_DIGITS = 4
 
 
-class Way(BaseModel, allow_inf_nan=False):
-    """The way of a design through the cycle of its task."""
+class Motion(BaseModel, allow_inf_nan=False):
+    """The motion of a design through the cycle of its task."""
 
     seconds: list[float]  # of each motion
     q: list[list[list[float]]]  # of each motion: points at equal shares, of each the joint values [rad] or [m]
@@ -79,7 +79,7 @@ class DesignRecord(BaseModel, extra="allow"):
     number: int
     facts: dict[str, Fact]
     path: dict[str, Extreme | list[int]] | None = None  # where it is worst along the cycle (cycle_faults.py)
-    way: Way | None = None
+    motion: Motion | None = None
     loads: Loads | None = None  # of recommended designs
 
 
@@ -148,16 +148,16 @@ def _is_of(record: DesignRecord, history: History, number: int) -> bool:
     """Return whether a record is of this design, whose number another may have had, and states all that it should."""
     params = (record.model_extra or {}).get("params")
     is_design = record.number == number and params == dict(history.trials[number].design.params)
-    return is_design and record.facts.keys() >= {*QUANTITIES, VOLTAGE} and _leads_through(record.way, history, number)
+    return is_design and record.facts.keys() >= {*QUANTITIES, VOLTAGE} and _fits(record.motion, history, number)
 
 
-def _leads_through(way: Way | None, history: History, number: int) -> bool:
-    """Return whether a way has each motion of the task's cycle and each joint of the design."""
+def _fits(motion: Motion | None, history: History, number: int) -> bool:
+    """Return whether a motion is of the task's cycle and of the joints of the design."""
     plan, joints = history.problem.scenes[0].plan, len(history.member(number).arm.joints)
-    if plan is None or way is None:
-        return plan is None and way is None
-    is_whole = len(way.seconds) == len(way.q) == len(plan.motions)
-    return is_whole and all(len(points) > 1 and all(len(q) == joints for q in points) for points in way.q)
+    if plan is None or motion is None:
+        return plan is None and motion is None
+    is_whole = len(motion.seconds) == len(motion.q) == len(plan.motions)
+    return is_whole and all(len(points) > 1 and all(len(q) == joints for q in points) for points in motion.q)
 
 
 def _alike(history: History, numbers: Sequence[int]) -> list[list[int]]:
@@ -196,7 +196,7 @@ def _record(history: History, number: int, arm: Arm, evaluation: Evaluation, row
         "masses": history.problem.space.mass_note,
         **({"assumed": assumed} if assumed else {}),
         **path_record(evaluation, row),
-        **({} if evaluation.cycle_paths is None else {"way": _way(evaluation, row, len(arm.joints))}),
+        **({} if evaluation.cycle_paths is None else {"motion": _motion(evaluation, row, len(arm.joints))}),
         "targets": [_target_record(evaluation, row, t, arm) for t in range(len(evaluation.targets))],
     }
 
@@ -215,8 +215,8 @@ def _target_record(evaluation: Evaluation, row: int, target: int, arm: Arm) -> d
     }
 
 
-def _way(evaluation: Evaluation, row: int, joints: int) -> dict[str, Any]:
-    """Return the way of an arm through the cycle, with its number of joints."""
+def _motion(evaluation: Evaluation, row: int, joints: int) -> dict[str, Any]:
+    """Return the motion of an arm through the cycle, with its number of joints."""
     _, paths = evaluation.paths.of_arm(row)
     try:
         seconds = evaluation.loads.durations[row]
