@@ -46,9 +46,8 @@ bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes o
 package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare environments of PYTHON
 	$(BIN)/python tools/package.py $(PYTHON)
 
-fuzz: .venv/.fuzz  ## over a million made-up inputs (docs/security.md)
-	$(BIN)/python -m tests.fuzz --share 0.1
-	$(BIN)/python -m tests.fuzz --engine atheris
+fuzz: .venv/.test  ## over a million made-up inputs (docs/security.md)
+	$(BIN)/python -m pytest tests/fuzz --fuzz 1
 
 # What cannot be looked up is an error (--strict), not a package without known faults.
 audit: .venv/.audit  ## known faults of all that may be installed, extras included; asks PyPI
@@ -77,10 +76,6 @@ audit: .venv/.audit  ## known faults of all that may be installed, extras includ
 
 .venv/.docs: .venv/.run
 	$(PIP) --group docs
-	@touch $@
-
-.venv/.fuzz: .venv/.test
-	$(PIP) --group fuzz
 	@touch $@
 
 .venv/.audit: .venv/.python pyproject.toml constraints.txt

@@ -41,6 +41,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--kills", type=int, default=6, help="how often runs are killed in tests/torture")
+    parser.addoption("--fuzz", type=float, default=0.0, help="share of the inputs of `make fuzz` in tests/fuzz")
 
 
 @pytest.fixture(autouse=True)
