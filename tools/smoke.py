@@ -2,9 +2,9 @@
 
 It has no extras, or `figures` and `studies`.
 
-    python smoke.py FOLDER          # the Python that it is installed in, an empty folder
+    python smoke.py FOLDER          # the Python that it is installed in, a folder
 
-Run folders stay in FOLDER. Every command must end with its code, without a traceback, and without a warning of ours.
+Run folders stay in FOLDER, which is empty for the base install; the other goes on there. Every command must end with its code, without a traceback, and without a warning of ours.
 """
 
 import json
@@ -135,7 +135,10 @@ def base() -> None:
 
 
 def studies() -> None:
-    """Everything that needs the extras `studies` and `figures` alone."""
+    """Everything that needs the extras `studies` and `figures` alone, and what the base install does with its run."""
+    for kind in FORMATS:
+        armwright("export", "front", "--format", kind, "--out", f"out/{kind}")
+    assert "in MuJoCo" in armwright("simulate", "front").stdout
     run = armwright("optimize", "target-1", "--seed", "0", "--out", "run")
     assert "hypervolume" in run.stdout
     for made in ("report.html", "summary.json", "front.csv", "figures/front.png", "figures/front.pdf"):
@@ -172,12 +175,12 @@ def main(folder: Path) -> None:
     installed = {str(distribution.metadata["Name"]).lower() for distribution in metadata.distributions()}
     assert not installed & {"pydantic-ai-slim", "starlette", "torch", "distributed", "robot-descriptions", "pytest"}
     os.chdir(folder)
-    base()
     if "optuna" in installed:
         studies()
         refuse(NEEDS)
     else:
         assert not installed & {"cloudpickle", "jinja2", "matplotlib", "threadpoolctl"}
+        base()
         refuse(NEEDS_OF_BASE)
     print(f"all of it works on Python {sys.version.split()[0]}, in {folder}")
 
