@@ -4,7 +4,8 @@ It has no extras, or `figures` and `studies`.
 
     python smoke.py FOLDER          # the Python that it is installed in, a folder
 
-Run folders stay in FOLDER, which is empty for the base install; the other goes on there. Every command must end with its code, without a traceback, and without a warning of ours.
+Run folders stay in FOLDER, which is empty for the base install; the other goes on there. Every command must end with
+its code, without a traceback, and without a warning of ours.
 """
 
 import json
