@@ -37,7 +37,7 @@ if __name__ == "__main__":
     run = aw.optimize(problem, proposer="rules", n_total=20, seed=0, out="python")
     assert run.hypervolume[-1] > 0
     assert aw.to_urdf(run.front[0].arm).startswith("<?xml")
-    assert len(aw.find_front(problem, evaluations=20000).front) > 20
+    assert len(aw.find_front(problem, evaluations=2000).front) > 20
     assert [path for path in aw.write_figures("python") if path.suffix == ".png"]
     for ask in (
         lambda: aw.LlmProposer("openai-chat:gpt-4o"),
@@ -112,13 +112,13 @@ def base() -> None:
     """Everything that needs no extra, and one line for each thing that does."""
     assert armwright("--version").stdout.strip() == metadata.version("armwright")
     assert "optimize" in armwright("--help").stdout
-    armwright("design", "desk-sorting", "--evaluations", "5000", "--out", "front")
+    armwright("design", "desk-sorting", "--evaluations", "1000", "--out", "front")
     for made in ("report.html", "summary.json", "front.csv"):
         assert (Path("front") / made).stat().st_size > 100, made
     urdfs = list(Path("front").glob("designs/*/arm.urdf"))
     assert urdfs
     assert all(ET.parse(urdf).getroot().tag == "robot" for urdf in urdfs)
-    assert "is finished" in armwright("design", "desk-sorting", "--evaluations", "5000", "--out", "front").stdout
+    assert "is finished" in armwright("design", "desk-sorting", "--evaluations", "1000", "--out", "front").stdout
     armwright("pick", "front", "--by", "price")
     for kind in FORMATS:
         armwright("export", "front", "--format", kind, "--out", f"out/{kind}")

@@ -87,7 +87,7 @@ def test_full_disk_keeps_finished_trials(disk: Path, whole: Path, kills: int, re
 
 
 def test_no_space_for_a_search(tmp_path: Path) -> None:
-    asked = ("design", "target-1", "--evaluations", "5000", "--no-figures", "--out")
+    asked = ("design", "target-1", "--evaluations", "1000", "--no-figures", "--out")
     assert "File too large" in one_line(armwright(*asked, tmp_path / "run", preexec_fn=limit(20_000)))
     for name in ("whole", "run"):
         assert command_line.armwright(*asked, tmp_path / name).returncode == 0
