@@ -12,7 +12,7 @@ import pytest
 from hypothesis import strategies as st
 
 import armwright
-from tests.fuzz.__main__ import TooSlowError, limited
+from tests.fuzz.target import TooSlowError, limited
 
 ROOT = Path(armwright.__file__).parent
 WHOLE = {"match", "fullmatch"}

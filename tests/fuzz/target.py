@@ -7,8 +7,10 @@ use them.
 import atexit
 import os
 import shutil
+import signal
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -20,6 +22,7 @@ from tests import ROOT
 from tests.fuzz.mutation import changed
 
 MAX_REFUSAL_LENGTH = 3000  # characters
+LONGEST = 30.0  # [s] of an input
 
 
 class DefectError(AssertionError):
@@ -42,6 +45,26 @@ class Target:
     def make(self, rng: Random) -> bytes:
         """Return a mutated valid document."""
         return changed(rng.choice(seeds_of(self)), self.form, rng)
+
+
+class TooSlowError(BaseException):
+    """An input takes too long; not an Exception, so that no handler hides it."""
+
+
+@contextmanager
+def limited(seconds: float = LONGEST) -> Iterator[None]:
+    """Raise TooSlowError after so many CPU seconds of all threads, however busy the machine is."""
+
+    def end(*_: object) -> None:
+        raise TooSlowError(f"more than {seconds} s")
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def check(target: Target, data: bytes) -> bool:

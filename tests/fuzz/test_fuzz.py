@@ -1,40 +1,16 @@
 """Give mutated documents to every entry point; `make fuzz` gives more than the short form does."""
 
 import resource
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from random import Random
 
 import pytest
 
-from tests.fuzz.target import check, seeds_of
+from tests.fuzz.target import check, limited, seeds_of
 from tests.fuzz.targets import TARGETS
 
 FOUND = Path("fuzz-found")
-LONGEST = 30.0  # [s] of an input
 LARGEST = 1.5  # [GiB] of a process
-
-
-class TooSlowError(BaseException):
-    """An input takes too long; not an Exception, so that no handler hides it."""
-
-
-@contextmanager
-def limited(seconds: float = LONGEST) -> Iterator[None]:
-    """Raise TooSlowError after so many CPU seconds of all threads, however busy the machine is."""
-
-    def end(*_: object) -> None:
-        raise TooSlowError(f"more than {seconds} s")
-
-    before = signal.signal(signal.SIGPROF, end)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        signal.signal(signal.SIGPROF, before)
 
 
 @pytest.mark.parametrize("name", TARGETS)
