@@ -14,7 +14,7 @@ import pytest
 
 import armwright as aw
 from armwright.exceptions import EvaluatorError, RunConflictError, SettingsError
-from armwright.problem.objectives import LENGTH, POSITION_ERROR
+from armwright.problem.objectives import length, position_error
 from armwright.runs.folder import read_run
 from tests.support.arms import paper_arms
 
@@ -43,7 +43,7 @@ def test_evaluator_defines_the_objectives() -> None:
         ("joints_used", "", "Joints used", "Return the reach of the arm."),
     ]
     designs = SPACE.sample(4, 0)
-    ours = aw.Problem(TASK.model_copy(update={"reference_point": None}), SPACE, objectives=(LENGTH,))
+    ours = aw.Problem(TASK.model_copy(update={"reference_point": None}), SPACE, objectives=(length,))
     assert problem.evaluate(designs).values[:, 0] == pytest.approx(ours.evaluate(designs).values[:, 0], abs=1e-9)
     assert problem.evaluate([designs[1]])[0] == problem.evaluate(designs)[1]
 
@@ -51,7 +51,7 @@ def test_evaluator_defines_the_objectives() -> None:
 def test_evaluator_combines_with_builtin_objectives_and_constraints() -> None:
     task = aw.Task(name="near", targets=((0.3, 0.0, 0.2),), constraints=("length <= 0.5",))
     reach, _ = measured.objectives
-    problem = aw.Problem(task, SPACE, objectives=(POSITION_ERROR, reach), evaluator=measured)
+    problem = aw.Problem(task, SPACE, objectives=(position_error, reach), evaluator=measured)
     plain = aw.Problem(task, SPACE)
     designs = SPACE.sample(5, 1)
     outcomes = problem.evaluate(designs)

@@ -12,7 +12,7 @@ from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError, TaskError
 from armwright.pictures.figures import chosen_members, write_figures
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, named_objectives
+from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, named_objectives, position_error
 from armwright.problem.problem import Problem
 from armwright.runs.folder import read_run
 from armwright.study.progress import StudyResult
@@ -30,7 +30,7 @@ SPREAD = Objective(
 )
 
 
-ONE, THREE = (POSITION_ERROR,), (*PAPER_OBJECTIVES, SPREAD)
+ONE, THREE = (position_error,), (*PAPER_OBJECTIVES, SPREAD)
 
 
 def one(task: Task) -> Problem:
@@ -46,7 +46,7 @@ OPEN = load_task("target-1").model_copy(update={"reference_point": None})
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
 def test_nonfinite_objective_is_refused(tmp_path: Path, number: float) -> None:
-    broken = (POSITION_ERROR, replace(SPREAD, each=lambda e: np.full(e.position_error.shape, number)))
+    broken = (position_error, replace(SPREAD, each=lambda e: np.full(e.position_error.shape, number)))
     with pytest.raises(SettingsError, match="objective spread: expected a finite number"):
         optimize(Problem(OPEN, objectives=broken), proposer="none", n_total=2, out=tmp_path / "run")
 

@@ -6,7 +6,7 @@ import pytest
 
 from armwright.exceptions import SettingsError, TaskError
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
+from armwright.problem.objectives import OBJECTIVES, named_objectives, unreached_targets
 from armwright.problem.problem import Problem
 from armwright.problem.unreached_reason import unreached_reason
 from armwright.proof.verification import verify
@@ -107,7 +107,7 @@ def test_objectives_use_weights_and_tolerances() -> None:
     missed = (found.position_error >= [1e-3, 1e-3, 2e-3, 1e-3]) | (
         found.angle_error >= found.target_arrays.angle_tolerance
     )
-    assert np.array_equal(UNREACHED_TARGETS(found), missed.sum(axis=1))
+    assert np.array_equal(unreached_targets(found), missed.sum(axis=1))
     anywhere = Task(name="a", targets=(Target(position=(0.3, 0.0, 0.3), axis=(0, 0, -1), tolerance=100.0),))
     found = evaluate(
         [problem.arm(design) for design in problem.space.sample(50, 0)],
@@ -115,7 +115,7 @@ def test_objectives_use_weights_and_tolerances() -> None:
         target_arrays=anywhere.target_arrays,
     )
     assert found.position_error.max() > 0.1
-    assert 0.5 < 1.0 - UNREACHED_TARGETS(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
+    assert 0.5 < 1.0 - unreached_targets(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
 
 
 def test_verification_uses_the_same_targets() -> None:

@@ -8,7 +8,7 @@ import pytest
 from armwright.exceptions import TaskError
 from armwright.kinematics.ik.solve import solve
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import DEXTEROUS_VOLUME, UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION
+from armwright.problem.objectives import dexterous_volume, uncovered_fraction, undexterous_fraction
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.rotations import cone_directions
@@ -59,7 +59,7 @@ def test_two_link_arm_reaches_a_spherical_shell() -> None:
     assert not np.any(reached[(far > a + b + 2e-3) | (far < a - b - 2e-3)])
     assert reached[inside].mean() > 0.97, "but for some that the straight start does not lead to"
     volume = 4 / 3 * np.pi * ((a + b) ** 3 - (a - b) ** 3) / 1.6**3
-    assert 1.0 - UNCOVERED_FRACTION(evaluation)[0] == pytest.approx(volume, abs=0.03)
+    assert 1.0 - uncovered_fraction(evaluation)[0] == pytest.approx(volume, abs=0.03)
 
 
 def test_workspace_points_are_solved_like_targets() -> None:
@@ -107,10 +107,10 @@ def test_dexterous_volume_is_that_of_many_restarts() -> None:
     arms = [paper_space(6).arm(design) for design in paper_space(6).sample(4, 1)]
     together = evaluate(arms, [[0.1, 0.2, 0.3]], workspace=[box])
     points = sample_regions((box,))
-    for arm, value in zip(arms, DEXTEROUS_VOLUME(together), strict=True):
+    for arm, value in zip(arms, dexterous_volume(together), strict=True):
         alone = evaluate(arm, [[0.1, 0.2, 0.3]], workspace=[box])
-        assert DEXTEROUS_VOLUME(alone)[0] == value, "independent of the batch"
-        assert UNDEXTEROUS_FRACTION(alone)[0] == 1.0 - value
+        assert dexterous_volume(alone)[0] == value, "independent of the batch"
+        assert undexterous_fraction(alone)[0] == 1.0 - value
         axes = np.tile(cone_directions(CONE["axis"], 0.6, 9), (40, 1))
         peer = (
             solve(arm, np.repeat(points, 9, axis=0), axes=axes, restarts=40, angle_tolerance=np.radians(1.0))
@@ -131,11 +131,11 @@ def test_points_behind_an_obstacle_are_not_dexterous() -> None:
     points = sample_regions((box,))
     gap = np.hypot(np.maximum(-points[:, 0], 0.0), np.maximum(0.4 - points[:, 2], 0.0)) - rod.radius
     assert 0.2 < (gap > 0.0).mean() < 0.8
-    assert DEXTEROUS_VOLUME(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box]))[0] == 1.0
+    assert dexterous_volume(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box]))[0] == 1.0
     behind = evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[plate])
-    assert (gap > 1e-3).mean() <= DEXTEROUS_VOLUME(behind)[0] <= (gap > -1e-3).mean()  # reached within 1 mm
+    assert (gap > 1e-3).mean() <= dexterous_volume(behind)[0] <= (gap > -1e-3).mean()  # reached within 1 mm
     around = Box(kind="box", center=(0.0, 0.0, 0.45), size=(1.0, 1.0, 0.4))
-    assert DEXTEROUS_VOLUME(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[around]))[0] == 0.0
+    assert dexterous_volume(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[around]))[0] == 0.0
 
 
 def test_tasks_bound_and_minimise_directions_of_the_tool() -> None:

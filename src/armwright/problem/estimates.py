@@ -8,20 +8,20 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.objectives import (
-    JOINTS,
-    LENGTH,
-    MASS,
     OBJECTIVES,
-    POSITION_ERROR,
-    PRICE,
-    UNREACHED_TARGETS,
-    VOLTAGES,
-    WORST_ERROR,
+    joints,
+    length,
+    mass,
+    position_error,
+    price,
+    unreached_targets,
+    voltages,
+    worst_error,
 )
 from armwright.problem.problem import Outcomes, Problem
 
-EXACT = (PRICE, MASS, LENGTH, JOINTS, VOLTAGES)  # quantities that an arm has without moving
-OF_REACH = (POSITION_ERROR, WORST_ERROR, UNREACHED_TARGETS)  # at least what the distance beyond reach implies
+EXACT = (price, mass, length, joints, voltages)  # quantities that an arm has without moving
+OF_REACH = (position_error, worst_error, unreached_targets)  # at least what the distance beyond reach implies
 ROUNDING = 1e-5  # of a distance relative to the reach, from single precision
 AT_ONCE = 500  # designs that are estimated at once: below MANY_ARMS, so that no other kernels are loaded
 

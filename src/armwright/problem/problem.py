@@ -17,12 +17,7 @@ from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.evaluators import Evaluator, Measurement
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Need, Objective
-from armwright.problem.objectives import (
-    ORIENTATION_ERROR,
-    PAPER_OBJECTIVES,
-    QUANTITIES,
-    named_objectives,
-)
+from armwright.problem.objectives import PAPER_OBJECTIVES, QUANTITIES, named_objectives, orientation_error
 from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import stack_designs
@@ -155,7 +150,7 @@ class Problem:
             return named_objectives(self.task.objectives)
         if self.evaluator is not None:
             return self.evaluator.objectives
-        return (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.target_arrays.oriented else PAPER_OBJECTIVES
+        return (*PAPER_OBJECTIVES, orientation_error) if self.task.target_arrays.oriented else PAPER_OBJECTIVES
 
     def _check_reference_point(self) -> None:
         point, names = self.reference_point, [objective.name for objective in self.objectives]

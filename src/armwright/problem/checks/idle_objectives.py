@@ -8,7 +8,7 @@ from armwright.problem.checks.finding import SUSPECTED, Finding
 from armwright.problem.constraints import Constraint
 from armwright.problem.ignored_errors import ANGLES, LINES, POSITIONS, stated_tolerance
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import CYCLE_TIME, DYNAMIC_TORQUE, MASS, PEAK_TORQUE, PRICE, UNREACHED_TARGETS
+from armwright.problem.objectives import cycle_time, dynamic_torque, mass, peak_torque, price, unreached_targets
 from armwright.problem.problem import Problem
 
 
@@ -33,7 +33,7 @@ def _is_bounded(problem: Problem, objective: Objective, constraint: Constraint) 
         tolerance = stated_tolerance(problem.task, objective)
         return constraint.quantity == objective and constraint.bound <= float(tolerance.min(initial=0.0))
     is_error = objective.name in (*POSITIONS, *ANGLES)
-    return is_error and constraint.quantity == UNREACHED_TARGETS and constraint.bound < 1.0
+    return is_error and constraint.quantity == unreached_targets and constraint.bound < 1.0
 
 
 def _is_ignored(problem: Problem, objective: Objective) -> bool:
@@ -49,10 +49,10 @@ def _others(problem: Problem) -> str:
     """Return objectives that suit the task, as its file would state them."""
     motors, cycle = problem.space.actuators, problem.task.cycle
     if cycle is None:
-        first = PEAK_TORQUE
+        first = peak_torque
     elif None not in cycle.durations():
-        first = DYNAMIC_TORQUE
+        first = dynamic_torque
     else:
-        first = CYCLE_TIME if motors else PEAK_TORQUE
-    second = PRICE if motors and all(motor.price is not None for motor in motors) else MASS
+        first = cycle_time if motors else peak_torque
+    second = price if motors and all(motor.price is not None for motor in motors) else mass
     return f"objectives: [{first.name}, {second.name}]"
