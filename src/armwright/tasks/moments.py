@@ -8,6 +8,7 @@ MAX_MASS = 1e4  # [kg]
 MAX_MOMENT = 1e6  # [kg m²]
 ROUNDING = 1e-9  # relative
 
+Mass = Annotated[float, Field(ge=0.0, le=MAX_MASS)]  # [kg]
 Moment = Annotated[float, Field(ge=0.0, le=MAX_MOMENT)]  # [kg m²]
 Moments = tuple[Moment, Moment, Moment]
 

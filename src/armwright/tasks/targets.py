@@ -27,6 +27,8 @@ MIN_TOLERANCE = 1e-9  # [m], [rad]
 Point = tuple[float, float, float]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]  # [m]
 Position = tuple[Coordinate, Coordinate, Coordinate]
+Size = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
+Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]  # [rad]
 
 TARGET_NAME = r"^([A-Za-z][A-Za-z0-9 ._-]{0,39})?$"  # empty for none
 REACHED = 1e-3  # [m]; a target nearer than this counts as reached
