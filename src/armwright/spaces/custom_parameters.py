@@ -7,7 +7,8 @@ from typing import Any, Literal, Self, cast
 
 from pydantic import BaseModel, ValidationError, model_validator
 
-from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter, ParameterValue, Range
+from armwright.spaces.field_types import Ordered
+from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter, ParameterValue
 from armwright.validation_messages import describe_fault
 
 MAX_CUSTOM = 30  # entries of a space file
@@ -30,7 +31,7 @@ class CustomParameter(
 ):
     """A custom parameter: a range of numbers, or choices."""
 
-    range: Range | None = None
+    range: Ordered[float] | None = None
     """Smallest and largest value."""
     choices: tuple[str, ...] = ()
     """Names to choose from, instead of a range."""
@@ -55,8 +56,6 @@ class CustomParameter(
 
     def _check_range(self, low: float, high: float) -> None:
         shown = f"range = [{low:g}, {high:g}] {self.unit}".rstrip()
-        if low > high:
-            raise ValueError(f"{shown} is reversed: give the smaller number first")
         if max(abs(low), abs(high)) > MAX_VALUE:
             raise ValueError(f"{shown}: expected values within ±{MAX_VALUE:g}; try another unit")
         if self.scale == "log" and low <= 0.0:

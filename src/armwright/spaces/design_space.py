@@ -19,7 +19,8 @@ from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import build_arm
 from armwright.spaces.custom_parameters import NUMBERED
 from armwright.spaces.design_parameters import ConditionalParameter, check_parameters, conditional_parameters
-from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, ParameterValue
+from armwright.spaces.joint_modules import MODULES
+from armwright.spaces.parameters import CategoricalParameter, Design, FloatParameter, Parameter, ParameterValue
 from armwright.spaces.space_schema import SpaceSchema
 from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.yaml_documents import check_document, parse_document, read_document
@@ -44,6 +45,20 @@ class DesignSpace(SpaceSchema, frozen=True):
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters in their fixed order: origin, joint types, link lengths, …; tied ones, too."""
         return tuple(entry.parameter for entry in conditional_parameters(self).values())
+
+    @property
+    def max_reach(self) -> float:
+        """The length of the longest possible arm without a tool, with all slides extended [m]."""
+        known = {parameter.name: parameter for parameter in self.parameters}
+        reach = 0.0
+        for module in range(1, self.max_joints + 1):
+            link, joint, stroke = (known.get(f"{kind}_{module}") for kind in ("link", "joint", "stroke"))
+            assert isinstance(link, FloatParameter)
+            assert isinstance(joint, CategoricalParameter)
+            may_slide = any(MODULES[letter].is_prismatic for letter in joint.choices)  # pyright: ignore[reportArgumentType]
+            longest = stroke.high if isinstance(stroke, FloatParameter) else self.min_stroke
+            reach += link.high + (longest if may_slide else 0.0)
+        return reach
 
     @property
     def custom_names(self) -> frozenset[str]:
