@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import TaskError
-from armwright.kinematics.ik.solve import solve
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import dexterous_volume, uncovered_fraction, undexterous_fraction
+from armwright.problem.objectives import dexterous_volume, uncovered_fraction
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
-from armwright.rotations import cone_directions
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.obstacles import Box
 from armwright.tasks.task import Task
@@ -99,25 +97,6 @@ def test_invalid_workspaces_are_refused_in_one_line(written: str) -> None:
 
 
 CONE: dict[str, Any] = {"axis": (0, 0, 1), "half_angle": 0.6, "count": 9, "share": 0.5}
-
-
-@pytest.mark.slow
-def test_dexterous_volume_is_that_of_many_restarts() -> None:
-    box = region(low=(-0.3, -0.3, 0.0), high=(0.3, 0.3, 0.3), points=40, directions=CONE)
-    arms = [paper_space(6).arm(design) for design in paper_space(6).sample(4, 1)]
-    together = evaluate(arms, [[0.1, 0.2, 0.3]], workspace=[box])
-    points = sample_regions((box,))
-    for arm, value in zip(arms, dexterous_volume(together), strict=True):
-        alone = evaluate(arm, [[0.1, 0.2, 0.3]], workspace=[box])
-        assert dexterous_volume(alone)[0] == value, "independent of the batch"
-        assert undexterous_fraction(alone)[0] == 1.0 - value
-        axes = np.tile(cone_directions(CONE["axis"], 0.6, 9), (40, 1))
-        peer = (
-            solve(arm, np.repeat(points, 9, axis=0), axes=axes, restarts=40, angle_tolerance=np.radians(1.0))
-            .reached[0]
-            .reshape(40, 9)
-        )
-        assert value == pytest.approx((peer.mean(axis=1) >= 0.5).mean(), abs=0.05)
 
 
 def test_points_behind_an_obstacle_are_not_dexterous() -> None:

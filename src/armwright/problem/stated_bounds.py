@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from armwright.problem.objectives import orientation_error, position_error, unreached_targets, worst_angle, worst_error
 from armwright.problem.problem import Problem
 
+TOLERANCES = "tolerances"  # the reason of bounds that all targets must be reached within
 MARGIN = 1.1  # of a reference point over a bound, so that designs at the bound count
 
 
@@ -35,12 +36,12 @@ def stated_bounds(problem: Problem) -> tuple[StatedBound | None, ...]:
         if constraint.relation == "<=":
             bound(constraint.quantity.name, constraint.bound, constraint.description)
             if constraint.quantity == unreached_targets and constraint.bound < 1.0:
-                bound(worst_error.name, targets.tolerance.max(), "tolerances")
-                bound(position_error.name, float(targets.weight @ targets.tolerance), "tolerances")
+                bound(worst_error.name, targets.tolerance.max(), TOLERANCES)
+                bound(position_error.name, float(targets.weight @ targets.tolerance), TOLERANCES)
                 if oriented.any():
                     angles = targets.angle_tolerance[oriented]
-                    bound(worst_angle.name, angles.max(), "tolerances")
-                    bound(orientation_error.name, float(targets.weight[oriented] @ angles), "tolerances")
+                    bound(worst_angle.name, angles.max(), TOLERANCES)
+                    bound(orientation_error.name, float(targets.weight[oriented] @ angles), TOLERANCES)
     for worst, total, weight in (
         (worst_error, position_error, targets.weight.sum()),
         (worst_angle, orientation_error, targets.weight[oriented].sum()),
