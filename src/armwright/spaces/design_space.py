@@ -69,12 +69,10 @@ class DesignSpace(SpaceSchema, frozen=True):
 
     def with_custom(self, design: Design, like: Design | None = None) -> Design:
         """Return a design with the custom parameters of another one, or with their defaults."""
-        own = self.custom_names
-        if not own:
-            return design
         source: Mapping[str, ParameterValue] = {} if like is None else like.params
-        defaults: dict[str, ParameterValue] = {p.name: p.default for p in self.parameters if p.name in own}
-        return Design({name: source.get(name, defaults.get(name, value)) for name, value in design.params.items()})
+        names = self.custom_names & design.params.keys()
+        custom = {p.name: source.get(p.name, p.default) for p in self.parameters if p.name in names}
+        return Design({**design.params, **custom})
 
     def is_free(self, name: str, params: Mapping[str, ParameterValue]) -> bool:
         """Return whether a parameter is active and not tied, given the values of the parameters before it."""
