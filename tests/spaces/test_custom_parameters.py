@@ -70,7 +70,7 @@ def test_space_file_declares_parameters_after_the_built_in_ones(tmp_path: Path) 
         ({"kp": {"range": [0, 1], "scale": "log"}}, "expected values above 0 with scale: log"),
         ({"kp": {"range": [0.5, 1], "integer": True}}, "expected whole numbers"),
         ({"belt": {"choices": ["a", "A"]}}, "expected different names"),
-        ({"belt": {"choices": ["a b"]}}, "choices: expected at most 40"),
+        ({"belt": {"choices": ["a b"]}}, r"choices\[0\]: expected text of the form"),
         ({"belt": {"choices": ["a"], "unit": "m"}}, "expected no scale, integer or unit"),
     ],
 )  # fmt: skip
@@ -131,6 +131,14 @@ def test_custom_parameters_do_not_change_arms() -> None:
     assert [space.parameters[i].name for i in length_columns(space)] == [
         plain.parameters[i].name for i in length_columns(plain)
     ]
+
+
+def test_design_takes_the_custom_parameters_of_another_and_keeps_its_arm() -> None:
+    space = space_of()
+    one, other = space.sample(2, 0)
+    mixed = space.with_custom(one, other)
+    assert space.arm(mixed) == space.arm(one)
+    assert {name: mixed.params[name] for name in space.custom_names} == {n: other.params[n] for n in space.custom_names}
 
 
 def test_distributions_have_the_scale_and_the_type() -> None:

@@ -69,7 +69,7 @@ def test_target_with_only_a_position_is_a_point() -> None:
 @pytest.mark.parametrize(
     ("target", "words"),
     [
-        ("{position: [0, 0, 1], axis: [0, 0, 0]}", r"targets\[1\]: axis = .* is no direction"),
+        ("{position: [0, 0, 1], axis: [0, 0, 0]}", r"targets\[1\].axis: expected a direction"),
         (
             "{position: [0, 0, 1], axis: [0, 0, 1], orientation: [0, 0, 1]}",
             r"targets\[1\]: expected axis or orientation, got both",

@@ -64,7 +64,7 @@ POINT = "name: a\ntargets: [[0, 0, 0]]\n"
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("name: a\ntargets: []", "targets is empty"),
+        ("name: a\ntargets: []", "targets: expected at least 1 entry, got 0"),
         ("name: a\ntargets: [[0, 0, .nan]]", "targets[0][2]"),
         ("name: a\ntargets: [[0, 0]]", "targets[0]: expected three numbers x, y, z [m], got 2: [0, 0]"),
         ("name: a\ntargets: [[0, 0, 1, 2]]", "got 4: [0, 0, 1, 2]; write decimals with a point"),
@@ -84,7 +84,10 @@ POINT = "name: a\ntargets: [[0, 0, 0]]\n"
         (POINT + "target_noise: -0.1", "target_noise"),
         (POINT + "target_noise: 5", "target_noise"),
         (POINT + "payload: {mass: 1, size: [1, 1, 1], inertia: [1, 1, 1]}", "expected size or inertia, got both"),
-        (POINT + "payload: {mass: 0.5, inertia: [1, 1, 3]}", "payload: inertia = [1.0, 1.0, 3.0] kg m²: no body has"),
+        (
+            POINT + "payload: {mass: 0.5, inertia: [1, 1, 3]}",
+            "payload.inertia: no body has moments of [1.0, 1.0, 3.0] kg m²",
+        ),
     ],
 )
 def test_invalid_task_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:

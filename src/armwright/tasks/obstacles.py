@@ -1,6 +1,5 @@
 """Solid convex obstacles that the arm should keep away from, as in task files."""
 
-import math
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self, get_args
 
@@ -10,7 +9,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
 from armwright.tasks.moments import describe_vector
-from armwright.tasks.targets import Angle, Coordinate, Point, Position, Size
+from armwright.tasks.targets import Angle, Coordinate, Direction, Point, Position, Size
 
 Shape = Literal["box", "sphere", "cylinder", "ground"]
 
@@ -114,13 +113,7 @@ class Cylinder(Record, frozen=True):
     center: Position  # [m]
     radius: Size
     height: Size
-    axis: Literal["x", "y", "z"] | Position = "z"
-
-    @model_validator(mode="after")
-    def _check_axis(self) -> Self:
-        if not isinstance(self.axis, str) and math.hypot(*self.axis) < 1e-6:
-            raise ValueError(f"axis = {describe_vector(self.axis)} has no direction; try x, y, z or a vector")
-        return self
+    axis: Literal["x", "y", "z"] | Direction = "z"
 
     @property
     def solid(self) -> Solid:

@@ -5,7 +5,7 @@ from typing import Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from armwright.tasks.moments import MAX_MASS, Moments, check_moments, describe_vector
+from armwright.tasks.moments import MAX_MASS, Moments, describe_vector
 from armwright.tasks.targets import Position, Size
 
 Vector = tuple[float, float, float]
@@ -34,7 +34,6 @@ class Payload(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def _check(self) -> Self:
         if self.size is not None and self.inertia is not None:
             raise ValueError("expected size or inertia, got both; a size stands for the inertia of a uniform box")
-        check_moments(self.inertia or (0.0, 0.0, 0.0))
         return self
 
     @property

@@ -54,7 +54,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     name: Annotated[str, AfterValidator(check_name)] = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     # Points [m], or records with a tool direction, a tolerance, a weight or a name; by default the workspace's corners.
     targets: tuple[Annotated[Annotated[Point, BeforeValidator(check_length)] | Target, AfterValidator(_plain)], ...] = (
-        Field(max_length=MAX_TARGETS)
+        Field(min_length=1, max_length=MAX_TARGETS)
     )
     tool: Tool = NO_TOOL  # at the end of the last link
     # Mass that the tip carries, a point at all targets or at each [kg]; or a rigid body
@@ -119,8 +119,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @model_validator(mode="after")
     def _check_numbers(self) -> Self:
-        if not self.targets:
-            raise ValueError("targets is empty: give at least one point [x, y, z] in metres")
         far = np.abs(self.target_positions).max(axis=1) > MAX_COORDINATE
         if far.any():
             number = int(np.argmax(far))

@@ -5,7 +5,7 @@ from typing import Self
 
 from pydantic import BaseModel, model_validator
 
-from armwright.tasks.moments import Mass, Moments, check_moments, describe_vector
+from armwright.tasks.moments import Mass, Moments, describe_vector
 from armwright.tasks.targets import Angle, Position
 
 
@@ -25,7 +25,6 @@ class Tool(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         for name in ("center", "inertia"):
             if self.mass == 0.0 and any(getattr(self, name)):
                 raise ValueError(f"{name} needs a mass above 0 kg, such as mass: 0.35")
-        check_moments(self.inertia)
         return self
 
     @property
