@@ -8,7 +8,7 @@ import pytest
 
 from armwright.kinematics.reach.payload_limits import payloads_over_reach
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import PAYLOAD_CAPACITY
+from armwright.problem.objectives import payload_capacity
 from armwright.robot.arm import GRAVITY, Actuator, Arm, Joint, uniform_link
 from armwright.tasks.moments import MAX_MASS
 from tests.support.arms import moving_arms
@@ -27,7 +27,7 @@ def test_motors_are_at_their_limit_with_the_largest_payload() -> None:
     """By Pinocchio's gravity torques of the arm with a massive body at its tip."""
     arms = [driven(arm, 60.0) for arm in moving_arms(12, 5, 3)]
     evaluation = evaluate(arms, TARGETS, payload=0.3)
-    capacity = PAYLOAD_CAPACITY.each(evaluation)
+    capacity = payload_capacity.each(evaluation)
     assert (capacity > 0.0).mean() > 0.3
     for i, arm in enumerate(arms):
         for t in range(len(TARGETS)):
@@ -40,7 +40,7 @@ def test_motors_are_at_their_limit_with_the_largest_payload() -> None:
 def test_upright_axes_hold_any_payload() -> None:
     links = (uniform_link((0.2, 0.0, 0.0), 0.1, 0.01),) * 2
     arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "z", -2.0, 2.0),) * 2, links)
-    assert PAYLOAD_CAPACITY(evaluate([driven(arm, 0.1)], [[0.3, 0.1, 0.0]])) == [MAX_MASS]
+    assert payload_capacity(evaluate([driven(arm, 0.1)], [[0.3, 0.1, 0.0]])) == [MAX_MASS]
 
 
 def planar_arm(peak: float) -> Arm:

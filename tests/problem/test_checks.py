@@ -10,8 +10,7 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.checks.finding import PROVEN, SUSPECTED
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
-from armwright.problem.checks.reach import longest_reach
-from armwright.problem.checks.sampling import SEED, check_by_sampling, violations
+from armwright.problem.checks.sampling import check_by_sampling, violations
 from armwright.problem.evaluators import load_evaluator
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
@@ -78,24 +77,14 @@ def test_random_tasks_have_no_findings() -> None:
     assert [seed for seed in range(60) if found(Problem(load_task(f"random-{seed}")))] == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in builtin_names() if load_task(name).cycle])
-def test_samples_satisfy_each_constraint_of_builtin_tasks(name: str) -> None:
-    checked = Problem(load_task(name), default_space(name))
-    found = violations(checked, checked.space.sample_matrix(120, np.random.default_rng(SEED)))
-    assert (found.min(axis=0) <= 0.0).all()
-
-
 # Reach
 
 
 @pytest.mark.parametrize("keys", SPACES.values(), ids=SPACES)
 def test_no_design_reaches_further_than_the_longest_arm(keys: dict[str, Any]) -> None:
     checked = problem(of=space(**keys), tool={"tip": [0.0, 0.03, 0.1]})
-    longest = longest_reach(checked)
     reaches = [checked.arm(design).reach for design in checked.space.sample(300, 0)]
-    assert max(reaches) <= longest + 1e-12
-    assert longest <= checked.max_reach + 1e-12
+    assert max(reaches) <= checked.max_reach + 1e-12
 
 
 def test_targets_beyond_the_longest_arm_are_proven() -> None:
@@ -259,12 +248,11 @@ def test_proven_findings_stop_and_others_do_not() -> None:
 @pytest.mark.parametrize(
     ("keys", "text"),
     [
-        ({"targets": [HERE, [0.3, 0.1, 8.0]], "tool": {"tip": [0, 0, 7]}}, "tool: its tip is 7 m from the flange"),
-        ({"targets": [{"position": HERE, "tolerance": 2.0}]}, "its tolerance of 2 m exceeds the reach"),
+        ({"targets": [HERE, [0.3, 0.1, 8.0]], "tool": {"tip": [0, 0, 7]}}, "from the flange = 7 m is 5.83 times"),
+        ({"targets": [{"position": HERE, "tolerance": 2.0}]}, "target 1: tolerance = 2 m is 1.67 times"),
         ({"targets": [{"position": HERE, "axis": DOWN, "angle_tolerance": 3}]}, "write 0.0524 for 3°"),
-        ({"targets": [[0.05, 0.02, 0.03], [0.04, 0.03, 0.9]]}, "its z = 0.9 m is 18 times the largest other"),
-        ({"obstacles": [{"kind": "sphere", "center": [500, 0, 0], "radius": 100}]}, "obstacle 1 is 200 m long"),
-        ({"payload": {"mass": 0.5, "size": [60, 40, 40]}}, "payload: a side of 60 m exceeds any arm"),
+        ({"obstacles": [{"kind": "sphere", "center": [500, 0, 0], "radius": 100}]}, "obstacle 1: size = 200 m"),
+        ({"payload": {"mass": 0.5, "size": [60, 40, 40]}}, "payload: the longest side = 60 m"),
         ({"of": space(link=[30, 300])}, "space: the longest arm reaches 1.2e+03 m"),
         ({"payload": 500}, "500 kg are 34,435 times the mass of the heaviest arm of the space, 0.0145 kg"),
         (
@@ -279,26 +267,11 @@ def test_numbers_of_a_strange_size_are_suspected(keys: dict[str, Any], text: str
     assert text in " ".join(messages)
 
 
-def test_approach_beyond_reach_is_proven() -> None:
-    targets = [
-        {"name": name, "position": point, "axis": DOWN} for name, point in (("bin", HERE), ("tray", [0.4, -0.2, 0.3]))
-    ]
-    cycle = {"steps": [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}], "time": 1.5}
-    arm = space(joints=5, origin_z=[0.0, 0.1])
-
-    def raised(approach: float) -> Problem:
-        return problem(targets, arm, cycle={**cycle, "approach": approach}, objectives=["torque"])
-
-    assert found(raised(1.2)) == []  # 1.4 m above the highest base
-    (evidence, message), second = found(raised(60))
-    assert evidence == PROVEN
-    assert message.startswith("cycle: the approach of target bin begins at (0.4, 0.2, 60.3) m, 60.2 m from")
-    assert (second[0], "approach = 60 m exceeds" in second[1]) == (SUSPECTED, True)
-    checked = raised(1.4)
-    assert only(checked)[0] == PROVEN
-    sampled = violations(checked, checked.space.sample_matrix(30, np.random.default_rng(0)))
-    names = [constraint.quantity.name for constraint in checked.constraints]
-    assert (sampled[:, names.index("path_error")] > 0.0).all()
+def test_approach_beyond_reach_is_suspected() -> None:
+    targets = [{"position": HERE, "axis": DOWN}, {"position": [0.4, -0.2, 0.3], "axis": DOWN}]
+    cycle = {"steps": [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}], "time": 1.5, "approach": 60}
+    evidence, message = only(problem(targets, cycle=cycle, objectives=["torque"]))
+    assert (evidence, "cycle: approach = 60 m is 50 times" in message) == (SUSPECTED, True)
 
 
 # Requirements

@@ -10,9 +10,8 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError, TaskError
-from armwright.pictures.figures import chosen_members, write_figures
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, named_objectives
+from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, named_objectives, position_error
 from armwright.problem.problem import Problem
 from armwright.runs.folder import read_run
 from armwright.study.progress import StudyResult
@@ -30,7 +29,7 @@ SPREAD = Objective(
 )
 
 
-ONE, THREE = (POSITION_ERROR,), (*PAPER_OBJECTIVES, SPREAD)
+ONE, THREE = (position_error,), (*PAPER_OBJECTIVES, SPREAD)
 
 
 def one(task: Task) -> Problem:
@@ -46,7 +45,7 @@ OPEN = load_task("target-1").model_copy(update={"reference_point": None})
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
 def test_nonfinite_objective_is_refused(tmp_path: Path, number: float) -> None:
-    broken = (POSITION_ERROR, replace(SPREAD, each=lambda e: np.full(e.position_error.shape, number)))
+    broken = (position_error, replace(SPREAD, each=lambda e: np.full(e.position_error.shape, number)))
     with pytest.raises(SettingsError, match="objective spread: expected a finite number"):
         optimize(Problem(OPEN, objectives=broken), proposer="none", n_total=2, out=tmp_path / "run")
 
@@ -64,8 +63,6 @@ def short(problem: Problem, n_total: int, out: Path | None = None) -> StudyResul
     [
         pytest.param(one(OPEN), marks=pytest.mark.slow),
         three(bounded(5.0, 5.0, 60.0)),
-        pytest.param(one(bounded(5.0)), marks=pytest.mark.slow),
-        pytest.param(three(OPEN), marks=pytest.mark.slow),
     ],
 )
 def test_runs_of_one_and_three_objectives_complete_and_resume(tmp_path: Path, problem: Problem) -> None:
@@ -93,23 +90,15 @@ def test_runs_of_one_and_three_objectives_complete_and_resume(tmp_path: Path, pr
     assert sum(gained) == pytest.approx(run.summary["hypervolume"]["final"])
 
 
-@pytest.mark.slow
 def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path) -> None:
     problem = three(OPEN)
-    run = short(problem, 12, tmp_path / "run")
+    run = optimize(problem, proposer="none", sampler="random", n_init=4, n_total=1, verify=False, out=tmp_path / "run")
     config, history = read_run(tmp_path / "run")
-    names = [objective.name for objective in problem.objectives]
-    assert [objective.name for objective in history.problem.objectives] == names
+    assert [o.name for o in history.problem.objectives] == ["position_error", "torque", "spread"]
     assert config == run.config
     assert [member.values for member in history.front] == [member.values for member in run.front]
-    assert history.hypervolume == pytest.approx(run.hypervolume)
-    drawn = {path.stem for path in write_figures(tmp_path / "run")}
-    assert {"hypervolume", "arms", "front"} <= drawn
-    titles = [title for title, _ in chosen_members(history)]
-    assert all("position error" in title or "spread" in title or "nee" in title for title in titles)
     with pytest.raises(RunFolderError, match="the custom objective"):
         history.problem.evaluate(problem.space.sample(3, 0))
-    assert (tmp_path / "run" / "trials.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",".join(names))
 
 
 @pytest.mark.parametrize(("objectives", "point"), [(ONE, (5.0, 5.0)), (THREE, (5.0, 5.0)), (PAPER_OBJECTIVES, (5.0,))])
@@ -168,6 +157,3 @@ def test_objectives_option_drops_a_foreign_reference_point(tmp_path: Path) -> No
         assert CliRunner().invoke(app, ["optimize", "target-1", *options]).exit_code == 0
     assert read_run(tmp_path / "mass")[0].task.reference_point is None
     assert read_run(tmp_path / "rque")[0].task.reference_point == (5.0, 5.0)
-
-
-# What the tip carries

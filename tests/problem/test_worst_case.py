@@ -37,24 +37,3 @@ def test_objectives_are_the_worst_over_all_cases() -> None:
     assert np.any(values > each[0].values)
     exact = verify(problem, designs[:5], values[:5], (5.0, 5.0, 1.0)).exact
     assert np.all(np.abs(np.median(exact / values[:5]) - 1.0) < 0.05)  # float64 takes other ways at times
-
-
-def test_worst_case_combines_with_build_tolerance() -> None:
-    problem = Problem(ROBUST, tolerance=1e-3)
-    designs = problem.space.sample(5, 2)
-    both, one, other = (
-        candidate.evaluate(designs).values for candidate in (problem, Problem(ROBUST), Problem(PLAIN, tolerance=1e-3))
-    )
-    assert np.all(both >= np.maximum(one, other))
-
-
-def test_prompt_states_the_worst_case_settings() -> None:
-    from armwright.llm.prompt import design_prompt
-    from tests.support.fixed_problem import FixedProblem, fixed_history
-
-    told = design_prompt(fixed_history(FixedProblem(ROBUST), n=12), 0)
-    assert (
-        "the worst of the task as it stands, of payloads 0, 1.5 times as heavy, and of targets that are all 4 mm"
-        in told
-    )
-    assert "may come otherwise" not in design_prompt(fixed_history(FixedProblem(PLAIN), n=12), 0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.pareto import front_mask, hypervolume
-from armwright.problem.objectives import POSITION_ERROR, TORQUE
+from armwright.problem.objectives import position_error, torque
 from armwright.problem.problem import Problem
 from armwright.proof.front_gap import best_known_hypervolume, front_gap, known_front
 from armwright.spaces.design_space import builtin_spaces, default_space, paper_space
@@ -75,7 +75,7 @@ def test_other_problems_have_no_such_front() -> None:
     assert known_front(Problem(task.model_copy(update={"name": "mine"}), space.model_copy(update={"name": "mine"})))
     assert isinstance(payload, Payload)
     heavier = task.model_copy(update={"payload": payload.model_copy(update={"mass": 0.2})})
-    effort = (POSITION_ERROR, dataclasses.replace(TORQUE, name="effort"))
+    effort = (position_error, dataclasses.replace(torque, name="effort"))
     for other in (
         Problem(heavier, space),
         Problem(task, space, tolerance=1e-3),

@@ -114,7 +114,7 @@ def test_torque_utilisation_is_the_worst_share_of_peak_torque_with_the_safety_fa
     ("space", "words"),
     [
         ({"actuators": ["XM430-W35"]}, 'unknown actuator "XM430-W35".*Did you mean'),
-        ({"actuators": [BIG, dict(BIG)]}, "actuators has duplicates"),
+        ({"actuators": [BIG, dict(BIG)]}, "actuators: expected different ones"),
         ({"actuators": [{"name": "x", "mass": 1.0}]}, "actuator x states no torque; give stall_torque"),
         ({"actuators": [BIG | {"corner_speed": 4.0}]}, "corner_speed is above the no-load speed of 3.1 rad/s"),
         ({"actuators": [MID | {"estimates": ["speed"]}]}, "estimates names speed, which has no value"),

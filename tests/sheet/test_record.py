@@ -15,14 +15,14 @@ import armwright as aw
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.failure import Failure
 from armwright.problem.objectives import (
-    BACKLASH_ERROR,
-    DEFLECTION,
-    DYNAMIC_UTILISATION,
-    MASS,
-    SPEED_UTILISATION,
-    THERMAL_UTILISATION,
-    TORQUE_UTILISATION,
-    WORST_ERROR,
+    backlash_error,
+    deflection,
+    dynamic_utilisation,
+    mass,
+    speed_utilisation,
+    thermal_utilisation,
+    torque_utilisation,
+    worst_error,
 )
 from armwright.proof.design_record import compute_facts
 from armwright.robot.mjcf import to_mjcf
@@ -108,9 +108,12 @@ def test_reach_is_that_of_the_drawing(sheet: DataSheet, history: History) -> Non
 def test_utilisation_of_joints_is_that_of_the_quantities(sheet: DataSheet, history: History) -> None:
     evaluation = history.evaluation([NUMBER])
     peaks = [joint.peak_utilisation or 0.0 for joint in sheet.joints]
-    both = max(float(TORQUE_UTILISATION(evaluation)[0]), float(DYNAMIC_UTILISATION(evaluation)[0]))
+    both = max(float(torque_utilisation(evaluation)[0]), float(dynamic_utilisation(evaluation)[0]))
     assert max(peaks) == pytest.approx(both)
-    for key, quantity in (("thermal_utilisation", THERMAL_UTILISATION), ("speed_utilisation", SPEED_UTILISATION)):
+    for key, quantity in (
+        ("thermal_utilisation", thermal_utilisation),
+        ("speed_utilisation", speed_utilisation),
+    ):
         values = [getattr(joint, key) for joint in sheet.joints]
         assert max(values) == pytest.approx(float(quantity(evaluation)[0])), key
 
@@ -135,10 +138,10 @@ def test_sensitivities_are_those_of_designs_edited_by_hand(sheet: DataSheet, his
     for key, edit in edits.items():
         changed = aw.evaluate(space.arm(aw.Design({**before, **edit})), problem.task)
         for name, quantity in (
-            ("position_error", WORST_ERROR),
-            ("deflection", DEFLECTION),
-            ("backlash_error", BACKLASH_ERROR),
-            ("mass", MASS),
+            ("position_error", worst_error),
+            ("deflection", deflection),
+            ("backlash_error", backlash_error),
+            ("mass", mass),
         ):
             expected = float(quantity(changed)[0] - quantity(start)[0])
             assert getattr(possible[key], name) == pytest.approx(expected, rel=1e-3, abs=1e-6), (key, name)

@@ -9,7 +9,7 @@ import pytest
 from armwright.exceptions import SpaceError
 from armwright.kinematics.contact.clearance import clearances
 from armwright.problem.checks.bounds import intervals_by_modules
-from armwright.problem.objectives import MASS, PRICE
+from armwright.problem.objectives import mass, price
 from armwright.problem.problem import Problem
 from armwright.spaces.base_support import supported_space
 from armwright.spaces.design_space import DesignSpace
@@ -18,7 +18,7 @@ from armwright.tasks.task import Task
 TABLE = {"kind": "box", "name": "table", "center": [0.2, 0.0, 0.35], "size": [0.6, 0.4, 0.7]}
 GROUND = {"kind": "ground", "name": "floor", "z": -0.2}
 PRICED = {"outer_diameter": 0.05, "wall": 0.002, "density": 7850, "price_per_metre": 20.0}
-EXACT = (MASS, PRICE)
+EXACT = (mass, price)
 
 
 def space(**keys: Any) -> DesignSpace:

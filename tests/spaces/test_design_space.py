@@ -106,13 +106,25 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("joints: 9", "joints = 9: expected a number from 1 to 8"),
-        ("link: [0.3, 0.03]", "link = [0.3, 0.03] m is reversed"),
-        ("origin_x: [1, -1]", "origin_x = [1, -1] m is reversed"),
-        ("link: [0, 0.3]", "longer than 0 m"),
+        ("joints: 9", "joints: expected a number of at most 8, got 9"),
+        ("link: [0.3, 0.03]", "link: [0.3, 0.03] is reversed"),
+        ("link: [0, 0.3]", "link[0]: expected a number above 0 m"),
+        ("joints: [3, 2]", "joints: [3, 2] is reversed"),
+        ("joint_types: [F]", "at least one type that moves"),
+        ("stroke: [0.3, 0.1]\njoint_types: [S]", "is reversed"),
+        ("tie: {link_9: link_1}", 'unknown parameter "link_9"'),
+        ("tie: {link_2: origin_x}", "different ranges"),
+        ("tie: {link_2: link_3, link_3: link_4}", "tied itself"),
+        ("tie: {link_2: link_3}\njoints: [2, 3]", "reverse the tie"),
+        ("grid: {joint_1: 1.0}", "unknown parameter"),
+        ("restrict: {joint_1: S}", "joint_1 = 'S' is not one of R, P, Y"),
+        ("restrict: {joint_1: []}", "joint_1 has no choice left"),
+        ("restrict: {link_9: 0.1}", 'unknown parameter "link_9". Did you mean'),
+        ("restrict: {link_1: [0.2, 0.1]}", "is outside"),
+        ("restrict: {link_1: Y}", "neither a number nor a range"),
         ("joint_range: [0.5, 2.4]", "must contain 0"),
         ("joint_range: [0, 0.01]", "narrower than 3 degrees"),
-        ("joint_types: [R, R]", "joint_types has duplicates: R, R"),
+        ("joint_types: [R, R]", "joint_types: expected different ones, got R, R"),
         ("joint_range: [-7, 2.4]", "exceeds ±2π"),
         ("link_section: {tubes: [[0.03, 0.02]]}", "expected a wall of at most the radius, 0.015 m"),
         ("link_section: {tubes: [[20, 1.5]]}", "got 20 m; lengths are in metres: write 0.02 for 20 mm"),
@@ -123,7 +135,7 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
         ("column: {wall: 0.04}", "column: expected a wall of at most the radius, 0.03 m"),
         ("column: {}\nmount: wall+x", "column: expected mount: floor, got wall+x"),
         ("base_on: table\nmount: [floor, ceiling]", "base_on: expected mount: floor, got floor, ceiling"),
-        ("origin_x: [-1.0e308, 1]", "exceeds ±1000"),
+        ("origin_x: [-2000, 1]", "origin_x[0]: expected a number of at least -1000 m"),
         ("- a\n- list", "keys and values"),
         ("joints: 4\njoints: 5", "duplicate key"),
     ],
@@ -156,7 +168,7 @@ def test_design_of_another_space_is_refused() -> None:
         paper_space().arm(paper_space(5).sample(1, 0)[0])
     with pytest.raises(DesignError, match="joint_1 = 'S' is not one of R, P, Y"):
         paper_space().arm(Design(GOOD | {"joint_1": "S"}))
-    with pytest.raises(SpaceError, match="from 1 to 8"):
+    with pytest.raises(SpaceError, match="at most 8"):
         paper_space(9)
 
 
@@ -176,19 +188,3 @@ def test_restrict_fixes_or_narrows_parameters(tmp_path: Path) -> None:
     assert DesignSpace.model_validate_json(space.model_dump_json()) == space
     moved = space.clipped((0.0, 0.0, 0.7), "RYPY", (0.3, 0.3, 0.3, 0.3))
     assert (moved.joints, moved.origin[2], moved.links[0]) == ("YRPY", 0.0, 0.2)
-
-
-@pytest.mark.parametrize(
-    ("restrict", "words"),
-    [
-        ({"joint_1": "S"}, "joint_1 = 'S' is not one of R, P, Y"),
-        ({"joint_1": []}, "joint_1 has no choice left"),
-        ({"link_9": 0.1}, 'unknown parameter "link_9".*Did you mean'),
-        ({"link_1": [0.2, 0.1]}, "is outside"),
-        ({"link_1": "Y"}, "neither a number nor a range"),
-    ],
-)
-def test_restriction_outside_a_parameter_is_refused(tmp_path: Path, restrict: object, words: str) -> None:
-    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": restrict}), encoding="utf-8")
-    with pytest.raises(SpaceError, match=words):
-        load_space(tmp_path / "space.yaml")

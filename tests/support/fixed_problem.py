@@ -11,7 +11,7 @@ from armwright.kinematics.cycle.cycle_path import CyclePaths
 from armwright.pareto import default_reference_point
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import PAPER_OBJECTIVES, POSITION_ERROR
+from armwright.problem.objectives import PAPER_OBJECTIVES, position_error
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
@@ -85,7 +85,7 @@ LENGTH = Objective(
 )
 
 
-ONE_OBJECTIVE = (POSITION_ERROR,)
+ONE_OBJECTIVE = (position_error,)
 THREE_OBJECTIVES = (*PAPER_OBJECTIVES, LENGTH)
 
 

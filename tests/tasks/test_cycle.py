@@ -82,7 +82,7 @@ PICK, PLACE = {"to": 1, "do": "pick"}, {"to": 2, "do": "place"}
         (steps(1, 4), "step 2: there is no target 4; targets are counted from 1 to 3"),
         (steps(1, 2, 2), "step 3: the tool is already there; leave the step out"),
         (steps(1, 2, 1), "step 1: the tool is already there; leave the step out"),
-        (steps(1), "cycle.steps: a cycle needs at least two steps, got 1"),
+        (steps(1), "cycle.steps: expected at least 2 entries, got 1"),
         ("in-order", "cycle: expected in_order or a record with steps"),
         (steps({"to": 1, "dwell": 1}, 2), 'cycle.steps[0]: unknown key "dwell". It is a key of cycle. Allowed: to,'),
         (steps(1, {"to": 2.0}), "cycle.steps[1].to: expected text or a whole number, got 2.0; try 2"),

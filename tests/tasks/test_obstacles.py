@@ -59,7 +59,7 @@ GROUND, SHELF, _, POLE = RECORDS
     ("record", "words"),
     [
         (SHELF | {"yaw": 1.0}, "expected yaw or rpy, got both"),
-        (POLE | {"axis": [0, 0, 0]}, "axis = (0, 0, 0) has no direction; try x, y, z or a vector"),
+        (POLE | {"axis": [0, 0, 0]}, "axis: expected a direction, got [0.0, 0.0, 0.0]"),
         (GROUND | {"name": "a\nb"}, "name"),
         (GROUND | {"name": "{{ evil }}"}, "name"),
     ],

@@ -6,10 +6,9 @@ import pytest
 
 from armwright.exceptions import SettingsError, TaskError
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
+from armwright.problem.objectives import OBJECTIVES, named_objectives, unreached_targets
 from armwright.problem.problem import Problem
 from armwright.problem.unreached_reason import unreached_reason
-from armwright.proof.verification import verify
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.rotations import rotation_from_rpy
 from armwright.spaces.design_space import paper_space
@@ -70,7 +69,7 @@ def test_target_with_only_a_position_is_a_point() -> None:
 @pytest.mark.parametrize(
     ("target", "words"),
     [
-        ("{position: [0, 0, 1], axis: [0, 0, 0]}", r"targets\[1\]: axis = .* is no direction"),
+        ("{position: [0, 0, 1], axis: [0, 0, 0]}", r"targets\[1\].axis: expected a direction"),
         (
             "{position: [0, 0, 1], axis: [0, 0, 1], orientation: [0, 0, 1]}",
             r"targets\[1\]: expected axis or orientation, got both",
@@ -107,7 +106,7 @@ def test_objectives_use_weights_and_tolerances() -> None:
     missed = (found.position_error >= [1e-3, 1e-3, 2e-3, 1e-3]) | (
         found.angle_error >= found.target_arrays.angle_tolerance
     )
-    assert np.array_equal(UNREACHED_TARGETS(found), missed.sum(axis=1))
+    assert np.array_equal(unreached_targets(found), missed.sum(axis=1))
     anywhere = Task(name="a", targets=(Target(position=(0.3, 0.0, 0.3), axis=(0, 0, -1), tolerance=100.0),))
     found = evaluate(
         [problem.arm(design) for design in problem.space.sample(50, 0)],
@@ -115,17 +114,7 @@ def test_objectives_use_weights_and_tolerances() -> None:
         target_arrays=anywhere.target_arrays,
     )
     assert found.position_error.max() > 0.1
-    assert 0.5 < 1.0 - UNREACHED_TARGETS(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
-
-
-def test_verification_uses_the_same_targets() -> None:
-    """Designs are about as good in float64 as in the search, and orientation counts."""
-    problem = Problem(task(), paper_space(6))
-    designs = problem.space.sample(30, 0)
-    values = problem.evaluate(designs).values
-    verified = verify(problem, designs, values, (1.0, 10.0, 3.0))
-    assert np.median(np.abs(verified.exact - values)) < 1e-3
-    assert (verified.exact[:, 2] > 0.0).all()
+    assert 0.5 < 1.0 - unreached_targets(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
 
 
 def test_reasons_of_missed_targets() -> None:

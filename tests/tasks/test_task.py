@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from armwright.exceptions import TaskError
 from armwright.problem.problem import Problem
 from armwright.tasks.catalogue import builtin_tasks, load_task, random_task
-from armwright.tasks.decimal_commas import find_decimal_commas
 from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
 from armwright.yaml_documents import parse_document
@@ -65,12 +64,12 @@ POINT = "name: a\ntargets: [[0, 0, 0]]\n"
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("name: a\ntargets: []", "targets is empty"),
+        ("name: a\ntargets: []", "targets: expected at least 1 entry, got 0"),
         ("name: a\ntargets: [[0, 0, .nan]]", "targets[0][2]"),
         ("name: a\ntargets: [[0, 0]]", "targets[0]: expected three numbers x, y, z [m], got 2: [0, 0]"),
         ("name: a\ntargets: [[0, 0, 1, 2]]", "got 4: [0, 0, 1, 2]; write decimals with a point"),
         ("name: a\ntargets: [[450, 0, 2000]]", "more than 1000 m away"),
-        (POINT + "reference_point: [0, 5]", "above 0"),
+        (POINT + "reference_point: [0, 5]", "reference_point[0]: expected a number above 0, got 0"),
         (POINT + "resolution: 0.1", "resolution: expected objectives and their resolutions"),
         (POINT + "resolution: {torque: 0}", "resolution[0][1]: expected a number above 0, got 0"),
         (POINT + "resolutions: {torque: 1}", 'Did you mean "resolution"?'),
@@ -78,14 +77,17 @@ POINT = "name: a\ntargets: [[0, 0, 0]]\n"
         (POINT + "tool: {center: [0, 0, 0.05]}", "tool: center needs a mass above 0 kg"),
         (POINT + "tool: {inertia: [1, 1, 1]}", "tool: inertia needs a mass above 0 kg"),
         (POINT + "tool: {mass: 0.3, inertia: [1, 1, 3]}", "at most the sum of the other two"),
-        (POINT + "payload: -1", "payload: expected 0 to 10000 kg"),
+        (POINT + "payload: -1", "payload: expected a number of at least 0 kg, got -1"),
         (POINT + "payload: [1, 2]", "payload"),
         (POINT + "payload: .nan", "payload"),
         (POINT + "payload_factors: [-1]", "payload_factors"),
         (POINT + "target_noise: -0.1", "target_noise"),
         (POINT + "target_noise: 5", "target_noise"),
         (POINT + "payload: {mass: 1, size: [1, 1, 1], inertia: [1, 1, 1]}", "expected size or inertia, got both"),
-        (POINT + "payload: {mass: 0.5, inertia: [1, 1, 3]}", "payload: inertia = [1.0, 1.0, 3.0] kg m²: no body has"),
+        (
+            POINT + "payload: {mass: 0.5, inertia: [1, 1, 3]}",
+            "payload.inertia: no body has moments of [1.0, 1.0, 3.0] kg m²",
+        ),
     ],
 )
 def test_invalid_task_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
@@ -120,7 +122,6 @@ def test_task_template_and_each_part_that_it_comments_out_are_valid() -> None:
     given = parse_document(text, Task, TaskError, "it")
     assert (given.name, given.targets) == ("12", ((0.1, 0.2345678, 0.3), (0.4, 0.1, 0.2)))
     text = task_template(Path("mine.yaml"))
-    assert find_decimal_commas(text) == []
     parts = re.findall(rf"^# (?:{'|'.join(Task.model_fields)}):.*(?:\n#   .*)*", text, re.MULTILINE)
     assert len(parts) >= 15
     for part in parts:

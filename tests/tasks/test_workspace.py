@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import TaskError
-from armwright.kinematics.ik.solve import solve
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import DEXTEROUS_VOLUME, UNCOVERED_FRACTION, UNDEXTEROUS_FRACTION
+from armwright.problem.objectives import dexterous_volume, uncovered_fraction
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
-from armwright.rotations import cone_directions
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.obstacles import Box
 from armwright.tasks.task import Task
@@ -59,7 +57,7 @@ def test_two_link_arm_reaches_a_spherical_shell() -> None:
     assert not np.any(reached[(far > a + b + 2e-3) | (far < a - b - 2e-3)])
     assert reached[inside].mean() > 0.97, "but for some that the straight start does not lead to"
     volume = 4 / 3 * np.pi * ((a + b) ** 3 - (a - b) ** 3) / 1.6**3
-    assert 1.0 - UNCOVERED_FRACTION(evaluation)[0] == pytest.approx(volume, abs=0.03)
+    assert 1.0 - uncovered_fraction(evaluation)[0] == pytest.approx(volume, abs=0.03)
 
 
 def test_workspace_points_are_solved_like_targets() -> None:
@@ -83,7 +81,7 @@ FAULTS = {
     "{low: [0, 0, 0.5], high: [1, 1, 0.4]}": "workspace: expected low z <= high z, got 0.5 m and 0.4 m",
     "everything": r"workspace: expected \{low: \[x, y, z\], high",
     "[]": "targets",
-    "{low: [0, 0, 0], high: [1, 1, 1], directions: {axis: [0, 0, 0]}}": r"directions: axis = \[0.0, 0.0, 0.0\] is no",
+    "{low: [0, 0, 0], high: [1, 1, 1], directions: {axis: [0, 0, 0]}}": "directions.axis: expected a direction",
     "{low: [0, 0, 0], high: [1, 1, 1], directions: {half_angle: 45}}": "directions.half_angle: .* at most 3.14159 rad",
     "{low: [0, 0, 0], high: [1, 1, 1], points: 600, directions: {count: 100}}": "at most 50000 points x directions",
     "[{low: [0, 0, 0], high: [1, 1, 1], points: 6000}, {low: [0, 0, 0], high: [1, 1, 1], points: 6000}]": "10000",
@@ -101,25 +99,6 @@ def test_invalid_workspaces_are_refused_in_one_line(written: str) -> None:
 CONE: dict[str, Any] = {"axis": (0, 0, 1), "half_angle": 0.6, "count": 9, "share": 0.5}
 
 
-@pytest.mark.slow
-def test_dexterous_volume_is_that_of_many_restarts() -> None:
-    box = region(low=(-0.3, -0.3, 0.0), high=(0.3, 0.3, 0.3), points=40, directions=CONE)
-    arms = [paper_space(6).arm(design) for design in paper_space(6).sample(4, 1)]
-    together = evaluate(arms, [[0.1, 0.2, 0.3]], workspace=[box])
-    points = sample_regions((box,))
-    for arm, value in zip(arms, DEXTEROUS_VOLUME(together), strict=True):
-        alone = evaluate(arm, [[0.1, 0.2, 0.3]], workspace=[box])
-        assert DEXTEROUS_VOLUME(alone)[0] == value, "independent of the batch"
-        assert UNDEXTEROUS_FRACTION(alone)[0] == 1.0 - value
-        axes = np.tile(cone_directions(CONE["axis"], 0.6, 9), (40, 1))
-        peer = (
-            solve(arm, np.repeat(points, 9, axis=0), axes=axes, restarts=40, angle_tolerance=np.radians(1.0))
-            .reached[0]
-            .reshape(40, 9)
-        )
-        assert value == pytest.approx((peer.mean(axis=1) >= 0.5).mean(), abs=0.05)
-
-
 def test_points_behind_an_obstacle_are_not_dexterous() -> None:
     """A rod on three slides reaches all points of a box, those above a plate only where the plate is not in its way."""
     joints = tuple(Joint("prismatic", axis, -0.5, 0.5) for axis in ("x", "y", "z"))
@@ -131,11 +110,11 @@ def test_points_behind_an_obstacle_are_not_dexterous() -> None:
     points = sample_regions((box,))
     gap = np.hypot(np.maximum(-points[:, 0], 0.0), np.maximum(0.4 - points[:, 2], 0.0)) - rod.radius
     assert 0.2 < (gap > 0.0).mean() < 0.8
-    assert DEXTEROUS_VOLUME(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box]))[0] == 1.0
+    assert dexterous_volume(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box]))[0] == 1.0
     behind = evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[plate])
-    assert (gap > 1e-3).mean() <= DEXTEROUS_VOLUME(behind)[0] <= (gap > -1e-3).mean()  # reached within 1 mm
+    assert (gap > 1e-3).mean() <= dexterous_volume(behind)[0] <= (gap > -1e-3).mean()  # reached within 1 mm
     around = Box(kind="box", center=(0.0, 0.0, 0.45), size=(1.0, 1.0, 0.4))
-    assert DEXTEROUS_VOLUME(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[around]))[0] == 0.0
+    assert dexterous_volume(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[around]))[0] == 0.0
 
 
 def test_tasks_bound_and_minimise_directions_of_the_tool() -> None:

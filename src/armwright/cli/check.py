@@ -1,6 +1,5 @@
 """Check a task and a design space: what they mean, what cannot work, and what was hardly meant."""
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,37 +10,21 @@ from armwright.cli.activity import activity
 from armwright.cli.notes import unused_parts
 from armwright.cli.show_inputs import show_target_table, show_task
 from armwright.cli.streams import print_json
-from armwright.exceptions import TaskError
-from armwright.files import read_text
-from armwright.problem.checks.finding import SUSPECTED, Finding
+from armwright.problem.checks.finding import Finding
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
-from armwright.problem.checks.reach import longest_reach
 from armwright.problem.checks.sampling import check_by_sampling
 from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.problem import Problem
 from armwright.runs.config import record_objectives
 from armwright.runs.folder import CONFIG
-from armwright.spaces.design_space import DesignSpace, builtin_spaces
+from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import CategoricalParameter, Parameter
-from armwright.tasks.catalogue import builtin_names
-from armwright.tasks.decimal_commas import find_decimal_commas
-from armwright.yaml_documents import MAX_BYTES
 
 FIRST_SECONDS = 1.0  # [s] of samples before a search
 DEEP_SECONDS, DEEP_SAMPLES = 10.0, 1000  # [s] of a deep check, and the samples that it takes at least
 
 
-def check_files(task: str, space: Path | None) -> list[Finding]:
-    """Return what is suspicious in the text of a task file and a space file; nothing for built-in ones."""
-    findings: list[Finding] = []
-    for name, known in ((task, builtin_names()), (None if space is None else str(space), builtin_spaces())):
-        if name is not None and name not in known and os.path.isfile(name):
-            text = read_text(Path(name), MAX_BYTES, TaskError)
-            findings += [Finding(f"{name}, {message}", SUSPECTED) for message in find_decimal_commas(text)]
-    return findings
-
-
-def check_before_search(console: Console, problem: Problem, written: Sequence[Finding], folder: Path) -> None:
+def check_before_search(console: Console, problem: Problem, folder: Path) -> None:
     """Print warnings about a problem; stop at what is proven.
 
     Constraints are sampled for a second, unless the run folder already holds a run.
@@ -49,7 +32,7 @@ def check_before_search(console: Console, problem: Problem, written: Sequence[Fi
     Raises:
         TaskError: It is proven that no design can serve the task.
     """
-    findings = [*written, *check_instantly(problem)]
+    findings = check_instantly(problem)
     _show_warnings(console, findings)
     stop_if_proven(findings)
     if not (folder / CONFIG).exists():
@@ -75,7 +58,7 @@ def record_check(problem: Problem, findings: Sequence[Finding], n_samples: int) 
         "space": {
             "name": space.name,
             "joints": [space.min_joints, space.max_joints],
-            "max_reach": longest_reach(problem),
+            "max_reach": problem.max_reach,
             "free_parameters": len(free_parameters(space)),
             "parameters": {parameter.name: _describe_range(parameter) for parameter in space.parameters},
             "tie": dict(space.tie),
@@ -102,7 +85,7 @@ def show_check(console: Console, problem: Problem) -> None:
     low, high = space.min_joints, space.max_joints
     console.print(
         f"space {space.name}: {low if low == high else f'{low} to {high}'} joints, reach at most "
-        f"{longest_reach(problem):.3g} m, {len(free_parameters(space))} free parameters"
+        f"{problem.max_reach:.3g} m, {len(free_parameters(space))} free parameters"
     )
     for parameter in space.parameters:
         tied = f", always equal to {tie[parameter.name]}" if parameter.name in tie else ""
@@ -112,9 +95,7 @@ def show_check(console: Console, problem: Problem) -> None:
         console.print(f"note: {note}")
 
 
-def run_check(
-    console: Console, problem: Problem, written: Sequence[Finding], deep: bool, picture: Path | None, json_: bool
-) -> None:
+def run_check(console: Console, problem: Problem, deep: bool, picture: Path | None, json_: bool) -> None:
     """Print what a task and a space mean and what is wrong with them, and draw them into the picture, if there is one.
 
     Raises:
@@ -123,7 +104,7 @@ def run_check(
     if not json_:
         show_check(console, problem)
     with activity("evaluating random designs" if deep else "checking"):
-        findings, n_samples = [*written, *check_instantly(problem)], 0
+        findings, n_samples = check_instantly(problem), 0
         if deep and not any(finding.is_proven for finding in findings):
             sampled, n_samples = check_by_sampling(problem, DEEP_SECONDS, DEEP_SAMPLES)
             findings += sampled

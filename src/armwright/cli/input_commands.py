@@ -96,12 +96,12 @@ def check(
     json_: Json = False,
 ) -> None:
     """Check TASK and a design space: what they mean, what cannot work, and what was hardly meant."""
-    from armwright.cli.check import check_files, run_check
+    from armwright.cli.check import run_check
     from armwright.cli.notes import can_draw
 
     problem = load_problem(task, space, objectives=objectives)
     drawn = (out or Path(f"{problem.task.name}-check.png")) if can_draw(open_console(json_), picture) else None
-    run_check(open_console(), problem, check_files(task, space), deep, drawn, json_)
+    run_check(open_console(), problem, deep, drawn, json_)
 
 
 def tasks(

@@ -85,7 +85,7 @@ def design(
     plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=drawing, started=started)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
     folder = out or Path("runs") / f"{problem.task.name}-design-seed{seed}"
-    _begin(console, problem, task, space, folder)
+    _begin(console, problem, space, folder)
     try:
         with interruptible(), search_progress(console) as watch:
             run = find_front(
@@ -208,7 +208,7 @@ def optimize(
     is_method_chosen = proposer != "auto" or model is not None or sampler != "auto"
     if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
         console.print(note)
-    _begin(console, problem, task, space, folder)
+    _begin(console, problem, space, folder)
     if live:
         from armwright.page.live_server import start_server
 
@@ -260,16 +260,16 @@ def optimize(
         raise typer.Exit(1)
 
 
-def _begin(console: "Console", problem: "Problem", task: str, space: Path | None, folder: Path) -> None:
+def _begin(console: "Console", problem: "Problem", space: Path | None, folder: Path) -> None:
     """Print the task's own space and warnings; stop if no design can serve the task."""
-    from armwright.cli.check import check_before_search, check_files
+    from armwright.cli.check import check_before_search
     from armwright.cli.notes import space_note
     from armwright.cli.progress import announce_compilation
 
     announce_compilation(console)
     if space is None and (note := space_note(problem)):
         console.print(note)
-    check_before_search(console, problem, check_files(task, space), folder)
+    check_before_search(console, problem, folder)
 
 
 def _draw(folder: Path, drawing: bool) -> list[Path]:

@@ -15,7 +15,7 @@ from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.problem.assumptions import assumed_values, count_assumed
 from armwright.problem.facts import describe_supply
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import QUANTITIES, TORQUE, TORQUE_SCALE
+from armwright.problem.objectives import QUANTITIES, TORQUE_SCALE, torque
 from armwright.proof.cycle_faults import describe_path
 from armwright.proof.design_record import DesignRecord, facts_by_number
 from armwright.proof.selection import quantities_of_front
@@ -149,6 +149,6 @@ def show_picked(
 
 
 def _format_objective(objective: Objective, value: float) -> str:
-    if objective == TORQUE:  # scaled, as in the paper
+    if objective == torque:  # scaled, as in the paper
         return f"torque {value:.4g} = {TORQUE_SCALE:g} x {value / TORQUE_SCALE:.4g} N m"
     return f"{objective.label.lower()} {value:.4g} {objective.unit}"

@@ -13,7 +13,7 @@ from armwright.cli.streams import list_files
 from armwright.cli.tables import Column, Table, numbers, print_table
 from armwright.problem.assumptions import count_assumed
 from armwright.problem.ignored_errors import describe_ignored_errors
-from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
+from armwright.problem.objectives import TORQUE_SCALE, position_error, torque
 from armwright.proof.infeasibility import describe_infeasibility
 from armwright.proof.results import REPORT
 from armwright.runs.history import History, source_label
@@ -22,7 +22,7 @@ from armwright.study.front.direct_search import FrontRun
 from armwright.study.front.time_plan import MAX_DESIGNS
 from armwright.study.progress import StudyResult
 
-SHORT_NAMES = {POSITION_ERROR: "error [m]", TORQUE: "torque"}
+SHORT_NAMES = {position_error: "error [m]", torque: "torque"}
 MAX_ROWS = 16  # of the front; front.csv has all
 
 
@@ -49,7 +49,7 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
     _show_surrogate(console, summary.get("surrogate"))
     if summary["proposer"] is not None:
         _show_proposer(console, summary["proposer"])
-    is_scaled = TORQUE in problem.objectives
+    is_scaled = torque in problem.objectives
     notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if is_scaled else []
     notes += [
         problem.space.mass_note, payload_note(problem.task), describe_ignored_errors(problem), *unused_parts(problem),

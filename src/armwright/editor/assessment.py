@@ -1,17 +1,16 @@
 """What the texts of a task and a space mean, and what is wrong with them, for the page."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from armwright.editor.edited_files import EditedFiles, Texts
 from armwright.exceptions import ArmwrightError, SpaceError, TaskError
-from armwright.problem.checks.finding import SUSPECTED, Finding
+from armwright.problem.checks.finding import Finding
 from armwright.problem.checks.instant import check_instantly
-from armwright.problem.checks.reach import base_box, longest_reach
+from armwright.problem.checks.reach import base_box
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
-from armwright.tasks.decimal_commas import find_decimal_commas
 from armwright.tasks.task import Task
 from armwright.yaml_documents import load_document, parse_document
 
@@ -50,10 +49,9 @@ def assess(texts: Texts, files: EditedFiles) -> Assessment:
     problem: Problem | None = None
     if task is not None and space is not None:
         problem = attempt(lambda: Problem(task, space))
-    findings: list[Finding] = [] if faults else list(_decimal_commas(texts, names))
+    findings: list[Finding] = []
     if problem is not None:
-        found: list[Finding] | None = attempt(lambda: check_instantly(problem))
-        findings += found or []
+        findings = attempt(lambda: check_instantly(problem)) or []
     return Assessment(
         task=contents[0],
         space=contents[1],
@@ -62,12 +60,6 @@ def assess(texts: Texts, files: EditedFiles) -> Assessment:
         scene=None if task is None else _scene(task, problem),
         meaning={} if problem is None else _meaning(problem),
     )
-
-
-def _decimal_commas(texts: Texts, names: tuple[str, str]) -> Iterator[Finding]:
-    for text, name in zip((texts.task, texts.space), names, strict=True):
-        for message in find_decimal_commas(text):
-            yield Finding(f"{name}, {message}", SUSPECTED)
 
 
 def _scene(task: Task, problem: Problem | None) -> dict[str, Any]:
@@ -101,5 +93,5 @@ def _meaning(problem: Problem) -> dict[str, str]:
         "minimised": ", ".join(objective.name for objective in problem.objectives),
         "constraints, stated and implied": constraints or "none",
         "joints": f"{low}" if low == high else f"{low} to {high}",
-        "reach of the longest arm": f"{longest_reach(problem):.3g} m",
+        "reach of the longest arm": f"{problem.max_reach:.3g} m",
     }

@@ -10,7 +10,7 @@ from armwright.problem.constraints import Constraint
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.facts import Facts, fact_of, facts_of
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import CYCLE_TIME, DYNAMIC_UTILISATION, PRICE, SPEED_UTILISATION
+from armwright.problem.objectives import cycle_time, dynamic_utilisation, price, speed_utilisation
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
 from armwright.text import rounded
@@ -33,14 +33,14 @@ class ExistingArm:
 
     def value(self, quantity: Objective, minimised: bool = False) -> float | None:
         """Return a quantity; None if it is not known."""
-        if quantity == PRICE and self.price is not None:
+        if quantity == price and self.price is not None:
             return self.price
         return finite_or_none(known_values(quantity, self.evaluation, minimised)[0][0])
 
     def facts(self, arm: Arm) -> Facts:
         """Return what is known of the arm, which was evaluated."""
         (facts,) = facts_of(self.evaluation, [arm], known_values)
-        stated = {} if self.price is None else {PRICE.name: fact_of(PRICE, self.price)}
+        stated = {} if self.price is None else {price.name: fact_of(price, self.price)}
         return {**facts, **stated}
 
     @property
@@ -62,15 +62,15 @@ class ExistingArm:
     def _overloads(self) -> Iterator[str]:
         """Yield which efforts and speeds of the URDF the cycle exceeds; corner speeds, which it lacks, aside."""
         drives, bounded = self.evaluation.arms.actuation, {c.quantity for c in self.problem.constraints}
-        if drives is None or self.evaluation.cycle_paths is None or self.value(CYCLE_TIME) is None:
+        if drives is None or self.evaluation.cycle_paths is None or self.value(cycle_time) is None:
             return
         loads = self.evaluation.loads
         torque = drives.safety_factor[0] * np.abs(loads.torques[0]).max(axis=(0, 1)) / drives.peak[0]
         speed = np.abs(loads.speeds[0]).max(axis=(0, 1)) / drives.no_load_speed[0]
-        decided = DYNAMIC_UTILISATION in bounded and self.value(DYNAMIC_UTILISATION) is not None
+        decided = dynamic_utilisation in bounded and self.value(dynamic_utilisation) is not None
         if np.nanmax(torque, initial=0.0) > 1.0 and not decided:
             yield f"an effort of its file (along the cycle it needs {np.nanmax(torque):.0%}, safety factor included)"
-        if np.nanmax(speed, initial=0.0) > 1.0 and SPEED_UTILISATION not in bounded:
+        if np.nanmax(speed, initial=0.0) > 1.0 and speed_utilisation not in bounded:
             yield f"a speed of its file (along the cycle it needs {np.nanmax(speed):.0%})"
 
     @property

@@ -12,7 +12,7 @@ from armwright.llm.feedback import Feedback, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.ignored_errors import stated_tolerance
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import ORIENTATION_ERROR, POSITION_ERROR, QUANTITIES, UNREACHED_TARGETS
+from armwright.problem.objectives import QUANTITIES, orientation_error, position_error, unreached_targets
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History
@@ -150,7 +150,7 @@ def _task_values(problem: Problem) -> dict[str, Any]:
 def _task_specific(objective: Objective, task: Task) -> Objective:
     """Return the objective with a description that mentions the task's tolerances and weights."""
     target_arrays = task.target_arrays
-    if objective == UNREACHED_TARGETS and (target_arrays.oriented or np.any(target_arrays.tolerance != REACHED)):
+    if objective == unreached_targets and (target_arrays.oriented or np.any(target_arrays.tolerance != REACHED)):
         angle = " or the tool's direction by its angle tolerance" if target_arrays.oriented else ""
         return replace(
             objective, description=f"1 where the tip misses the target by its tolerance{angle} or more, else 0"
@@ -158,7 +158,7 @@ def _task_specific(objective: Objective, task: Task) -> Objective:
     description = objective.description
     if stated_tolerance(task, objective).any():
         description = f"{description}, beyond the stated tolerance, else 0"
-    if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(target_arrays.weight != 1.0):
+    if objective in (position_error, orientation_error) and np.any(target_arrays.weight != 1.0):
         description = f"{description}, times the target's weight"
     return replace(objective, description=description)
 

@@ -27,7 +27,7 @@ from armwright.pictures.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_L
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.facts import ASKED, Facts, describe_supply
 from armwright.problem.ignored_errors import describe_ignored_errors
-from armwright.problem.objectives import TORQUE, TORQUE_SCALE
+from armwright.problem.objectives import TORQUE_SCALE, torque
 from armwright.proof.design_record import DesignRecord, read_records
 from armwright.proof.front_gap import known_front
 from armwright.proof.results import read_summary
@@ -315,7 +315,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
             }
             for constraint in config.problem.constraints
         ],
-        "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
+        "torque_scale": TORQUE_SCALE if any(o.name == torque.name for o in config.objectives) else None,
         "parameters": [
             {"name": p.name, "needs": space.condition(p.name), "custom": p.name in space.custom_names}
             | (

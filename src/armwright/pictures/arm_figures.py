@@ -24,7 +24,7 @@ from armwright.pictures.drawing import legend_mark
 from armwright.pictures.solids import Extent, draw_edges, draw_obstacles, draw_solid, extent_of
 from armwright.pictures.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objectives import TORQUE
+from armwright.problem.objectives import torque
 from armwright.runs.history import FrontMember, History, source_label
 from armwright.tasks.motions import Motion
 from armwright.tasks.targets import AXIS
@@ -222,7 +222,7 @@ def _caption(history: History, member: FrontMember, columns: int = 200) -> str:
     length = sum(member.design.links)
     first = f"#{member.number} ({source_label(member.source)}), {member.design.joints}, length {length:.2f} m"
     values = (
-        f"{objective.label.lower()} {value:.4g}" + ("" if objective is TORQUE else f" {objective.unit}")
+        f"{objective.label.lower()} {value:.4g}" + ("" if objective is torque else f" {objective.unit}")
         for objective, value in zip(history.problem.objectives, member.values, strict=True)
     )
     return f"{first}\n{textwrap.fill(', '.join(values), columns)}"

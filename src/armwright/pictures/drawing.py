@@ -15,7 +15,7 @@ from armwright.arrays import Array
 from armwright.files import naming_write_errors, new_part, replace_file, replace_folder
 from armwright.pareto import front_mask
 from armwright.pictures.style import FRONT, RC
-from armwright.problem.objectives import TORQUE
+from armwright.problem.objectives import torque
 from armwright.problem.problem import Problem
 
 FAR_REFERENCE = 2.0  # times the largest value; a reference point beyond is not drawn
@@ -77,7 +77,7 @@ def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], limits:
     for i, axis in enumerate("xy"):
         objective = problem.objectives[i]
         unit = objective.unit_in_brackets.replace(" x ", " × ")
-        if objective.name == TORQUE.name and problem.space.is_toy:
+        if objective.name == torque.name and problem.space.is_toy:
             unit = unit.replace("]", "; toy masses]")
         label = f"{objective.label}{unit}"
         axes.set(**{f"{axis}label": label, f"{axis}lim": tuple(limits[i])})

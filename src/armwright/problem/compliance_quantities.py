@@ -1,3 +1,4 @@
+# ruff: noqa: D205, D401 (a docstring here is the description that users and models read)
 """Quantities of arms that yield under load, have backlash, and can hold only so much."""
 
 import numpy as np
@@ -12,43 +13,44 @@ from armwright.kinematics.reach.compliance import (
 )
 from armwright.kinematics.reach.payload_limits import payload_limits, torques_by_payload
 from armwright.problem.evaluation import Evaluation
+from armwright.problem.objective import quantity
 from armwright.tasks.moments import MAX_MASS
 
 
-def deflection(evaluation: Evaluation) -> Array:
-    """Return (N, T) how far its own weight and the payload move the tip [m]."""
-    arms, frames, stiffness = evaluation.arms, evaluation.frames, _stiffness(evaluation)
-    own = tip_displacements(arms, frames, own_loads(arms, frames), stiffness)
-    return np.linalg.norm(own + _payload_displacement(evaluation, stiffness), axis=-1)
+@quantity("m", over="max", needs=("sections",), ratings=("joint_stiffness",))
+def deflection(e: Evaluation) -> Array:
+    """How far the arm's own weight and the payload move the tip in the kept posture, because links bend and twist and
+    joints yield.
+    """
+    own = tip_displacements(e.arms, e.frames, own_loads(e.arms, e.frames), _stiffness(e))
+    return np.linalg.norm(own + _payload_displacement(e), axis=-1)
 
 
-def payload_deflection(evaluation: Evaluation) -> Array:
-    """Return (N, T) how far the payload moves the tip [m]."""
-    return np.linalg.norm(_payload_displacement(evaluation, _stiffness(evaluation)), axis=-1)
+@quantity("m", over="max", needs=("sections",), ratings=("joint_stiffness",), symbol="E_payload")
+def payload_deflection(e: Evaluation) -> Array:
+    """How far the payload alone moves the tip in the kept posture, because links bend and twist and joints yield."""
+    return np.linalg.norm(_payload_displacement(e), axis=-1)
 
 
-def backlash_error(evaluation: Evaluation) -> Array:
-    """Return (N, T) how far half of the backlash of all joints moves the tip at most [m]."""
-    return backlash_errors(evaluation.arms, evaluation.frames, evaluation.drives.backlash)
+@quantity("m", over="max", ratings=("backlash",), symbol="E_backlash")
+def backlash_error(e: Evaluation) -> Array:
+    """How far half of the backlash of all actuators together moves the tip in the kept posture at most."""
+    return backlash_errors(e.arms, e.frames, e.drives.backlash)
 
 
-def payload_capacity(evaluation: Evaluation) -> Array:
-    """Return (N, T) the largest payload that all motors hold [kg]; MAX_MASS where a cycle carries none."""
-    arms, frames, drives = evaluation.arms, evaluation.frames, evaluation.drives
-    held = evaluation.payload[:, None] * torques_by_payload(arms, frames)
-    peak = drives.peak / drives.safety_factor[:, None]
-    limits = payload_limits(arms, frames, evaluation.joint_torques - held, peak)
-    if evaluation.plan is None:
-        return limits
-    return np.where(evaluation.plan.holds_payload(len(evaluation.targets)), limits, MAX_MASS)
+@quantity("kg", over="min", ratings=("peak",), symbol="payload_capacity")
+def payload_capacity(e: Evaluation) -> Array:
+    """The largest payload that all actuators hold in the kept posture, with the safety factor."""
+    held = e.payload[:, None] * torques_by_payload(e.arms, e.frames)
+    peak = e.drives.peak / e.drives.safety_factor[:, None]
+    limits = payload_limits(e.arms, e.frames, e.joint_torques - held, peak)
+    return limits if e.plan is None else np.where(e.plan.holds_payload(len(e.targets)), limits, MAX_MASS)
 
 
-def _payload_displacement(evaluation: Evaluation, stiffness: Stiffness) -> Array:
+def _payload_displacement(e: Evaluation) -> Array:
     """Return the (N, T, 3) displacements of the tip by the payload [m]."""
-    arms, frames = evaluation.arms, evaluation.frames
-    return evaluation.payload[:, None] * tip_displacements(arms, frames, unit_payload(arms, frames), stiffness)
+    return e.payload[:, None] * tip_displacements(e.arms, e.frames, unit_payload(e.arms, e.frames), _stiffness(e))
 
 
-def _stiffness(evaluation: Evaluation) -> Stiffness:
-    arms = evaluation.arms
-    return Stiffness(arms.bending_stiffness, arms.torsional_stiffness, evaluation.drives.joint_stiffness)
+def _stiffness(e: Evaluation) -> Stiffness:
+    return Stiffness(e.arms.bending_stiffness, e.arms.torsional_stiffness, e.drives.joint_stiffness)

@@ -9,8 +9,7 @@ import numpy as np
 from armwright.exceptions import SettingsError
 from armwright.units import NUMBER, OTHER_UNITS, UNSIGNED
 
-_BOUND = re.compile(rf"\s*(?:(<=|>=|==|<|>)\s*)?({NUMBER})\s*([^\W\d][^<>=]*)?")
-_NAME = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>=].*)", re.DOTALL)
+_CONDITION = re.compile(rf"\s*([A-Za-z_]\w*)\s*(<=|>=|==|<|>)\s*({NUMBER})\s*([^\W\d][^<>=]*)?")
 _WEIGHT = re.compile(rf"\s*([A-Za-z_]\w*)\s*=\s*({UNSIGNED})\s*")
 _HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.greater, "==": np.equal}
 
@@ -42,11 +41,11 @@ class Condition:
 
 def read_condition(text: str) -> Condition:
     """Parse a condition such as `position_error<=0.05` or `mass<2 kg`; SettingsError if it is none."""
-    name = _NAME.fullmatch(text)
-    found = None if name is None else _BOUND.fullmatch(name[2])
-    if name is None or found is None or not found[1]:
+    found = _CONDITION.fullmatch(text)
+    if found is None:
         raise SettingsError(f'--where "{text}": expected a name, one of <= < == > >= and a number, such as mass<=2.5')
-    return Condition(name[1], found[1], float(found[2]), (found[3] or "").strip())
+    name, relation, bound, unit = found.groups("")
+    return Condition(name, relation, float(bound), unit.strip())
 
 
 def read_weights(text: str) -> dict[str, float]:

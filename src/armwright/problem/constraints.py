@@ -14,7 +14,6 @@ from armwright.exceptions import TaskError, did_you_mean
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import CLEARANCES, QUANTITIES
-from armwright.tasks.cycle import Cycle
 from armwright.tasks.task import Task
 from armwright.units import NUMBER
 
@@ -87,23 +86,17 @@ def implied_constraints(task: Task, has_actuators: bool, has_bodies: bool) -> tu
         has_actuators: Whether the torques and speeds of the joints are limited.
         has_bodies: Whether motors or a column are solid bodies.
     """
-    implied = _cycle_bounds(task.cycle, task.target_arrays.oriented, has_actuators) if task.cycle else {}
+    implied: dict[str, float] = {}
+    if task.cycle is not None:
+        tolerance = task.cycle.tolerance
+        implied = {"unreached_targets": 0.0, "path_error": tolerance.largest_distance}
+        implied |= {"path_angle": tolerance.largest_angle} if task.target_arrays.oriented else {}
+        implied |= {"jumps": 0.0, "collision": 0.0}
+        implied |= dict.fromkeys(DRIVE_QUANTITIES, 1.0) if has_actuators else {}
     implied |= {"collision": 0.0} if has_bodies else {}
     own = {constraint.quantity.name for constraint in read_constraints(task.constraints)}
     own |= {"collision"} if own & {quantity.name for quantity in CLEARANCES} else set()
     return tuple(f"{name} <= {bound:.12g}" for name, bound in implied.items() if name not in own)
-
-
-def _cycle_bounds(cycle: Cycle, oriented: bool, has_actuators: bool) -> dict[str, float]:
-    tolerance = cycle.tolerance
-    return {
-        "unreached_targets": 0.0,
-        "path_error": tolerance.largest_distance,
-        **({"path_angle": tolerance.largest_angle} if oriented else {}),
-        "jumps": 0.0,
-        "collision": 0.0,
-        **(dict.fromkeys(DRIVE_QUANTITIES, 1.0) if has_actuators else {}),
-    }
 
 
 def _read(text: str) -> Constraint:

@@ -1,3 +1,4 @@
+# ruff: noqa: D205, D401 (a docstring here is the description that users and models read)
 """Quantities of arms that depend on their actuators, whose ratings are known."""
 
 import numpy as np
@@ -5,43 +6,74 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
+from armwright.problem.objective import quantity
 
 
-def torque_utilisation(evaluation: Evaluation) -> Array:
-    """Return (N, T) the largest share of its peak torque that a motor needs at rest, times the safety factor."""
-    drives = evaluation.drives
-    peak = (drives.peak * evaluation.arms.travel / drives.safety_factor[:, None])[:, None]
-    return evaluation.worst_torques(lambda torques: np.abs(torques / peak).max(axis=-1))
+@quantity("of allowed", over="max", needs=("motions",), ratings=("peak",), symbol="E_util")
+def torque_utilisation(e: Evaluation) -> Array:
+    """The largest share of its actuator's peak torque that any joint needs to hold the kept posture up against
+    gravity, times the safety factor; above 1 the arm does not hold it with this factor.
+    """
+    peak = (e.drives.peak * e.arms.travel / e.drives.safety_factor[:, None])[:, None]
+    return e.worst_torques(lambda torques: np.abs(torques / peak).max(axis=-1))
 
 
-def dynamic_utilisation(evaluation: Evaluation) -> Array:
-    """Return (N, T) the largest torque-speed utilisation on the way to each target."""
-    drives = evaluation.drives
-    return evaluation.worst_loads(
-        lambda torques, speeds: torque_speed_utilisation(torques, speeds, drives).max(axis=-1)
-    )
+@quantity("USD", over="arm", ratings=("price",))
+def price(e: Evaluation) -> Array:
+    """The price of all actuators, and of links and column if the space states one."""
+    return e.drives.price + e.arms.structure_price
 
 
-def speed_utilisation(evaluation: Evaluation) -> Array:
-    """Return (N, T) the largest share of its no-load speed that a motor needs on the way to each target."""
-    speed = evaluation.drives.no_load_speed[:, None]
-    return evaluation.worst_loads(lambda _, speeds: np.abs(speeds / speed).max(axis=-1))
+@quantity("N m", over="max", needs=("cycle", "durations"), symbol="E_dynamic")
+def dynamic_torque(e: Evaluation) -> Array:
+    """The largest absolute torque of any motor on the way to the target, gravity and inertia included."""
+    travel = e.arms.travel[:, None]
+    return e.worst_loads(lambda torques, _: np.abs(torques * travel).max(axis=-1))
 
 
-def dynamic_torque(evaluation: Evaluation) -> Array:
-    """Return (N, T) the largest torque of a motor on the way to each target [N m]."""
-    travel = evaluation.arms.travel[:, None]
-    return evaluation.worst_loads(lambda torques, _: np.abs(torques * travel).max(axis=-1))
+@quantity(
+    "of allowed",
+    over="max",
+    needs=("cycle", "durations"),
+    ratings=("peak", "corner_speed", "no_load_speed"),
+    symbol="E_dynutil",
+)
+def dynamic_utilisation(e: Evaluation) -> Array:
+    """The largest factor by which any actuator's torque, times the safety factor, and speed together exceed its
+    torque-speed limit on the way to the target; above 1 it cannot.
+    """
+    return e.worst_loads(lambda torques, speeds: torque_speed_utilisation(torques, speeds, e.drives).max(axis=-1))
 
 
-def thermal_utilisation(evaluation: Evaluation) -> Array:
-    """Return the (N,) largest share of its continuous torque that a motor needs, times the safety factor."""
-    share = evaluation.loads.rms_torques / evaluation.drives.continuous
-    return evaluation.drives.safety_factor * share.max(axis=1)
+@quantity("of allowed", over="max", needs=("cycle", "durations"), ratings=("no_load_speed",), symbol="E_speed")
+def speed_utilisation(e: Evaluation) -> Array:
+    """The largest share of any actuator's no-load speed on the way to the target; above 1 it cannot."""
+    speed = e.drives.no_load_speed[:, None]
+    return e.worst_loads(lambda _, speeds: np.abs(speeds / speed).max(axis=-1))
 
 
-def voltages(evaluation: Evaluation) -> Array:
-    """Return the (N,) number of different voltages; fixed joints have 0 V."""
-    voltage = np.sort(evaluation.drives.voltage, axis=1)
-    first = np.diff(voltage, axis=1, prepend=0.0) > 0.0
-    return first.sum(axis=1).astype(np.float64)
+@quantity("of allowed", over="arm", needs=("cycle", "durations"), ratings=("continuous",), symbol="E_thermal")
+def thermal_utilisation(e: Evaluation) -> Array:
+    """The largest share of any actuator's continuous torque that its torque takes, as a root mean square over the
+    cycle with its dwells, times the safety factor; above 1 it overheats.
+    """
+    return e.drives.safety_factor * (e.loads.rms_torques / e.drives.continuous).max(axis=1)
+
+
+@quantity("A", over="arm", needs=("cycle", "durations"), ratings=("peak", "voltage", "current"), symbol="I_peak")
+def peak_current(e: Evaluation) -> Array:
+    """The largest current that all actuators together draw from the supply along the cycle."""
+    return e.supply.peak
+
+
+@quantity("A", over="arm", needs=("cycle", "durations"), ratings=("peak", "voltage", "current"), symbol="I_mean")
+def mean_current(e: Evaluation) -> Array:
+    """The mean current that all actuators together draw from the supply over the cycle with its dwells."""
+    return e.supply.mean
+
+
+@quantity("voltages", over="arm", ratings=("voltage",))
+def voltages(e: Evaluation) -> Array:
+    """The number of different supply voltages of the actuators."""
+    voltage = np.sort(e.drives.voltage, axis=1)  # (N, J) [V]; 0 for fixed joints
+    return (np.diff(voltage, axis=1, prepend=0.0) > 0.0).sum(axis=1).astype(np.float64)

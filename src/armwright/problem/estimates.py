@@ -8,20 +8,21 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.objectives import (
-    JOINTS,
-    LENGTH,
-    MASS,
     OBJECTIVES,
-    POSITION_ERROR,
-    PRICE,
-    UNREACHED_TARGETS,
-    VOLTAGES,
-    WORST_ERROR,
+    joints,
+    length,
+    mass,
+    position_error,
+    price,
+    unreached_targets,
+    voltages,
+    worst_error,
 )
-from armwright.problem.problem import Outcomes, Problem
+from armwright.problem.problem import Outcomes, Problem, joined, worst_case
+from armwright.problem.scene import Scene
 
-EXACT = (PRICE, MASS, LENGTH, JOINTS, VOLTAGES)  # quantities that an arm has without moving
-OF_REACH = (POSITION_ERROR, WORST_ERROR, UNREACHED_TARGETS)  # at least what the distance beyond reach implies
+EXACT = (price, mass, length, joints, voltages)  # quantities that an arm has without moving
+OF_REACH = (position_error, worst_error, unreached_targets)  # at least what the distance beyond reach implies
 ROUNDING = 1e-5  # of a distance relative to the reach, from single precision
 AT_ONCE = 500  # designs that are estimated at once: below MANY_ARMS, so that no other kernels are loaded
 
@@ -32,7 +33,7 @@ def lower_bounds(problem: Problem, matrix: Array) -> Outcomes:
     Price, mass, length, joints and voltages are exact, and the tip is off a target by at least its distance beyond
     reach. Other objectives are bounded by 0, custom ones and other constraints by nothing.
     """
-    evaluation = _motionless(problem, problem.arms(problem.space.normalised(matrix)))
+    evaluation = motionless(problem.scenes[0], problem.arms(problem.space.normalised(matrix)))
     values = np.zeros((len(matrix), len(problem.objectives)))
     for column, objective in enumerate(problem.objectives):
         if objective in (*EXACT, *OF_REACH):
@@ -60,13 +61,12 @@ def estimates(problem: Problem, matrix: Array, near: Array) -> Outcomes:
         rows = slice(first, first + AT_ONCE)
         arms = problem.arms(matrix[rows])
         rough = (evaluate_arrays(arms, scene, problem.device, roughly_near=near[rows]) for scene in problem.scenes)
-        parts.append(problem.worst(rough))
-    return Outcomes(np.concatenate([p.values for p in parts]), np.concatenate([p.violations for p in parts]))
+        parts.append(worst_case(map(problem.outcomes, rough)))
+    return joined(parts)
 
 
-def _motionless(problem: Problem, arms: ArmArrays) -> Evaluation:
-    """Return an evaluation of arms in the first case of a task that is off each target by its distance beyond reach."""
-    scene = problem.scenes[0]
+def motionless(scene: Scene, arms: ArmArrays) -> Evaluation:
+    """Return an evaluation of arms that are off each target by its distance beyond their reach."""
     n, t = len(arms), len(scene.targets)
     strokes = np.where(arms.prismatic, np.maximum(np.abs(arms.lower), np.abs(arms.upper)), 0.0)
     reach = np.linalg.norm(arms.offset, axis=2).sum(axis=1) + strokes.sum(axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError
+from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import ArmArrays, carrying, stack_arms
 from armwright.kinematics.arms.forward import Frames, forward_kinematics
@@ -51,9 +51,6 @@ class Evaluation(Scene):
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
     cycle_paths: CyclePaths | None = None
     device: Device = "cpu"
-
-    def __post_init__(self) -> None:
-        """Check nothing: the scene was checked before the arms were evaluated in it."""
 
     def __len__(self) -> int:
         return len(self.q)
@@ -280,10 +277,16 @@ def evaluate(
         scene = task_scene(targets, *targets.cases[0])
         return evaluate_arrays(stack_arms([carrying_tool(arm, targets.tool) for arm in arms]), scene, device)
     positions = np.asarray(targets, dtype=np.float64)
-    if target_arrays is None:
-        target_arrays = position_targets(len(np.atleast_1d(positions)))
-    loads = np.asarray(0.0 if payload is None else payload)
-    scene = Scene(positions, loads, target_arrays, tuple(obstacles), plan, tuple(workspace))
+    if positions.ndim != 2 or positions.shape[1] != 3 or not len(positions) or not np.all(np.isfinite(positions)):
+        raise TaskError(f"targets: expected finite numbers of shape (T, 3), T >= 1, got shape {positions.shape}")
+    t = len(positions)
+    loads = np.asarray(0.0 if payload is None else payload, dtype=np.float64)
+    if loads.shape not in ((), (t,)) or not np.all((loads >= 0.0) & np.isfinite(loads)):
+        raise TaskError(f"payload: expected 1 or {t} values >= 0 kg, got {payload}")
+    arrays = position_targets(t) if target_arrays is None else target_arrays
+    if len(arrays) != t:
+        raise TaskError(f"target_arrays: expected {t} targets, got {len(arrays)}")
+    scene = Scene(positions, np.broadcast_to(loads, (t,)).copy(), arrays, tuple(obstacles), plan, tuple(workspace))
     return evaluate_arrays(stack_arms(arms), scene, device)
 
 

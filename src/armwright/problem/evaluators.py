@@ -10,23 +10,22 @@ A function with a third argument, `design`, also gets the parameters that do not
 
 import hashlib
 import importlib
-import importlib.abc
-import importlib.util
 import inspect
+import linecache
 import math
 import re
 import sys
 import sysconfig
-from collections.abc import Callable, Sequence
-from contextvars import Context, copy_context
+from collections.abc import Callable, Iterable, Sequence
+from contextvars import copy_context
 from dataclasses import dataclass, field, replace
+from importlib.util import decode_source
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
@@ -60,8 +59,6 @@ class Evaluator:
     place: str = field(default="", compare=False)  # the argument of `load_evaluator`
     # Content of the file. A pickle holds it, so that other processes need no copy
     source: bytes = field(default=b"", compare=False, repr=False)
-    # The state that its file set when it was imported, such as `numpy.seterr`; applies to its calls only
-    context: Context | None = field(default=None, compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle a file by its source, a module's evaluator by name, and any other by value."""
@@ -93,10 +90,11 @@ class Evaluator:
     def attempt(self, arm: Arm, task: Task, design: Design | None = None) -> Measurement:
         """Return the objectives of an arm, or why there are none; the arguments are those of a call."""
         given: dict[str, Any] = {DESIGN: design} if self.takes_design else {}
-        context = copy_context() if self.context is None else self.context.copy()
         try:
             with contained():
-                return self._measurement(context.run(cast("Callable[..., object]", self.measure), arm, task, **given))
+                return self._measurement(
+                    copy_context().run(cast("Callable[..., object]", self.measure), arm, task, **given)
+                )
         except KeyboardInterrupt:
             raise
         except ForkError as fault:
@@ -108,8 +106,9 @@ class Evaluator:
     def _measurement(self, made: object) -> Measurement:
         """Check what the function returned."""
         names = [objective.name for objective in self.objectives]
-        values = _numbers(made)
-        if len(values) != len(names):
+        several = list(cast("Iterable[object]", made)) if isinstance(made, (tuple, list, np.ndarray)) else [made]
+        values = tuple(float(one) for one in several if isinstance(one, Real))
+        if not len(values) == len(several) == len(names):
             return self._wrong_result(f"expected {len(names)} numbers ({', '.join(names)}), got {made!r:.80}")
         for name, value in zip(names, values, strict=True):
             if not abs(value) <= LARGEST_OBJECTIVE:
@@ -170,20 +169,20 @@ def load_evaluator(place: str) -> Evaluator:
         if not Path(where).is_file():
             raise SettingsError(f"cannot read {where}: there is no such file")
         return _from_source(place, Path(where).read_bytes())
-    module, context = _loaded(_module, where)
+    module = _loaded(lambda: importlib.import_module(where), where)
     found = _found(module, where, function)
     file = getattr(module, "__file__", None)
     version = "" if file is None else _version(Path(file).read_bytes())
-    return replace(found, name=f"{where}:{function}", version=version, place=place, context=context)
+    return replace(found, name=f"{where}:{function}", version=version, place=place)
 
 
 def _from_source(place: str, source: bytes) -> Evaluator:
     """Load the evaluator of `file.py:function`, whether or not the file is here."""
     where, _, function = place.rpartition(":")
-    module, context = _loaded(_file_module, Path(where), source)
+    module = _loaded(lambda: _run_file(Path(where), source), where)
     found = _found(module, where, function)
     name = f"{Path(where).name}:{function}"
-    return replace(found, name=name, version=_version(source), place=place, source=source, context=context)
+    return replace(found, name=name, version=_version(source), place=place, source=source)
 
 
 def _version(source: bytes) -> str:
@@ -204,22 +203,6 @@ def _found(module: ModuleType, where: str, function: str) -> Evaluator:
     raise SettingsError(f"{where} has no evaluator {function}.{did_you_mean(function, there)} {known}")
 
 
-def _numbers(made: object) -> tuple[float, ...]:
-    """Return the numbers that a function returned; empty if it returned anything else."""
-    if isinstance(made, np.ndarray):
-        made = cast("NDArray[Any]", made).tolist()
-    several = list(cast("tuple[object, ...]", made)) if isinstance(made, (tuple, list)) else [made]
-    numbers = [_number(one) for one in several if isinstance(one, Real)]
-    return tuple(numbers) if len(numbers) == len(several) else ()
-
-
-def _number(one: Real) -> float:
-    try:
-        return float(one)
-    except OverflowError:
-        return math.inf
-
-
 def _objective(given: str, description: str, name: str) -> Objective:
     """Return the objective of a name with a unit; its value comes from the evaluator alone."""
     match = NAMED.fullmatch(given)
@@ -238,58 +221,38 @@ def _objective(given: str, description: str, name: str) -> Objective:
     return Objective(own, unit, description, each, over="arm")
 
 
-def _loaded(load: Callable[..., ModuleType], *arguments: object) -> tuple[ModuleType, Context]:
-    """Return a module of users, and the context that its code left behind."""
-    context = copy_context()
-    return context.run(load, *arguments), context
+def _loaded(load: Callable[[], ModuleType], where: str) -> ModuleType:
+    """Return a module of users, whose code changes nothing in this process, such as `numpy.seterr`.
 
-
-def _module(name: str) -> ModuleType:
+    Raises:
+        SettingsError: Its code raises, or is not there.
+    """
     try:
         with contained():
-            return importlib.import_module(name)
+            return copy_context().run(load)
     except KeyboardInterrupt:
         raise
     except BaseException as fault:
-        raise SettingsError(f"cannot import {name}: {describe_exception(fault)}") from fault
+        place = ""
+        if where.endswith(".py"):  # a decorator of ours raises SettingsError for an argument in the file
+            place = f" ({place_of(fault, where if isinstance(fault, SettingsError) else '')})"
+        reason = str(fault) if isinstance(fault, SettingsError) else describe_exception(fault)
+        raise SettingsError(f"cannot load {where}: {reason}{place}") from fault
 
 
-class _Source(importlib.abc.SourceLoader):
-    """Loads a module from source in memory; tracebacks show its lines where the file is missing."""
-
-    def __init__(self, path: Path, source: bytes) -> None:
-        self._path = path
-        self._source = source
-
-    def get_filename(self, fullname: str) -> str:
-        return str(self._path)
-
-    def get_data(self, path: str) -> bytes:
-        return self._source
-
-
-def _file_module(path: Path, source: bytes) -> ModuleType:
-    """Import a Python file as a module; it can import its neighbours, but they hide no module of Python's own."""
-    name = f"armwright_evaluator_{path.stem}"
+def _run_file(path: Path, source: bytes) -> ModuleType:
+    """Run a Python file as a module; it can import its neighbours, but they hide no module of Python's own."""
     folder = str(path.resolve().parent)
     if folder not in sys.path:
         own = Path(sysconfig.get_path("stdlib"))
         last = max((n for n, place in enumerate(sys.path) if Path(place) in (own, own / "lib-dynload")), default=-1)
         sys.path.insert(last + 1, folder)
-    spec = importlib.util.spec_from_loader(name, _Source(path, source))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # as pickle and dataclasses expect
-    try:
-        with contained():
-            spec.loader.exec_module(module)
-    except KeyboardInterrupt:
-        raise
-    except SettingsError as fault:  # raised by our decorator for an argument in the file
-        raise SettingsError(f"cannot load {path}: {fault} ({place_of(fault, str(path))})") from fault
-    except BaseException as fault:
-        raise SettingsError(f"cannot load {path}: {describe_exception(fault)} ({place_of(fault)})") from fault
+    name = f"armwright_evaluator_{path.stem}"
+    module = sys.modules[name] = ModuleType(name)  # as pickle and dataclasses expect
+    module.__file__ = str(path)
+    text = decode_source(source)
+    linecache.cache[str(path)] = len(text), None, text.splitlines(keepends=True), str(path)  # for tracebacks
+    exec(compile(text, path, "exec"), vars(module))
     return module
 
 

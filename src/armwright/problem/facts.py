@@ -15,7 +15,7 @@ from pydantic import ConfigDict, Field
 from armwright.arrays import LARGEST_OBJECTIVE, Array, finite_or_none
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import MASS, QUANTITIES
+from armwright.problem.objectives import QUANTITIES
 from armwright.problem.over_reach import ReachLine
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
@@ -90,7 +90,7 @@ def facts_of(
     return [
         {
             **{q.name: fact_of(q, finite_or_none(values[row]), reason) for q, values, reason in columns},
-            MASS.name: fact_of(MASS, arm.mass),  # which arrays have in the precision of the kernels
+            "mass": fact_of(QUANTITIES["mass"], arm.mass),  # which arrays have in the precision of the kernels
             VOLTAGE: _voltage(evaluation, row),
         }
         for row, arm in enumerate(arms)

@@ -4,20 +4,12 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import (
-    ORIENTATION_ERROR,
-    PATH_ANGLE,
-    PATH_ERROR,
-    POSITION_ERROR,
-    WORST_ANGLE,
-    WORST_ERROR,
-)
 from armwright.problem.problem import Problem
 from armwright.tasks.task import Task
 
-POSITIONS = (POSITION_ERROR.name, WORST_ERROR.name)
-ANGLES = (ORIENTATION_ERROR.name, WORST_ANGLE.name)
-LINES = (PATH_ERROR.name, PATH_ANGLE.name)
+POSITIONS = ("position_error", "worst_error")
+ANGLES = ("orientation_error", "worst_angle")
+LINES = ("path_error", "path_angle")
 
 
 def stated_tolerance(task: Task, objective: Objective) -> Array:
@@ -33,7 +25,7 @@ def stated_tolerance(task: Task, objective: Objective) -> Array:
         return arrays.stated_angle_tolerance
     if name in LINES and task.cycle is not None:
         along = task.cycle.tolerance
-        return np.array([(along.path if name == PATH_ERROR.name else along.angle) or 0.0])
+        return np.array([(along.path if name == "path_error" else along.angle) or 0.0])
     return np.empty(0)
 
 

@@ -135,3 +135,23 @@ class Objective:
     def is_of_targets(self) -> bool:
         """True if each target contributes to it."""
         return self.over != "arm"
+
+
+def quantity(
+    unit: str,
+    over: Over = "sum",
+    *,
+    needs: tuple[Need, ...] = (),
+    ratings: tuple[str, ...] = (),
+    symbol: str = "",
+    label: str = "",
+    excess: Callable[[Evaluation], Array] | None = None,
+) -> Callable[[Callable[[Evaluation], Array]], Objective]:
+    """Make an objective of the function of its values, with the name and the docstring of that function."""
+
+    def decorated(each: Callable[[Evaluation], Array]) -> Objective:
+        text = " ".join((each.__doc__ or "").split()).rstrip(".")
+        description = text[:1].lower() + text[1:]
+        return Objective(each.__name__, unit, description, each, over, label, symbol, excess, needs, ratings)
+
+    return decorated

@@ -1,7 +1,7 @@
 """The problem: a design space, a task, and the objectives to minimise."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,12 +17,7 @@ from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.evaluators import Evaluator, Measurement
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Need, Objective
-from armwright.problem.objectives import (
-    ORIENTATION_ERROR,
-    PAPER_OBJECTIVES,
-    QUANTITIES,
-    named_objectives,
-)
+from armwright.problem.objectives import PAPER_OBJECTIVES, QUANTITIES, named_objectives, orientation_error
 from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import stack_designs
@@ -76,12 +71,25 @@ class Outcomes:
         return penalised_objectives(self.values, self.violations)
 
 
-def worst_case(outcomes: Sequence[Outcomes]) -> Outcomes:
+def worst_case(outcomes: Iterable[Outcomes]) -> Outcomes:
     """Return the largest of each objective and violation, each by itself, of the same designs in several cases."""
-    if len(outcomes) == 1:
-        return outcomes[0]
-    values, violations = (np.max([getattr(o, name) for o in outcomes], axis=0) for name in ("values", "violations"))
-    return Outcomes(values, violations, postures=outcomes[0].postures, q=outcomes[0].q)
+    first, *others = outcomes
+    if not others:
+        return first
+    values, violations = (
+        np.max([getattr(o, name) for o in (first, *others)], axis=0) for name in ("values", "violations")
+    )
+    return Outcomes(values, violations, postures=first.postures, q=first.q)
+
+
+def joined(parts: Sequence[Outcomes]) -> Outcomes:
+    """Return the outcomes of all designs of several parts, in their order; at least one part."""
+
+    def all_of(name: str) -> Any:
+        arrays = [getattr(part, name) for part in parts]
+        return None if arrays[0] is None else np.concatenate(arrays)
+
+    return Outcomes(all_of("values"), all_of("violations"), postures=all_of("postures"), q=all_of("q"))
 
 
 @dataclass(frozen=True)
@@ -141,8 +149,7 @@ class Problem:
                 )
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
-        self._check_reference_point()
-        self._check_resolution()
+        self._check_task()
 
     @property
     def has_drives(self) -> bool:
@@ -155,18 +162,16 @@ class Problem:
             return named_objectives(self.task.objectives)
         if self.evaluator is not None:
             return self.evaluator.objectives
-        return (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.target_arrays.oriented else PAPER_OBJECTIVES
+        return (*PAPER_OBJECTIVES, orientation_error) if self.task.target_arrays.oriented else PAPER_OBJECTIVES
 
-    def _check_reference_point(self) -> None:
+    def _check_task(self) -> None:
+        """Raise TaskError if what the task states of its objectives is for other ones."""
         point, names = self.reference_point, [objective.name for objective in self.objectives]
         if point is not None and len(point) != len(names):
             raise TaskError(
                 f"task {self.task.name}: reference_point: expected {len(names)} values ({', '.join(names)}), got "
                 f"{len(point)}; without reference_point the search finds one"
             )
-
-    def _check_resolution(self) -> None:
-        names = [objective.name for objective in self.objectives]
         for name, _ in self.task.resolution:
             if name not in names:
                 raise TaskError(
@@ -229,18 +234,30 @@ class Problem:
         """
         is_matrix = isinstance(designs, np.ndarray)
         matrix = self.space.normalised(designs) if is_matrix else self.space.matrix(designs)
-        if self.evaluator is None:
-            return self._evaluate(matrix, NO_MEASUREMENTS)
-        if measurements is None:
-            measurements = [self.measure(design) for design in (self.space.designs(matrix) if is_matrix else designs)]
-        failures = {row: one for row, one in enumerate(measurements) if isinstance(one, Failure)}
-        names = [objective.name for objective in self.evaluator.objectives]
-        nothing = (0.0,) * len(names)  # of failed ones
-        table = [nothing if isinstance(one, Failure) else one for one in measurements]
-        columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
-        found = self._evaluate(matrix, dict(zip(names, columns, strict=True)))
+        measured: dict[str, Array] = {}
+        failures: dict[int, Failure] = {}
+        if self.evaluator is not None:
+            if measurements is None:
+                measurements = [
+                    self.measure(design) for design in (self.space.designs(matrix) if is_matrix else designs)
+                ]
+            failures = {row: one for row, one in enumerate(measurements) if isinstance(one, Failure)}
+            names = [objective.name for objective in self.evaluator.objectives]
+            nothing = (0.0,) * len(names)  # of failed ones
+            table = [nothing if isinstance(one, Failure) else one for one in measurements]
+            columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
+            measured = dict(zip(names, columns, strict=True))
+        parts = [  # with only the postures of one chunk in memory at a time
+            worst_case(
+                self.outcomes(evaluation, {name: column[rows] for name, column in measured.items()})
+                for evaluation in self._variants(matrix[rows])
+            )
+            for rows in self.chunks(len(matrix))
+        ]
+        nobody = Outcomes(np.empty((0, len(self.objectives))), np.empty((0, len(self.constraints))))
+        found = joined(parts) if parts else nobody
         found.values[list(failures)] = np.inf
-        return Outcomes(found.values, found.violations, failures, q=found.q)
+        return replace(found, failures=failures)
 
     def measure(self, design: Design) -> Measurement:
         """Return what the custom evaluator measures of a design, or why it fails."""
@@ -286,10 +303,6 @@ class Problem:
         for scene, postures in zip(scenes, near or [None] * len(scenes), strict=True):
             yield evaluate_arrays(arms, scene, self.device, initial_q=start, near=postures)
 
-    def worst(self, evaluations: Iterable[Evaluation], measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
-        """Return the worst outcomes of the same designs in several evaluations, of which one is in memory at a time."""
-        return worst_case([self.outcomes(evaluation, measured) for evaluation in evaluations])
-
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.
 
@@ -309,21 +322,6 @@ class Problem:
         """Return the (N, C) violations of evaluated arms; SettingsError if one is not a finite number."""
         violations = [constraint(evaluation) for constraint in self.constraints]
         return _finite(violations, [f'constraint "{c.description}"' for c in self.constraints], len(evaluation))
-
-    def _evaluate(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:
-        """Evaluate settled rows, with only the postures of one chunk in memory at a time."""
-        values = np.empty((len(matrix), len(self.objectives)))
-        violations = np.empty((len(matrix), len(self.constraints)))
-        postures: list[Array] = []
-        q: list[Array] = []
-        for rows in self.chunks(len(matrix)):
-            chunk = {name: column[rows] for name, column in measured.items()}
-            found = self.worst(self._variants(matrix[rows]), chunk)
-            values[rows], violations[rows] = found.values, found.violations
-            postures += [] if found.postures is None else [found.postures]
-            q += [] if found.q is None else [found.q]
-        of_cycle, of_targets = (np.concatenate(parts) if parts else None for parts in (postures, q))
-        return Outcomes(values, violations, postures=of_cycle, q=of_targets)
 
     def chunks(self, n: int) -> Iterator[slice]:
         """Yield the rows of n designs that are evaluated at once, so that their postures fit into memory."""

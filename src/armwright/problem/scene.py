@@ -3,11 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from armwright.arrays import Array
-from armwright.exceptions import TaskError, UnknownQuantityError
+from armwright.exceptions import UnknownQuantityError
 from armwright.tasks.motions import CyclePlan
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.payload import POINT_LOAD, LoadShape
@@ -45,15 +42,6 @@ class Scene:
     workspace: tuple[Region, ...] = ()  # boxes to cover
     load_shape: LoadShape = POINT_LOAD  # how the mass of the payload is distributed
 
-    def __post_init__(self) -> None:
-        """Check that the arrays are finite and belong to the same targets."""
-        targets = self.targets
-        if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
-            raise TaskError(f"targets: expected finite numbers of shape (T, 3), T >= 1, got shape {targets.shape}")
-        object.__setattr__(self, "payload", _payloads(self.payload, len(targets)))
-        if len(self.target_arrays) != len(targets):
-            raise TaskError(f"target_arrays: expected {len(targets)} targets, got {len(self.target_arrays)}")
-
     def require(self, need: str) -> None:
         """Raise UnknownQuantityError if the task lacks a cycle, a workspace, or one with directions."""
         directions = any(region.directions is not None for region in self.workspace)
@@ -67,11 +55,3 @@ def task_scene(task: Task, targets: Array, payloads: Array) -> Scene:
     plan = task.plan(targets) if task.cycle else None
     held = payloads if plan is None else payloads * plan.holds_payload(len(targets))
     return Scene(targets, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
-
-
-def _payloads(payload: ArrayLike, t: int) -> Array:
-    """Return the (T,) payloads [kg]."""
-    loads = np.asarray(payload, dtype=np.float64)
-    if loads.shape not in ((), (t,)) or not np.all((loads >= 0.0) & np.isfinite(loads)):
-        raise TaskError(f"payload: expected 1 or {t} values >= 0 kg, got {payload}")
-    return np.broadcast_to(loads, (t,)).copy()

@@ -3,15 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armwright.problem.objectives import (
-    ORIENTATION_ERROR,
-    POSITION_ERROR,
-    UNREACHED_TARGETS,
-    WORST_ANGLE,
-    WORST_ERROR,
-)
+from armwright.problem.objectives import orientation_error, position_error, unreached_targets, worst_angle, worst_error
 from armwright.problem.problem import Problem
 
+TOLERANCES = "tolerances"  # the reason of bounds that all targets must be reached within
 MARGIN = 1.1  # of a reference point over a bound, so that designs at the bound count
 
 
@@ -40,16 +35,16 @@ def stated_bounds(problem: Problem) -> tuple[StatedBound | None, ...]:
     for constraint in problem.constraints:
         if constraint.relation == "<=":
             bound(constraint.quantity.name, constraint.bound, constraint.description)
-            if constraint.quantity == UNREACHED_TARGETS and constraint.bound < 1.0:
-                bound(WORST_ERROR.name, targets.tolerance.max(), "tolerances")
-                bound(POSITION_ERROR.name, float(targets.weight @ targets.tolerance), "tolerances")
+            if constraint.quantity == unreached_targets and constraint.bound < 1.0:
+                bound(worst_error.name, targets.tolerance.max(), TOLERANCES)
+                bound(position_error.name, float(targets.weight @ targets.tolerance), TOLERANCES)
                 if oriented.any():
                     angles = targets.angle_tolerance[oriented]
-                    bound(WORST_ANGLE.name, angles.max(), "tolerances")
-                    bound(ORIENTATION_ERROR.name, float(targets.weight[oriented] @ angles), "tolerances")
+                    bound(worst_angle.name, angles.max(), TOLERANCES)
+                    bound(orientation_error.name, float(targets.weight[oriented] @ angles), TOLERANCES)
     for worst, total, weight in (
-        (WORST_ERROR, POSITION_ERROR, targets.weight.sum()),
-        (WORST_ANGLE, ORIENTATION_ERROR, targets.weight[oriented].sum()),
+        (worst_error, position_error, targets.weight.sum()),
+        (worst_angle, orientation_error, targets.weight[oriented].sum()),
     ):
         if worst.name in found:
             bound(total.name, float(weight * found[worst.name].value), found[worst.name].reason)

@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.problem.objectives import DEFLECTION, ORIENTATION_ERROR, POSITION_ERROR, PRICE, TORQUE
+from armwright.problem.objectives import deflection, orientation_error, position_error, price, torque
 from armwright.proof.perturbations import FACTORS, Survival, evaluate_survival
 from armwright.proof.ranking import knee_first
 from armwright.proof.simulated_run import Simulator
@@ -20,7 +20,7 @@ from armwright.runs.history import History
 from armwright.runs.trial import Count
 
 MAX_TRIED = 10  # designs for each role
-BY_DEFAULT = (POSITION_ERROR.name, ORIENTATION_ERROR.name, TORQUE.name)  # objectives of tasks that state none
+BY_DEFAULT = (position_error.name, orientation_error.name, torque.name)  # objectives of tasks that state none
 VERIFIED, NOT_SIMULATED = "verified", "not simulated"
 BY_EVALUATOR = f"{NOT_SIMULATED}: a custom evaluator measured it"
 OUT_OF_TIME = f"{NOT_SIMULATED}: the time is up"
@@ -72,9 +72,9 @@ def candidates(history: History) -> dict[str, list[int]]:
     columns = dict(zip(objectives, np.array([member.values for member in order]).T, strict=True))
     known = columns | _price_and_deflection(history, [member.number for member in order])
     roles = [objectives[0], objectives[-1]]
-    if {PRICE.name, DEFLECTION.name} <= set(known) and history.problem.task.cycle is not None:
+    if {price.name, deflection.name} <= set(known) and history.problem.task.cycle is not None:
         roles = [name for name in roles if name not in BY_DEFAULT]
-    roles += [quantity.name for quantity in (PRICE, DEFLECTION) if quantity.name in known]
+    roles += [quantity.name for quantity in (price, deflection) if quantity.name in known]
     return {
         "knee": [member.number for member in order],
         **{f"least {name}": [order[row].number for row in np.argsort(known[name], kind="stable")] for name in roles},
@@ -87,7 +87,7 @@ def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str,
         return {}
 
     first = history.evaluation(numbers[:1])
-    others = [quantity for quantity in (PRICE, DEFLECTION) if quantity not in history.problem.objectives]
+    others = [quantity for quantity in (price, deflection) if quantity not in history.problem.objectives]
     asked = [quantity for quantity in others if not quantity.known(first)[1]]
     evaluation = history.evaluation(numbers) if asked else first
     found = {quantity.name: quantity.known(evaluation) for quantity in asked}

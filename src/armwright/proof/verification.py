@@ -65,10 +65,10 @@ def verify(
     matrix = problem.space.matrix(designs)
     arms = problem.arms(matrix, "float64")
     evaluations = list(problem.cases(arms))
-    exact = problem.worst(evaluations)
+    exact = worst_case(map(problem.outcomes, evaluations))
     near = [evaluation.entry_postures for evaluation in evaluations]
     copies = (problem.arms(rows, "float64") for rows in perturbed(problem.space, matrix))
-    moved = worst_case([problem.worst(problem.cases(copy, near)) for copy in copies])
+    moved = worst_case(problem.outcomes(each) for copy in copies for each in problem.cases(copy, near))
     started = exact if _visits_all(problem) else _started(problem, arms)
     allowed = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
     built = worst_case([exact, moved])
@@ -93,4 +93,4 @@ def _started(problem: Problem, arms: ArmArrays) -> Outcomes:
     """Return the worst from other start postures."""
     shape = STARTS, len(problem.task.targets), arms.dof
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
-    return worst_case([problem.worst(problem.cases(arms, start=start)) for start in starts])
+    return worst_case(problem.outcomes(each) for start in starts for each in problem.cases(arms, start=start))

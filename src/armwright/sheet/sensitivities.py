@@ -12,7 +12,7 @@ from armwright.arrays import Array, finite_or_none
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, MASS, WORST_ERROR
+from armwright.problem.objectives import backlash_error, deflection, mass, worst_error
 from armwright.problem.problem import Problem
 from armwright.proof.perturbations import ROUNDING
 from armwright.sheet.record import Sensitivity
@@ -45,7 +45,7 @@ def _price(evaluation: Evaluation) -> Array:
     return (0.0 if drives is None else drives.price) + evaluation.arms.structure_price
 
 
-MEASURES: Sequence[Callable[[Evaluation], Array]] = (WORST_ERROR, DEFLECTION, BACKLASH_ERROR, MASS, _price)
+MEASURES: Sequence[Callable[[Evaluation], Array]] = (worst_error, deflection, backlash_error, mass, _price)
 
 
 def sensitivities(problem: Problem, design: Design) -> tuple[Sensitivity, ...]:

@@ -10,7 +10,7 @@ from armwright.existing.existing_arm import ExistingArm
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.assumptions import ALONG_CYCLE, describe_assumed
 from armwright.problem.facts import VOLTAGE, Fact, Facts, fact_of, reach_facts
-from armwright.problem.objectives import MASS, PRICE, QUANTITIES
+from armwright.problem.objectives import QUANTITIES
 from armwright.problem.over_reach import reach_lines
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import ActuatorRecord, named_actuator, value_of
@@ -209,9 +209,9 @@ def _facts(arm: Arm, existing: ExistingArm | None, price: float | None) -> Facts
     else:
         facts = {name: fact_of(quantity, None, NO_TASK) for name, quantity in QUANTITIES.items()}
         facts[VOLTAGE] = Fact("Supply voltage", "V", "The voltage of all actuators.", None, NO_TASK)
-        facts[PRICE.name] = fact_of(PRICE, price, "" if price is not None else NO_PRICE)
+        facts["price"] = fact_of(QUANTITIES["price"], price, "" if price is not None else NO_PRICE)
     mass = arm.mass or None
-    return facts | {MASS.name: fact_of(MASS, mass, "" if mass else "no link of the URDF states a mass")}
+    return facts | {"mass": fact_of(QUANTITIES["mass"], mass, "" if mass else "no link of the URDF states a mass")}
 
 
 def _assumptions(

@@ -5,7 +5,7 @@ joints, else 1; its link follows the last joint. The D = M K joint slots of stac
 arm has come first.
 """
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache
 from itertools import product
 from typing import Any
@@ -266,9 +266,21 @@ class _Parts:
         if i + 1 < self._columns.modules and self._rails[row, i + 1] > 0.0:
             u, v, w = np.broadcast_to(self._end_shift, self._offset.shape)[row, i].tolist()
             shift = (u, v, w)
-        mass, length, end_mass = (float(each[row, i]) for each in (self._mass, self._columns.links, self._end_mass))
-        between = int(self._has[row, i].sum()) - 1
-        return [tube.link(ORIGIN, 0.0, 0.0)] * between + [tube.link((x, y, z), mass, length, end_mass, shift)]
+        length = float(self._columns.links[row, i])
+        link = Link(
+            offset=(x, y, z),
+            mass=float(self._mass[row, i]),
+            com=(x / 2, y / 2, z / 2),
+            radius=tube.radius,
+            end_mass=float(self._end_mass[row, i]),
+            end_shift=shift,
+            bending_stiffness=tube.bending_stiffness,
+            torsional_stiffness=tube.torsional_stiffness,
+            wall=tube.wall,
+            price=tube.price_per_metre * length,
+        )
+        between = replace(link, offset=ORIGIN, mass=0.0, com=ORIGIN, end_mass=0.0, end_shift=ORIGIN, price=0.0)
+        return [between] * (int(self._has[row, i].sum()) - 1) + [link]
 
 
 @cache

@@ -3,19 +3,20 @@
 import keyword
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Literal, Self, cast
+from typing import Annotated, Any, Literal, Self, cast
 
-from pydantic import BaseModel, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
-from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter, ParameterValue, Range
+from armwright.spaces.field_types import Ordered
+from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter, ParameterValue
 from armwright.validation_messages import describe_fault
 
 MAX_CUSTOM = 30  # entries of a space file
 MAX_VALUE = 1e9  # of a bound
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 NUMBERED = re.compile(r"_\d+$")
-CHOICE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,39}")
-UNIT = re.compile(r"[^\[\]\s]([^\[\]\n\r\t]{0,18}[^\[\]\s])?")
+CHOICE = r"^[A-Za-z0-9][A-Za-z0-9._+-]{0,39}$"
+UNIT = r"^([^\[\]\s]([^\[\]\n\r\t]{0,18}[^\[\]\s])?)?$"
 
 # Built-in parameters alone and with a suffix, as in link_3; keys of an answer; columns of the tables of a run.
 PREFIXES = ("origin", "joint", "link", "direction", "tube", "motor", "stroke", "limit", "expected")
@@ -30,9 +31,9 @@ class CustomParameter(
 ):
     """A custom parameter: a range of numbers, or choices."""
 
-    range: Range | None = None
+    range: Ordered[float] | None = None
     """Smallest and largest value."""
-    choices: tuple[str, ...] = ()
+    choices: tuple[Annotated[str, Field(pattern=CHOICE)], ...] = ()
     """Names to choose from, instead of a range."""
     scale: Literal["linear", "log"] = "linear"
     """Scale on which values of the range are drawn; log for gains and other values that span decades."""
@@ -40,7 +41,7 @@ class CustomParameter(
     """Whether values are whole numbers."""
     per: Literal["joint"] | None = None
     """joint: one value for each joint module that moves, with the numbers of the modules added to the name."""
-    unit: str = ""
+    unit: str = Field(default="", pattern=UNIT)
     """Unit of the range."""
 
     @model_validator(mode="after")
@@ -55,24 +56,14 @@ class CustomParameter(
 
     def _check_range(self, low: float, high: float) -> None:
         shown = f"range = [{low:g}, {high:g}] {self.unit}".rstrip()
-        if low > high:
-            raise ValueError(f"{shown} is reversed: give the smaller number first")
         if max(abs(low), abs(high)) > MAX_VALUE:
             raise ValueError(f"{shown}: expected values within ±{MAX_VALUE:g}; try another unit")
         if self.scale == "log" and low <= 0.0:
             raise ValueError(f"{shown}: expected values above 0 with scale: log; try scale: linear")
         if self.integer and not (low.is_integer() and high.is_integer()):
             raise ValueError(f"{shown}: expected whole numbers with integer: true; try [{round(low)}, {round(high)}]")
-        if self.unit and not UNIT.fullmatch(self.unit):
-            raise ValueError(f"unit: expected at most 20 characters without brackets, got {self.unit!r:.40}; try N m")
 
     def _check_choices(self) -> None:
-        for choice in self.choices:
-            if not CHOICE.fullmatch(choice):
-                raise ValueError(
-                    f"choices: expected at most 40 letters, digits, dots, signs and _, got {choice!r:.50}; try "
-                    "[gt2, htd3]"
-                )
         if len({choice.lower() for choice in self.choices}) != len(self.choices):
             raise ValueError(f"choices: expected different names, got {', '.join(self.choices)}")
         if self.scale != "linear" or self.integer or self.unit:

@@ -5,10 +5,9 @@ parameter: a roll joint has no stroke.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import cast
 
 from armwright.exceptions import did_you_mean
 from armwright.spaces.joint_modules import MODULES
@@ -66,84 +65,65 @@ def conditional_parameters(space: SpaceSchema) -> dict[str, ConditionalParameter
     return entries
 
 
-def _unrestricted(space: SpaceSchema) -> tuple[ConditionalParameter, ...]:
-    """Return the parameters without restrictions and grids."""
-    revolute = tuple(letter for letter, module in MODULES.items() if module.is_revolute)
-    prismatic = tuple(letter for letter, module in MODULES.items() if module.is_prismatic)
-    entries = [*_arm_parameters(space), *_per_module(space, "joint", space.joint_types)]
-    entries += _per_module(space, "link", space.link, "m")
+def _unrestricted(space: SpaceSchema) -> Iterator[ConditionalParameter]:
+    """Yield the parameters without restrictions and grids."""
+    revolute = frozenset(letter for letter, module in MODULES.items() if module.is_revolute)
+    prismatic = frozenset(letter for letter, module in MODULES.items() if module.is_prismatic)
+    moving = revolute | prismatic
+    for axis, limits in zip("xyz", (space.origin_x, space.origin_y, space.origin_z), strict=True):
+        yield ConditionalParameter(FloatParameter(f"origin_{axis}", *limits, "m"))
+    counts = tuple(str(n) for n in range(space.min_joints, space.max_joints + 1))
+    for name, choices in (("mount", space.mount), ("n_joints", counts)):
+        if len(choices) > 1:
+            yield ConditionalParameter(CategoricalParameter(name, choices))
+    yield from _per_module(space, "joint", _choice(space.joint_types))
+    yield from _per_module(space, "link", _between(space.link, "m"))
     if len(space.link_directions) > 1:
-        entries += _per_module(space, "direction", space.link_directions)
+        yield from _per_module(space, "direction", _choice(space.link_directions))
     if len(space.tube_names) > 1 and space.link_section.per_link:
-        entries += _per_module(space, "tube", space.tube_names)
+        yield from _per_module(space, "tube", _choice(space.tube_names))
     elif len(space.tube_names) > 1:
-        entries.append(ConditionalParameter(CategoricalParameter("tube", space.tube_names)))
+        yield ConditionalParameter(CategoricalParameter("tube", space.tube_names))
     if len(space.actuators) > 1:
-        names = tuple(record.name for record in space.actuators)
-        entries += _per_module(space, "motor", names, types=revolute + prismatic)
+        yield from _per_module(space, "motor", _choice(tuple(record.name for record in space.actuators)), moving)
     if not isinstance(space.stroke, (int, float)):
-        entries += _per_module(space, "stroke", space.stroke, "m", prismatic)
+        yield from _per_module(space, "stroke", _between(space.stroke, "m"), prismatic)
     if space.limit is not None:
-        entries += _per_module(space, "limit", space.limit, "rad", revolute)
-    return (*entries, *_custom_parameters(space, revolute + prismatic))
-
-
-def _custom_parameters(space: SpaceSchema, moving: tuple[str, ...]) -> Iterator[ConditionalParameter]:
-    """Yield the custom parameters; those per joint for each module of a type that moves."""
-    types = () if set(space.joint_types) <= set(moving) else moving
+        yield from _per_module(space, "limit", _between(space.limit, "rad"), revolute)
     for name, custom in space.custom:
         if custom.per is None:
             yield ConditionalParameter(custom.parameter(name))
         else:
-            for j, always, used in _modules(space, types):
-                yield ConditionalParameter(custom.parameter(f"{name}_{j}"), None if always else j, used)
-
-
-def _arm_parameters(space: SpaceSchema) -> Iterator[ConditionalParameter]:
-    """Yield the parameters of the whole arm: base position, mount and number of modules."""
-    for axis, (low, high) in zip("xyz", (space.origin_x, space.origin_y, space.origin_z), strict=True):
-        yield ConditionalParameter(FloatParameter(f"origin_{axis}", low, high, "m"))
-    if len(space.mount) > 1:
-        yield ConditionalParameter(CategoricalParameter("mount", space.mount))
-    if space.min_joints < space.max_joints:
-        counts = tuple(str(n) for n in range(space.min_joints, space.max_joints + 1))
-        yield ConditionalParameter(CategoricalParameter("n_joints", counts))
+            yield from _per_module(
+                space, name, custom.parameter, None if moving.issuperset(space.joint_types) else moving
+            )
 
 
 def _per_module(
-    space: SpaceSchema,
-    kind: str,
-    values: tuple[str, ...] | Range,
-    unit: str = "",
-    types: tuple[str, ...] = (),
+    space: SpaceSchema, kind: str, make: Callable[[str], Parameter], types: frozenset[str] | None = None
 ) -> Iterator[ConditionalParameter]:
-    """Yield one parameter for each module.
+    """Yield one parameter for each module, unless no module may have it.
 
     Args:
         space: The design space.
         kind: The name of the parameters, without the number of the module.
-        values: The range, or the choices if there is no unit.
-        unit: The unit of a real parameter.
-        types: The module types for which the parameters are active; empty for all.
+        make: Returns the parameter of a name.
+        types: The module types for which the parameters are active; None for all.
     """
-    for j, always, used in _modules(space, types):
-        if unit:
-            parameter = FloatParameter(f"{kind}_{j}", float(values[0]), float(values[1]), unit)
-        else:
-            parameter = CategoricalParameter(f"{kind}_{j}", cast("tuple[str, ...]", values))
-        yield ConditionalParameter(parameter, None if always else j, used)
-
-
-def _modules(space: SpaceSchema, types: tuple[str, ...]) -> Iterator[tuple[int, bool, frozenset[str] | None]]:
-    """Yield each module, counted from 1, for which a parameter may be active.
-
-    With it: whether the parameter is always active there, and the types for which it is; None for all.
-    """
-    used = frozenset(letter for letter in space.joint_types if letter in types) if types else None
+    used = None if types is None else types & set(space.joint_types)
     if used is not None and not used:
         return
     for j in range(1, space.max_joints + 1):
-        yield j, j <= space.min_joints and (used is None or len(used) == len(space.joint_types)), used
+        is_always_active = j <= space.min_joints and (used is None or len(used) == len(space.joint_types))
+        yield ConditionalParameter(make(f"{kind}_{j}"), None if is_always_active else j, used)
+
+
+def _choice(choices: tuple[str, ...]) -> Callable[[str], Parameter]:
+    return lambda name: CategoricalParameter(name, choices)
+
+
+def _between(limits: Range, unit: str) -> Callable[[str], Parameter]:
+    return lambda name: FloatParameter(name, *limits, unit)
 
 
 def _kind(name: str) -> str:
@@ -190,26 +170,22 @@ def _on_grid(parameter: FloatParameter, step: float) -> FloatParameter:
 
 def check_parameters(space: SpaceSchema) -> None:
     """Raise ValueError for restrictions, grids and ties that do not fit the parameters."""
-    names = [entry.name for entry in _unrestricted(space)]
-    real = [entry.name for entry in _unrestricted(space) if isinstance(entry.parameter, FloatParameter)]
-    _check_known("restrict", [name for name, _ in space.restrict], names)
+    known = {entry.name: entry.parameter for entry in _unrestricted(space)}
+    real = [parameter for parameter in known.values() if isinstance(parameter, FloatParameter)]
     kinds = [*GRID_KINDS, *(name for name, custom in space.custom if custom.per is not None)]
-    _check_known("grid", [name for name, _ in space.grid], [*kinds, *real])
-    _check_known("tie", [name for pair in space.tie for name in pair], names)
+    _check_known("restrict", [name for name, _ in space.restrict], list(known))
+    _check_known("grid", [name for name, _ in space.grid], [*kinds, *(parameter.name for parameter in real)])
+    _check_known("tie", [name for pair in space.tie for name in pair], list(known))
     for name, step in space.grid:
         if not GRID_ERROR < step <= MAX_LENGTH:
             raise ValueError(f"grid: {name} = {step:g}: expected a step above 0")
-        for entry in _unrestricted(space):
-            if name in (entry.name, _kind(entry.name)) and isinstance(entry.parameter, FloatParameter):
-                _check_step(entry.parameter, step)
+        for parameter in real:
+            if name in (parameter.name, _kind(parameter.name)):
+                if parameter.log:
+                    raise ValueError(f"grid: {parameter.name}: expected a parameter on a linear scale, got scale: log")
+                if parameter.integer and not step.is_integer():
+                    raise ValueError(f"grid: {parameter.name} = {step:g}: expected a whole number, as its values are")
     _check_ties(space)
-
-
-def _check_step(parameter: FloatParameter, step: float) -> None:
-    if parameter.log:
-        raise ValueError(f"grid: {parameter.name}: expected a parameter on a linear scale, got scale: log")
-    if parameter.integer and not step.is_integer():
-        raise ValueError(f"grid: {parameter.name} = {step:g}: expected a whole number, as its values are")
 
 
 def _check_known(key: str, names: Iterable[str], known: Sequence[str]) -> None:

@@ -19,7 +19,8 @@ from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import build_arm
 from armwright.spaces.custom_parameters import NUMBERED
 from armwright.spaces.design_parameters import ConditionalParameter, check_parameters, conditional_parameters
-from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, ParameterValue
+from armwright.spaces.joint_modules import MODULES
+from armwright.spaces.parameters import CategoricalParameter, Design, FloatParameter, Parameter, ParameterValue
 from armwright.spaces.space_schema import SpaceSchema
 from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.yaml_documents import check_document, parse_document, read_document
@@ -46,6 +47,20 @@ class DesignSpace(SpaceSchema, frozen=True):
         return tuple(entry.parameter for entry in conditional_parameters(self).values())
 
     @property
+    def max_reach(self) -> float:
+        """The length of the longest possible arm without a tool, with all slides extended [m]."""
+        known = {parameter.name: parameter for parameter in self.parameters}
+        reach = 0.0
+        for module in range(1, self.max_joints + 1):
+            link, joint, stroke = (known.get(f"{kind}_{module}") for kind in ("link", "joint", "stroke"))
+            assert isinstance(link, FloatParameter)
+            assert isinstance(joint, CategoricalParameter)
+            may_slide = any(MODULES[letter].is_prismatic for letter in joint.choices)  # pyright: ignore[reportArgumentType]
+            longest = stroke.high if isinstance(stroke, FloatParameter) else self.min_stroke
+            reach += link.high + (longest if may_slide else 0.0)
+        return reach
+
+    @property
     def custom_names(self) -> frozenset[str]:
         """The names of the custom parameters, which do not change the arm."""
         custom = dict(self.custom)
@@ -54,12 +69,10 @@ class DesignSpace(SpaceSchema, frozen=True):
 
     def with_custom(self, design: Design, like: Design | None = None) -> Design:
         """Return a design with the custom parameters of another one, or with their defaults."""
-        own = self.custom_names
-        if not own:
-            return design
         source: Mapping[str, ParameterValue] = {} if like is None else like.params
-        defaults: dict[str, ParameterValue] = {p.name: p.default for p in self.parameters if p.name in own}
-        return Design({name: source.get(name, defaults.get(name, value)) for name, value in design.params.items()})
+        names = self.custom_names & design.params.keys()
+        custom = {p.name: source.get(p.name, p.default) for p in self.parameters if p.name in names}
+        return Design({**design.params, **custom})
 
     def is_free(self, name: str, params: Mapping[str, ParameterValue]) -> bool:
         """Return whether a parameter is active and not tied, given the values of the parameters before it."""

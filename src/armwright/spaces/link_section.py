@@ -6,7 +6,6 @@ from typing import Any
 
 from pydantic import BaseModel, Field, field_validator
 
-from armwright.robot.arm import Link, Vector
 from armwright.robot.tubes import Material, Tube, check_tube, resolve_material
 
 MAX_TUBES = 20
@@ -23,24 +22,6 @@ class LinkTube:
     bending_stiffness: float | None = None  # EI [N m²]; None without a material
     torsional_stiffness: float | None = None  # GJ [N m²]; None without a material
     price_per_metre: float = 0.0  # [USD/m]
-
-    def link(
-        self, offset: Vector, mass: float, length: float, end_mass: float = 0.0, end_shift: Vector = (0.0, 0.0, 0.0)
-    ) -> Link:
-        """Return a link of this tube, with its centre of mass halfway along `offset` [m]."""
-        x, y, z = offset
-        return Link(
-            offset,
-            mass,
-            (x / 2, y / 2, z / 2),
-            self.radius,
-            end_mass,
-            end_shift,
-            bending_stiffness=self.bending_stiffness,
-            torsional_stiffness=self.torsional_stiffness,
-            wall=self.wall,
-            price=self.price_per_metre * length,
-        )
 
 
 class LinkSection(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):

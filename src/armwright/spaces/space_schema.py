@@ -2,15 +2,23 @@
 
 import math
 from functools import lru_cache
-from typing import Any, Self, cast
+from typing import Annotated, Any, Self, cast
 
 import numpy as np
-from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    Field,
+    field_serializer,
+    field_validator,
+    model_validator,
+)  # fmt: skip
 
 from armwright.robot.actuators import DIMENSIONS, ActuatorRecord, resolve_actuator, value_of
 from armwright.robot.arm import Actuator
 from armwright.spaces.column import ColumnKeys
 from armwright.spaces.custom_parameters import MAX_CUSTOM, CustomParameter, check_names, read_custom
+from armwright.spaces.field_types import Choices, Ordered, Pairs
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
 from armwright.spaces.link_mass import Length, MassModel, MassPerMetre
 from armwright.spaces.link_section import LinkSection
@@ -24,6 +32,31 @@ MAX_LENGTH = 1000.0  # [m]; beyond it float32 kernels lose the millimetre
 MAX_ANGLE = 2 * math.pi  # [rad]
 MIN_JOINT_RANGE = math.radians(3.0)  # [rad]
 MIN_STROKE = 3e-3  # [m]
+
+Count = Annotated[int, Field(ge=1, le=MAX_MODULES)]
+Coordinate = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]  # [m]
+LinkLength = Annotated[float, Field(gt=0.0, le=MAX_LENGTH)]  # [m]
+Stroke = Annotated[float, Field(ge=MIN_STROKE, le=MAX_LENGTH)]  # [m]
+Limit = Annotated[float, Field(ge=MIN_JOINT_RANGE / 2, le=MAX_ANGLE)]  # [rad]
+
+
+def _check_joint_range(value: Range) -> Range:
+    low, high = value
+    if high - low < MIN_JOINT_RANGE:
+        raise ValueError(f"[{low:g}, {high:g}] rad is narrower than 3 degrees")
+    if max(-low, high) > MAX_ANGLE:
+        raise ValueError(
+            f"[{low:g}, {high:g}] rad exceeds ±2π; angles are in radians: write {math.radians(high):.4f} for {high:g}°"
+        )
+    if not low <= 0.0 <= high:
+        raise ValueError(f"[{low:g}, {high:g}] rad must contain 0, where the inverse kinematics starts")
+    return value
+
+
+def _check_types(types: tuple[JointType, ...]) -> tuple[JointType, ...]:
+    if not any(MODULES[letter].is_actuated for letter in types):
+        raise ValueError(f"expected at least one type that moves, got {', '.join(types)}")
+    return types
 
 
 class SpaceSchema(
@@ -40,33 +73,33 @@ class SpaceSchema(
 
     name: str = Field(default="paper", min_length=1, max_length=100)
     """Label for tables."""
-    joints: int | tuple[int, int] = 4
+    joints: Count | Ordered[Count] = 4
     """Number of joint modules, or the smallest and the largest number. A pair adds the parameter n_joints."""
-    joint_types: tuple[JointType, ...] = Field(default=("R", "P", "Y"), min_length=1)
+    joint_types: Annotated[Choices[JointType], AfterValidator(_check_types)] = ("R", "P", "Y")
     """Joint modules to choose from, by letter."""
-    joint_range: Range = (-2.4, 2.4)
+    joint_range: Annotated[Range, AfterValidator(_check_joint_range)] = (-2.4, 2.4)
     """Range of every revolute joint [rad]."""
-    limit: Range | None = None
+    limit: Ordered[Limit] | None = None
     """Range of the parameters limit_j [rad]: revolute joint j then moves within ±limit_j."""
-    stroke: float | Range = 0.3
+    stroke: Stroke | Ordered[Stroke] = 0.3
     """Stroke of every prismatic joint [m]; a range adds the parameters stroke_j. A rail weighs as much as a link."""
     travel: float = Field(default=0.01, gt=0.0, le=10.0)
     """Travel of a prismatic joint per radian of its actuator [m/rad]."""
-    origin_x: Range = (-1.0, 1.0)
+    origin_x: Ordered[Coordinate] = (-1.0, 1.0)
     """Range of the base position along x [m]."""
-    origin_y: Range = (-1.0, 1.0)
+    origin_y: Ordered[Coordinate] = (-1.0, 1.0)
     """Range of the base position along y [m]."""
-    origin_z: Range = (-1.0, 1.0)
+    origin_z: Ordered[Coordinate] = (-1.0, 1.0)
     """Range of the base position along z [m]."""
-    mount: tuple[Mount, ...] = Field(default=("floor",), min_length=1)
+    mount: Choices[Mount] = ("floor",)
     """Surface that the arm is mounted on; several choices add the parameter mount."""
     column: ColumnKeys | None = None
     """Tube on which a floor-mounted base stands; {} for the default one."""
     base_on: str = Field(default="", max_length=40)
     """Obstacle of the task on whose top face a floor-mounted base stands."""
-    link: Range = (0.03, 0.30)
+    link: Ordered[LinkLength] = (0.03, 0.30)
     """Range of the length of each link [m]."""
-    link_directions: tuple[Direction, ...] = Field(default=("+z",), min_length=1)
+    link_directions: Choices[Direction] = ("+z",)
     """Direction of a link in the frame of its joint; several choices add the parameters direction_j."""
     link_section: LinkSection = LinkSection()
     """Tubes and material of the links; several tubes add the parameters tube_j, or the parameter tube."""
@@ -80,11 +113,11 @@ class SpaceSchema(
     """Whether the actuators, if there are any, are solid bodies, which count in collisions."""
     bracket_mass: float = Field(default=0.0, ge=0.0, le=1e4)
     """Mass of brackets and screws at each joint that moves, where its actuator is [kg]."""
-    restrict: tuple[tuple[str, Restriction], ...] = Field(default=(), max_length=100)
+    restrict: Pairs[Restriction] = ()
     """Single parameters, fixed (joint_1: Y) or narrowed (joint_2: [P, R], link_1: [0.1, 0.2])."""
-    grid: tuple[tuple[str, float], ...] = Field(default=(), max_length=100)
+    grid: Pairs[float] = ()
     """Step size of a real parameter (link_1: 0.01) or of all of a kind (link: 0.005)."""
-    tie: tuple[tuple[str, str], ...] = Field(default=(), max_length=100)
+    tie: Pairs[str] = ()
     """Parameters that always equal another one (link_3: link_2)."""
     custom: tuple[tuple[str, CustomParameter], ...] = Field(default=(), max_length=MAX_CUSTOM, alias="parameters")
     """Custom parameters by name, which do not change the arm: an evaluator reads them."""
@@ -98,20 +131,6 @@ class SpaceSchema(
     def _custom_to_mapping(self, value: tuple[tuple[str, CustomParameter], ...]) -> dict[str, Any]:
         return {name: entry.model_dump(mode="json", exclude_defaults=True) for name, entry in value}
 
-    @field_validator("restrict", "grid", "tie", mode="before")
-    @classmethod
-    def _mapping_to_pairs(cls, value: Any) -> Any:
-        return tuple(cast("dict[str, Any]", value).items()) if isinstance(value, dict) else value
-
-    @field_serializer("restrict", "grid", "tie")
-    def _pairs_to_mapping(self, value: tuple[tuple[str, Any], ...]) -> dict[str, Any]:
-        return dict(value)
-
-    @field_validator("joint_types", "mount", "link_directions", mode="before")
-    @classmethod
-    def _one_to_list(cls, value: Any) -> Any:
-        return (value,) if isinstance(value, str) else value
-
     @field_validator("actuators", mode="before")
     @classmethod
     def _look_up_actuators(cls, value: Any) -> Any:
@@ -119,23 +138,24 @@ class SpaceSchema(
             raise ValueError("expected a list of names, or of records with name, mass and stall_torque")
         return [resolve_actuator(entry) for entry in cast("list[Any]", value)]
 
-    @field_validator("mass", mode="before")
-    @classmethod
-    def _require_kind(cls, value: Any) -> Any:
-        if isinstance(value, dict) and "kind" not in cast("dict[str, Any]", value):
-            raise ValueError("kind is missing: expected per_metre or per_link")
-        return cast("Any", value)
-
     @model_validator(mode="after")
     def _check_values(self) -> Self:
-        _check_modules(self)
-        _check_ranges(self)
-        _check_joint_ranges(self)
-        _check_duplicates(self)
-        _check_motor_bodies(self)
-        _check_mass(self)
-        _check_support(self)
         check_names(name for name, _ in self.custom)
+        if self.mass is not None and self.link_section.material is not None:
+            raise ValueError(
+                "mass: expected no value beside link_section.material, which implies the mass of the links; remove one "
+                "of the two"
+            )
+        for key, stated in (("column", self.column is not None), ("base_on", bool(self.base_on))):
+            if stated and self.mount != ("floor",):
+                raise ValueError(
+                    f"{key}: expected mount: floor, got {', '.join(self.mount)}; remove {key} or the mounts"
+                )
+        names = [record.name for record in self.actuators]
+        if len(set(names)) < len(names):
+            raise ValueError(f"actuators: expected different ones, got {', '.join(names)}")
+        if self.has_motor_bodies:
+            _check_motor_bodies(self)
         return self
 
     @property
@@ -204,13 +224,6 @@ class SpaceSchema(
         """Return the surface that the arm of a design is mounted on."""
         return cast("Mount", design.mount or self.mount[0])
 
-    @property
-    def max_reach(self) -> float:
-        """The length of the longest possible arm without a tool, with all slides extended [m]."""
-        has_slides = any(MODULES[letter].is_prismatic for letter in self.joint_types)
-        stroke = self.stroke if isinstance(self.stroke, (int, float)) else self.stroke[1]
-        return self.max_joints * (self.link[1] + (stroke if has_slides else 0.0))
-
 
 @lru_cache(maxsize=64)
 def _arm_actuators(space: SpaceSchema) -> tuple[Actuator, ...]:
@@ -223,77 +236,7 @@ def _tube_values(section: LinkSection, name: str) -> Any:
     return np.array([math.nan if value is None else value for value in values])
 
 
-def _check_mass(space: SpaceSchema) -> None:
-    if space.mass is not None and space.link_section.material is not None:
-        raise ValueError(
-            "mass: expected no value beside link_section.material, which implies the mass of the links; remove one of "
-            "the two"
-        )
-
-
-def _check_support(space: SpaceSchema) -> None:
-    keys = {"column": space.column is not None, "base_on": bool(space.base_on)}
-    for key, stated in keys.items():
-        if stated and space.mount != ("floor",):
-            raise ValueError(f"{key}: expected mount: floor, got {', '.join(space.mount)}; remove {key} or the mounts")
-
-
-def _check_modules(space: SpaceSchema) -> None:
-    low, high = space.min_joints, space.max_joints
-    if not 1 <= low <= high <= MAX_MODULES:
-        raise ValueError(
-            f"joints = {space.joints}: expected a number from 1 to {MAX_MODULES}, or the smallest and the largest one"
-        )
-    if not any(MODULES[letter].is_actuated for letter in space.joint_types):
-        raise ValueError(f"joint_types = {', '.join(space.joint_types)}: at least one type must move")
-
-
-def _check_ranges(space: SpaceSchema) -> None:
-    units = {"origin_x": "m", "origin_y": "m", "origin_z": "m", "link": "m", "joint_range": "rad"}
-    units |= {} if isinstance(space.stroke, (int, float)) else {"stroke": "m"}
-    units |= {} if space.limit is None else {"limit": "rad"}
-    for name, unit in units.items():
-        low, high = getattr(space, name)
-        if low > high:
-            raise ValueError(f"{name} = [{low:g}, {high:g}] {unit} is reversed: give the smaller number first")
-        if max(abs(low), abs(high)) > MAX_LENGTH:
-            raise ValueError(f"{name} = [{low:g}, {high:g}] {unit} exceeds ±{MAX_LENGTH:g}")
-    if space.link[0] <= 0.0:
-        raise ValueError(f"link = [{space.link[0]:g}, {space.link[1]:g}] m: a link must be longer than 0 m")
-    if not MIN_STROKE <= space.min_stroke <= MAX_LENGTH:
-        raise ValueError(f"stroke = {space.min_stroke:g} m is outside {MIN_STROKE:g} <= stroke <= {MAX_LENGTH:g} m")
-
-
-def _check_joint_ranges(space: SpaceSchema) -> None:
-    low, high = space.joint_range
-    if high - low < MIN_JOINT_RANGE:
-        raise ValueError(f"joint_range = [{low:g}, {high:g}] rad is narrower than 3 degrees")
-    if max(-low, high) > MAX_ANGLE:
-        raise ValueError(
-            f"joint_range = [{low:g}, {high:g}] rad exceeds ±2π; angles are in radians: write "
-            f"{math.radians(high):.4f} for {high:g}°"
-        )
-    if not low <= 0.0 <= high:
-        raise ValueError(f"joint_range = [{low:g}, {high:g}] rad must contain 0, where the inverse kinematics starts")
-    if space.limit is not None and not MIN_JOINT_RANGE / 2 <= space.limit[0] <= space.limit[1] <= MAX_ANGLE:
-        raise ValueError(f"limit = {list(space.limit)} rad: expected values from 1.5 degrees to 2π")
-
-
-def _check_duplicates(space: SpaceSchema) -> None:
-    choices: dict[str, tuple[str, ...]] = {
-        "joint_types": space.joint_types,
-        "mount": space.mount,
-        "link_directions": space.link_directions,
-        "actuators": tuple(record.name for record in space.actuators),
-    }
-    for key, names in choices.items():
-        if len(set(names)) != len(names):
-            raise ValueError(f"{key} has duplicates: {', '.join(names)}")
-
-
 def _check_motor_bodies(space: SpaceSchema) -> None:
-    if not space.has_motor_bodies:
-        return
     shared = [letter for letter in space.joint_types if len(MODULES[letter].joints) > 1]
     if shared:
         raise ValueError(

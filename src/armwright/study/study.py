@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
-from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
+from armwright.problem.checks.requirements import refuse_unread_parameters
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.runs.folder import RunFolder

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Literal, Self, cast
 
-from pydantic import BaseModel, Field, StrictInt, StrictStr, field_validator, model_validator
+from pydantic import BaseModel, Field, StrictInt, StrictStr, model_validator
 
 from armwright.exceptions import did_you_mean
 from armwright.tasks.targets import MIN_TOLERANCE
@@ -64,20 +64,13 @@ class Cycle(Strict, frozen=True):
     the way back to it, and its `do` happens on arrival.
     """
 
-    steps: tuple[Step, ...] = Field(max_length=MAX_STEPS)
+    steps: tuple[Step, ...] = Field(min_length=2, max_length=MAX_STEPS)
     closed: bool = True  # return to the first target at the end
     time: Duration = FASTEST  # duration of each step that does not state its own [s], or fastest
     dwell: float = Field(default=0.0, ge=0.0, le=MAX_DURATION)  # time at rest after each pick and place [s]
     # Length of the lines before and after each pick and place, along the tool's z axis [m]
     approach: float | None = Field(default=None, gt=0.0, le=1000.0)
     tolerance: PathTolerance = PathTolerance()  # largest deviations along lines
-
-    @field_validator("steps")
-    @classmethod
-    def _check_steps(cls, steps: tuple[Step, ...]) -> tuple[Step, ...]:
-        if len(steps) < 2:
-            raise ValueError(f"a cycle needs at least two steps, got {len(steps)}")
-        return steps
 
     @model_validator(mode="after")
     def _check_actions(self) -> Self:

@@ -113,9 +113,8 @@ class CyclePlan:
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
         """The blocks in their order, beginning at `first_motion`; joint motions join them."""
-        n, blocks = len(self.motions), list[Block]()
-        entry, lines = self.motions[self.first_motion].start, list[int]()
-        for index in ((self.first_motion + i) % n for i in range(n)):
+        blocks, lines, entry = list[Block](), list[int](), self.motions[self.first_motion].start
+        for index in self._order:
             motion = self.motions[index]
             if motion.by == "line":
                 lines.append(index)
@@ -129,9 +128,13 @@ class CyclePlan:
     @cached_property
     def joint_motions(self) -> tuple[int, ...]:
         """Indices of the joint motions, each after the block of the same index."""
-        n = len(self.motions)
-        order = ((self.first_motion + i) % n for i in range(n))
-        return tuple(index for index in order if self.motions[index].by == "joint")
+        return tuple(index for index in self._order if self.motions[index].by == "joint")
+
+    @property
+    def _order(self) -> list[int]:
+        """Indices of the motions, from the first of the blocks on."""
+        n, first = len(self.motions), self.first_motion
+        return [(first + i) % n for i in range(n)]
 
     @property
     def dwells(self) -> tuple[float, ...]:
@@ -147,15 +150,14 @@ class CyclePlan:
     def line(self, motion: Motion, share: Array) -> Poses:
         """Return the poses at shares (S,) of a line, with the tolerance of the path and, at its end, of the pose."""
         poses, allowed = along_line(self.poses, motion.start, motion.end, share), self.cycle.tolerance
-        at_end = share >= 1.0
+
+        def tolerance(on_path: float, of_pose: Array) -> Array:
+            return np.where(share >= 1.0, np.minimum(on_path, of_pose), on_path)
+
         return replace(
             poses,
-            tolerance=np.where(
-                at_end, np.minimum(allowed.largest_distance, self.poses.tolerance[motion.end]), allowed.largest_distance
-            ),
-            angle_tolerance=np.where(
-                at_end, np.minimum(allowed.largest_angle, self.poses.angle_tolerance[motion.end]), allowed.largest_angle
-            ),
+            tolerance=tolerance(allowed.largest_distance, poses.tolerance),
+            angle_tolerance=tolerance(allowed.largest_angle, poses.angle_tolerance),
         )
 
     def sample(self, refinement: float = 1) -> LineSamples:

@@ -1,6 +1,5 @@
 """Solid convex obstacles that the arm should keep away from, as in task files."""
 
-import math
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self, get_args
 
@@ -9,15 +8,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
-from armwright.tasks.targets import MAX_COORDINATE, Coordinate, Point, Position
+from armwright.tasks.moments import describe_vector
+from armwright.tasks.targets import Angle, Coordinate, Direction, Point, Position, Size
 
 Shape = Literal["box", "sphere", "cylinder", "ground"]
 
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 MAX_OBSTACLES = 100
 
-Size = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
-Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]  # [rad]
 Name = Annotated[str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9 ._-]{0,39})?$")]
 
 
@@ -89,8 +87,8 @@ class Box(Record, frozen=True):
         x, y, z = self.size
         rotation = f", turned by yaw {self.yaw:g} rad" if self.yaw else ""
         if self.rpy is not None:
-            rotation = f", turned by roll, pitch, yaw {_point(self.rpy)} rad"
-        return f"box of {x:g} x {y:g} x {z:g} m (along x, y, z) about {_point(self.center)}{rotation}"
+            rotation = f", turned by roll, pitch, yaw {describe_vector(self.rpy)} rad"
+        return f"box of {x:g} x {y:g} x {z:g} m (along x, y, z) about {describe_vector(self.center)}{rotation}"
 
 
 class Sphere(Record, frozen=True):
@@ -105,7 +103,7 @@ class Sphere(Record, frozen=True):
         return Solid("sphere", self.center, np.eye(3), (self.radius, self.radius, self.radius))
 
     def _describe(self) -> str:
-        return f"sphere of radius {self.radius:g} m about {_point(self.center)}"
+        return f"sphere of radius {self.radius:g} m about {describe_vector(self.center)}"
 
 
 class Cylinder(Record, frozen=True):
@@ -115,13 +113,7 @@ class Cylinder(Record, frozen=True):
     center: Position  # [m]
     radius: Size
     height: Size
-    axis: Literal["x", "y", "z"] | Position = "z"
-
-    @model_validator(mode="after")
-    def _check_axis(self) -> Self:
-        if not isinstance(self.axis, str) and math.hypot(*self.axis) < 1e-6:
-            raise ValueError(f"axis = {_point(self.axis)} has no direction; try x, y, z or a vector")
-        return self
+    axis: Literal["x", "y", "z"] | Direction = "z"
 
     @property
     def solid(self) -> Solid:
@@ -129,10 +121,10 @@ class Cylinder(Record, frozen=True):
         return Solid("cylinder", self.center, rotation_to_axis(axis), (self.radius, self.radius, self.height / 2))
 
     def _describe(self) -> str:
-        axis = self.axis if isinstance(self.axis, str) else _point(self.axis)
+        axis = self.axis if isinstance(self.axis, str) else describe_vector(self.axis)
         return (
             f"cylinder of radius {self.radius:g} m and height {self.height:g} m about "
-            f"{_point(self.center)}, its axis along {axis}"
+            f"{describe_vector(self.center)}, its axis along {axis}"
         )
 
 
@@ -151,7 +143,3 @@ class Ground(Record, frozen=True):
 
 
 Obstacle = Annotated[Box | Sphere | Cylinder | Ground, Field(discriminator="kind")]
-
-
-def _point(values: Point) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

@@ -1,14 +1,13 @@
 """Payloads that the tip carries."""
 
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from armwright.tasks.moments import MAX_MASS, Moments, check_moments, describe_vector
-from armwright.tasks.targets import MAX_COORDINATE, Position
+from armwright.tasks.moments import MAX_MASS, Moments, describe_vector
+from armwright.tasks.targets import Position, Size
 
-Side = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
 Vector = tuple[float, float, float]
 
 
@@ -28,14 +27,13 @@ class Payload(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     mass: float = Field(gt=0.0, le=MAX_MASS)  # [kg]
     center: Position = (0.0, 0.0, 0.0)  # centre of mass [m]
-    size: tuple[Side, Side, Side] | None = None  # sides of a box of uniform density along x, y and z [m]
+    size: tuple[Size, Size, Size] | None = None  # sides of a box of uniform density along x, y and z [m]
     inertia: Moments | None = None  # instead of a size, moments about the centre of mass, around x, y and z [kg m²]
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.size is not None and self.inertia is not None:
             raise ValueError("expected size or inertia, got both; a size stands for the inertia of a uniform box")
-        check_moments(self.inertia or (0.0, 0.0, 0.0))
         return self
 
     @property

@@ -34,7 +34,6 @@ _HEAD = re.compile(r"([^\[(]*)(?:[\[(]([^\])]*)[\])])?")
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)(e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
 _NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
 _QUOTED = re.compile(r'"[^"]*"')
-_SPACED_CELL = re.compile(r'"[^"]*"|\S+')
 _SPACE_BEFORE_UNIT = re.compile(r"(?<!\s)\s+(?=[\[(])")  # x [mm] is one name
 
 Row = tuple[int, list[str]]  # number of the line, and its cells
@@ -151,20 +150,18 @@ def _read_table(text: str, where: str) -> Iterator[Row]:
 
 
 def _delimiter(line: str) -> str:
-    """Return what separates the cells of a line; empty for spaces."""
+    """Return what separates the cells of a line."""
     bare = _QUOTED.sub("", line)
-    return next((delimiter for delimiter in ";\t," if delimiter in bare), "")
+    return next((delimiter for delimiter in ";\t," if delimiter in bare), " ")
 
 
 def _split_header(number: int, line: str, where: str) -> list[str]:
     delimiter = _delimiter(line)
-    return _split(line if delimiter else _SPACE_BEFORE_UNIT.sub("", line), f"{where}, line {number}", delimiter)
+    return _split(_SPACE_BEFORE_UNIT.sub("", line) if delimiter == " " else line, f"{where}, line {number}", delimiter)
 
 
 def _split(line: str, where: str, delimiter: str) -> list[str]:
     """Return the cells of a line without empty ones at its end."""
-    if not delimiter:
-        return [cell.strip('"').strip() for cell in _SPACED_CELL.findall(line)]
     try:
         cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True))
     except csv.Error as fault:

@@ -9,9 +9,9 @@ from typing import Annotated, Any, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
+    AfterValidator,
     BaseModel,
     Field,
-    GetJsonSchemaHandler,
     field_validator,
     model_serializer,
     model_validator,
@@ -27,6 +27,17 @@ MIN_TOLERANCE = 1e-9  # [m], [rad]
 Point = tuple[float, float, float]
 Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]  # [m]
 Position = tuple[Coordinate, Coordinate, Coordinate]
+Size = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
+Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]  # [rad]
+
+
+def _check_direction(vector: Point) -> Point:
+    if math.hypot(*vector) < 1e-6:
+        raise ValueError(f"expected a direction, got {list(vector)}; try [0, 0, -1]")
+    return vector
+
+
+Direction = Annotated[Position, AfterValidator(_check_direction)]  # of any length
 
 TARGET_NAME = r"^([A-Za-z][A-Za-z0-9 ._-]{0,39})?$"  # empty for none
 REACHED = 1e-3  # [m]; a target nearer than this counts as reached
@@ -67,7 +78,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     name: str = Field(default="", pattern=TARGET_NAME)  # name in the steps of a cycle and in tables; empty for none
     position: Point  # position of the tip [m]
-    axis: Point | None = None  # world direction of the tool's z axis, of any length; the tool may rotate about it
+    axis: Direction | None = None  # world direction of the tool's z axis, of any length; the tool may rotate about it
     # Instead of an axis, roll, pitch and yaw of the tool about the fixed x, then y, then z [rad]
     orientation: Point | None = None
     # Distance from which on the target counts as unreached [m]; None for REACHED
@@ -85,8 +96,6 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def _check(self) -> Self:
         if self.axis is not None and self.orientation is not None:
             raise ValueError("expected axis or orientation, got both; an orientation states all axes")
-        if self.axis is not None and not 1e-6 <= math.hypot(*self.axis) <= MAX_COORDINATE:
-            raise ValueError(f"axis = {list(self.axis)} is no direction; try [0, 0, -1] for a tool that points down")
         if self.orientation is not None and max(map(abs, self.orientation)) > 2 * math.pi:
             raise ValueError(
                 f"orientation: expected roll, pitch, yaw within ±2π rad, got {list(self.orientation)} (90° is 1.5708)"
@@ -96,15 +105,10 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return self
 
     @model_serializer(mode="wrap")
-    def _brief(self, handler: Any) -> Any:
+    def _brief(self, handler: Any):  # a return type would replace the schema of the fields
         """Leave out values that are the defaults."""
         defaults = {name: field.default for name, field in type(self).model_fields.items()}
         return {name: value for name, value in handler(self).items() if value != defaults[name]}
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> Any:
-        """Return the schema of the fields; `_brief` has no schema of its own."""
-        return handler(_without_serializer(core_schema))
 
     @property
     def is_plain(self) -> bool:
@@ -157,14 +161,6 @@ def describe_targets(specs: Sequence[Point | Target]) -> list[str]:
 
 def _vector(values: Point) -> str:
     return "(" + ", ".join(f"{value + 0.0:.4g}" for value in values) + ")"
-
-
-def _without_serializer(core_schema: Any) -> Any:
-    return {
-        key: _without_serializer(value) if key == "schema" else value
-        for key, value in core_schema.items()
-        if key != "serialization"
-    }
 
 
 @lru_cache

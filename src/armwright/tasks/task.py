@@ -19,7 +19,7 @@ from pydantic import (
 from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.files import check_name
 from armwright.tasks.cycle import IN_ORDER, Cycle, target_indices
-from armwright.tasks.moments import MAX_MASS
+from armwright.tasks.moments import Mass
 from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
 from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle
 from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload
@@ -54,11 +54,11 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     name: Annotated[str, AfterValidator(check_name)] = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     # Points [m], or records with a tool direction, a tolerance, a weight or a name; by default the workspace's corners.
     targets: tuple[Annotated[Annotated[Point, BeforeValidator(check_length)] | Target, AfterValidator(_plain)], ...] = (
-        Field(max_length=MAX_TARGETS)
+        Field(min_length=1, max_length=MAX_TARGETS)
     )
     tool: Tool = NO_TOOL  # at the end of the last link
     # Mass that the tip carries, a point at all targets or at each [kg]; or a rigid body
-    payload: float | tuple[float, ...] | Payload = 0.0
+    payload: Mass | tuple[Mass, ...] | Payload = 0.0
     # Factors by which the payload may be heavier; each objective takes its worst case.
     payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MAX_PAYLOAD_FACTOR)], ...] = Field(
         default=(), max_length=10
@@ -73,7 +73,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     objectives: tuple[str, ...] | None = None
     constraints: tuple[str, ...] = ()  # such as "torque_utilisation <= 0.8"
     # One value per objective; for the paper's two: position error [m], torque [N m] times 40.
-    reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
+    reference_point: tuple[Annotated[float, Field(gt=0.0, le=LARGEST_OBJECTIVE)], ...] | None = Field(
+        default=None, min_length=1
+    )
     # Differences of objectives that do not matter, by name; of designs that differ by no more, `design` reports one.
     resolution: tuple[tuple[str, Annotated[float, Field(gt=0.0)]], ...] = ()
     description: str = Field(default="", max_length=10_000)  # what the arm has to do; shown to proposers
@@ -117,8 +119,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @model_validator(mode="after")
     def _check_numbers(self) -> Self:
-        if not self.targets:
-            raise ValueError("targets is empty: give at least one point [x, y, z] in metres")
         far = np.abs(self.target_positions).max(axis=1) > MAX_COORDINATE
         if far.any():
             number = int(np.argmax(far))
@@ -128,8 +128,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             )
         if isinstance(self.payload, tuple) and len(self.payload) != len(self.targets):
             raise ValueError(f"payload: expected 1 or {len(self.targets)} values [kg], got {len(self.payload)}")
-        if not np.all((self.payloads >= 0.0) & (self.payloads <= MAX_MASS)):
-            raise ValueError(f"payload: expected 0 to {MAX_MASS:g} kg, got {self.payload} kg")
         if self.cycle is not None and isinstance(self.payload, tuple):
             raise ValueError("payload: expected one value for the whole cycle, got a list")
         if sum(region.points for region in self.workspace) > MAX_POINTS:
@@ -139,11 +137,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(
                 f"workspace: expected at most {MAX_POSES} points x directions in all boxes together, got {n_poses}; "
                 "try fewer points"
-            )
-        if any(not 0.0 < value <= LARGEST_OBJECTIVE for value in self.reference_point or ()):
-            raise ValueError(
-                f"reference_point: expected values above 0 and at most {LARGEST_OBJECTIVE:g}, "
-                f"got {list(self.reference_point or ())}"
             )
         seen: set[str] = set()
         for name in filter(None, self._names):

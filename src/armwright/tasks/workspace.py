@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from armwright.arrays import Array
 from armwright.rotations import cone_directions
-from armwright.tasks.targets import Position
+from armwright.tasks.targets import Direction, Position
 
 MAX_POINTS = 10_000
 MAX_REGIONS = 20
@@ -20,16 +20,10 @@ MAX_POSES = 50_000  # points with directions
 class ToolDirections(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Directions of the tool's z axis that an arm should reach at each point: a cone, sampled evenly."""
 
-    axis: Position = (0.0, 0.0, -1.0)  # middle of the cone, of any length
+    axis: Direction = (0.0, 0.0, -1.0)  # middle of the cone, of any length
     half_angle: Annotated[float, Field(ge=0.0, le=math.pi)] = math.pi  # half the opening angle [rad]; π: all directions
     count: Annotated[int, Field(ge=1, le=MAX_DIRECTIONS)] = 12
     share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0  # of the directions that a dexterous point needs
-
-    @model_validator(mode="after")
-    def _check_axis(self) -> Self:
-        if math.hypot(*self.axis) < 1e-6:
-            raise ValueError(f"axis = {list(self.axis)} is no direction; try [0, 0, -1] for a tool that points down")
-        return self
 
     @property
     def vectors(self) -> Array:

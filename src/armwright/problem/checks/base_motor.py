@@ -1,15 +1,13 @@
 """Bases so low that the motor of the first joint is inside the ground."""
 
 from collections.abc import Iterator
-from itertools import product
 
+from armwright.problem.checks.bounds import combinations
 from armwright.problem.checks.finding import PROVEN, Finding
 from armwright.problem.checks.inside_obstacles import required_clearance
 from armwright.problem.checks.reach import ROUNDING, base_box
 from armwright.problem.problem import Problem
-from armwright.robot.motor_body import MotorBody, placed_body
-from armwright.spaces.joint_modules import DIRECTIONS, MODULES
-from armwright.spaces.parameters import CategoricalParameter
+from armwright.spaces.arm_builder import build_arm
 from armwright.tasks.obstacles import Ground
 
 
@@ -22,11 +20,17 @@ def check_base_motor(problem: Problem) -> Iterator[Finding]:
     space = problem.space
     if not (grounds and space.has_motor_bodies and space.mount == ("floor",)) or required_clearance(problem) < 0.0:
         return
-    bodies = _first_bodies(problem)
-    highest, ground = float(base_box(space)[1][2]), max(grounds, key=lambda one: one.z)
-    if not bodies:
+    rows = combinations(space, ("joint_1", "motor_1"))
+    joints = [build_arm(space, row[None]).joints[0] for row in rows]
+    depths = [
+        (joint.body.size[2] / 2 - joint.body.centre[2], joint.actuator.name)
+        for joint in joints
+        if joint.body is not None and joint.actuator is not None
+    ]
+    if len(depths) < len(joints):  # an arm whose first joint is fixed has no motor there
         return
-    name, depth = min(((name, body.size[2] / 2 - body.centre[2]) for name, body in bodies), key=lambda one: one[1])
+    depth, name = min(depths)
+    highest, ground = float(base_box(space)[1][2]), max(grounds, key=lambda one: one.z)
     needed = ground.z + depth
     if highest + ROUNDING * (1.0 + abs(highest)) < needed:
         yield Finding(
@@ -35,18 +39,3 @@ def check_base_motor(problem: Problem) -> Iterator[Finding]:
             f"{needed:.3g} m up, or leave the motors out with motor_bodies: false",
             PROVEN,
         )
-
-
-def _first_bodies(problem: Problem) -> list[tuple[str, MotorBody]]:
-    """Return the bodies that the actuator of the first joint may have, by its name; none if that joint may be fixed."""
-    space = problem.space
-    choices = {p.name: p.choices for p in space.parameters if isinstance(p, CategoricalParameter)}
-    modules = [MODULES[letter] for letter in space.joint_types if letter in choices["joint_1"]]
-    names = choices.get("motor_1", tuple(record.name for record in space.actuators))
-    if not all(module.is_actuated for module in modules):
-        return []
-    return [
-        (actuator.name, placed_body(actuator.shape, module.joints[0][1], DIRECTIONS["+z"]))
-        for actuator, module in product(space.arm_actuators, modules)
-        if actuator.name in names and actuator.shape is not None
-    ]

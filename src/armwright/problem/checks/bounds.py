@@ -5,24 +5,30 @@ if every number of modules violates at least one.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from itertools import product
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.problem.checks.finding import PROVEN, Finding
 from armwright.problem.constraints import Constraint
-from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES
+from armwright.problem.estimates import motionless
+from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES, joints, length, mass, price
 from armwright.problem.problem import Problem
-from armwright.robot.arm import Actuator
+from armwright.problem.scene import Scene
+from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
-from armwright.spaces.joint_modules import MODULES, JointType
-from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter
+from armwright.spaces.parameters import CategoricalParameter
 from armwright.tasks.moments import MAX_MASS
+from armwright.tasks.targets import position_targets
 
 ROUNDING = 1e-5  # relative, of quantities in single precision
 COUNTED = ("joints", "targets", "voltages")  # units that their quantity names already
+SUMS = (price, mass, length, joints)  # to which each module adds its own share, whatever the others are
+OF_MODULE = ("joint", "link", "tube", "motor", "stroke")  # parameters that such a share depends on
+NOWHERE = Scene(np.zeros((1, 3)), np.zeros(1), position_targets(1))
 
 
 @dataclass(frozen=True)
@@ -32,9 +38,6 @@ class Interval:
     low: float
     high: float = math.inf
 
-    def __add__(self, other: "Interval") -> "Interval":
-        return Interval(self.low + other.low, self.high + other.high)
-
     def excludes(self, constraint: Constraint) -> bool:
         """Return whether no value satisfies a constraint."""
         slack = ROUNDING * max(constraint.scale, abs(constraint.bound))
@@ -43,15 +46,11 @@ class Interval:
         return self.high * (1.0 + ROUNDING) < constraint.bound - slack
 
 
-NOTHING = Interval(0.0, 0.0)
-
-
 def check_constraints(problem: Problem) -> Iterator[Finding]:
     """Find constraints that no design satisfies, alone or together."""
     fixed, by_size = _intervals_of_task(problem), intervals_by_modules(problem)
     for constraint in problem.constraints:
-        name = constraint.quantity.name
-        interval = None if name in by_size[problem.space.max_joints] else fixed.get(name)
+        interval = fixed.get(constraint.quantity.name)
         if interval is not None and interval.excludes(constraint):
             yield Finding(_describe(constraint, interval), PROVEN)
     violated = {
@@ -62,7 +61,8 @@ def check_constraints(problem: Problem) -> Iterator[Finding]:
         return
     always = [c for c in problem.constraints if all(c in broken for broken in violated.values())]
     for constraint in always:
-        interval = _hull([known[constraint.quantity.name] for known in by_size.values()])
+        known = [intervals[constraint.quantity.name] for intervals in by_size.values()]
+        interval = Interval(min(one.low for one in known), max(one.high for one in known))
         yield Finding(f"{_describe(constraint, interval)} in this space; loosen it, or widen the space", PROVEN)
     if not always:
         together = [
@@ -76,78 +76,47 @@ def check_constraints(problem: Problem) -> Iterator[Finding]:
 
 
 def intervals_by_modules(problem: Problem) -> dict[int, dict[str, Interval]]:
-    """Return the intervals of price [USD], mass [kg], length [m] and joints, for each number of modules."""
-    space, actuators = problem.space, {actuator.name: actuator for actuator in problem.space.arm_actuators}
-    known = {parameter.name: parameter for parameter in space.parameters}
-    totals = {"joints": NOTHING, "length": NOTHING, "price": NOTHING, "mass": NOTHING}
-    totals["mass"] = Interval(problem.task.tool.mass, problem.task.tool.mass)
-    if space.column is not None:
-        heights = cast("FloatParameter", known["origin_z"])
-        low, high = space.column.lengths(np.array([heights.low, heights.high])).tolist()
-        totals["mass"] += Interval(space.column.mass_per_metre * low, space.column.mass_per_metre * high)
-        totals["price"] += Interval(space.column.price_per_metre * low, space.column.price_per_metre * high)
+    """Return the intervals of price [USD], mass [kg], length [m] and joints, for each number of modules.
+
+    A quantity is left out if it is not known of all arms. Ties are ignored, as if tied parameters were free.
+    """
+    section = problem.space.link_section.model_copy(update={"per_link": True})  # a tube of its own for each link
+    space = problem.space.model_copy(update={"link_section": section})
+
+    def values(rows: Array) -> Array:
+        arms = stack_designs(space, rows, problem.task.tool, "float64")
+        return np.column_stack([quantity.known(motionless(NOWHERE, arms))[0] for quantity in SUMS])
+
+    start = values(combinations(space, ()))[0]
+    groups = [("origin_z",), *(tuple(f"{k}_{j}" for k in OF_MODULE) for j in range(1, space.max_joints + 1))]
+    shares = [values(combinations(space, names)) - start for names in groups]
+    low, high = (np.cumsum([end(share, axis=0) for share in shares], axis=0) for end in (np.min, np.max))
+    sizes = combinations(space, ("n_joints",))
     found: dict[int, dict[str, Interval]] = {}
-    for module in range(1, space.max_joints + 1):
-        letters = cast("CategoricalParameter", known[f"joint_{module}"]).choices
-        link = cast("FloatParameter", known[f"link_{module}"])
-        motors = known.get(f"motor_{module}")
-        names = motors.choices if isinstance(motors, CategoricalParameter) else tuple(actuators)[:1]
-        stroke = known.get(f"stroke_{module}")
-        strokes = (
-            (stroke.low, stroke.high) if isinstance(stroke, FloatParameter) else (space.min_stroke, space.min_stroke)
-        )
-        tubes = _tubes(space, known, module)
-        choices = [_of_letter(space, cast("JointType", x), [actuators[name] for name in names], strokes, tubes)
-                   for x in letters]  # fmt: skip
-        own = {name: _hull([choice[name] for choice in choices]) for name in ("joints", "price", "mass")}
-        own["length"] = Interval(link.low, link.high)
-        own["mass"] += _mass(space, (link.low, link.high), tubes)
-        prices = [space.link_section.options[tube].price_per_metre for tube in tubes]
-        own["price"] += Interval(min(prices) * link.low, max(prices) * link.high)
-        totals = {name: totals[name] + own[name] for name in totals}
-        if module >= space.min_joints:
-            found[module] = totals
-    if not actuators or any(actuator.price is None for actuator in actuators.values()):
-        found = {n: {name: i for name, i in one.items() if name != "price"} for n, one in found.items()}
+    for design, own in zip(space.designs(sizes), values(sizes), strict=True):
+        n = len(design.joints)
+        ends = zip(SUMS, (own + low[n]).tolist(), (own + high[n]).tolist(), strict=True)
+        found[n] = {quantity.name: Interval(*interval) for quantity, *interval in ends if math.isfinite(interval[0])}
     return found
 
 
-def _tubes(space: DesignSpace, known: Mapping[str, Parameter], module: int) -> list[int]:
-    """Return the indices of the tubes that a module may have, given the parameters of the space."""
-    parameter = known.get(f"tube_{module}", known.get("tube"))
-    names = parameter.choices if isinstance(parameter, CategoricalParameter) else space.tube_names[:1]
-    return [space.tube_names.index(name) for name in names]
+def combinations(space: DesignSpace, names: Sequence[str]) -> Array:
+    """Return (V, P) designs with all choices and both ends of the ranges of these parameters, combined.
 
-
-def _mass(space: DesignSpace, lengths: tuple[float, float], tubes: list[int]) -> Interval:
-    """Return the interval of the mass of links or rails of these lengths [m] and tubes [kg]."""
-    low, high = ([float(space.link_mass(length, tube)) for tube in tubes] for length in lengths)
-    return Interval(min(low), max(high))
-
-
-def _of_letter(
-    space: DesignSpace, letter: JointType, motors: list[Actuator], strokes: tuple[float, float], tubes: list[int]
-) -> dict[str, Interval]:
-    """Return the intervals of a module of this type, without its link."""
-    module = MODULES[letter]
-    n = len(module.joints) if module.is_actuated else 0
-    prices = [n * (motor.price or 0.0) for motor in motors] or [0.0]
-    masses = [n * (mass + space.bracket_mass) for mass in [motor.mass for motor in motors] or [0.0]]
-    rail = _mass(space, strokes, tubes) if module.is_prismatic else NOTHING
-    return {
-        "joints": Interval(n, n),
-        "price": Interval(min(prices), max(prices)),
-        "mass": Interval(min(masses), max(masses)) + rail,
-    }
-
-
-def _hull(intervals: list[Interval]) -> Interval:
-    return Interval(min(i.low for i in intervals), max(i.high for i in intervals))
+    All other parameters have their defaults, and the number of modules is the largest. Names that the space lacks are
+    left out.
+    """
+    values: list[Sequence[float]] = []
+    for p in space.parameters:
+        ends = range(len(p.choices)) if isinstance(p, CategoricalParameter) else (p.low, p.high)
+        default = ends[-1] if p.name == "n_joints" else p.encode(p.default)
+        values.append(ends if p.name in names else [default])
+    return np.array(list(product(*values)), dtype=np.float64)
 
 
 def _intervals_of_task(problem: Problem) -> Mapping[str, Interval]:
     """Return the intervals of quantities that do not depend on the space."""
-    intervals = dict.fromkeys(OBJECTIVES, Interval(0.0))
+    intervals = dict.fromkeys(OBJECTIVES.keys() - {quantity.name for quantity in SUMS}, Interval(0.0))
     n = float(len(problem.task.targets))
     intervals |= {"unreached_targets": Interval(0.0, n), "jumps": Interval(0.0, n), "manipulability": Interval(0.0)}
     intervals["payload_capacity"] = Interval(0.0, MAX_MASS)

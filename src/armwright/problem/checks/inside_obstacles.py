@@ -55,24 +55,19 @@ def required_clearance(problem: Problem) -> float:
 def _finding(problem: Problem, obstacle: Obstacle, distance: Array, found: NDArray[np.bool_], evidence: str) -> Finding:
     task, numbers = problem.task, np.flatnonzero(found)
     deepest = numbers[np.argmin(distance[numbers])]
-    who = describe_targets([task.target_names[i] for i in numbers], len(distance))
-    if len(numbers) > 1:
-        who += f", the deepest at {describe_point(task.target_positions[deepest])},"
-    else:
-        who += f" {describe_point(task.target_positions[deepest])}"
-    verb = "is" if len(numbers) == 1 else "are"
+    who, point = (
+        describe_targets([task.target_names[i] for i in numbers], len(distance)),
+        task.target_positions[deepest],
+    )
+    who += f" {describe_point(point)} is" if len(numbers) == 1 else f", the deepest at {describe_point(point)}, are"
     depth = -1e3 * float(distance[deepest])
     where = f"{depth:.3g} mm inside" if depth > 0.0 else f"{-depth:.3g} mm from"
-    if evidence == SUSPECTED:
-        return Finding(
-            f"{who} {verb} {where} an obstacle: {obstacle.describe()}; an arm that reaches it passes through its "
-            "surface",
-            evidence,
+    why = "an arm that reaches it passes through its surface"
+    if evidence == PROVEN:
+        radius, tool = 1e3 * min(problem.space.tube_values("radius")), 1e3 * task.tool.length
+        longer = "" if depth > 0.0 else ", or state a longer tool"
+        why = (
+            f"the last link, of radius {radius:g} mm and with a tool of {tool:g} mm, cannot keep the clearance that "
+            f"the constraints demand; move the target or the obstacle{longer}"
         )
-    radius, tool = 1e3 * min(problem.space.tube_values("radius")), 1e3 * task.tool.length
-    remedy = "move the target or the obstacle" + ("" if depth > 0.0 else ", or state a longer tool")
-    return Finding(
-        f"{who} {verb} {where} an obstacle: {obstacle.describe()}; the last link, of radius {radius:g} mm and with a "
-        f"tool of {tool:g} mm, cannot keep the clearance that the constraints demand; {remedy}",
-        evidence,
-    )
+    return Finding(f"{who} {where} an obstacle: {obstacle.describe()}; {why}", evidence)

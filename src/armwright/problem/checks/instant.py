@@ -5,7 +5,6 @@ from collections.abc import Iterable
 from armwright.exceptions import TaskError
 from armwright.problem.checks.base_motor import check_base_motor
 from armwright.problem.checks.bounds import check_constraints
-from armwright.problem.checks.custom_parameters import check_custom_parameters
 from armwright.problem.checks.finding import Finding
 from armwright.problem.checks.idle_objectives import check_idle_objectives
 from armwright.problem.checks.inside_obstacles import check_obstacles
@@ -25,7 +24,7 @@ def check_instantly(problem: Problem) -> list[Finding]:
     check_requirements(problem)
     checks = (
         check_reach, check_obstacles, check_base_motor, check_constraints, check_strength, check_magnitudes,
-        check_idle_objectives, check_custom_parameters,
+        check_idle_objectives,
     )  # fmt: skip
     findings = [finding for check in checks for finding in check(problem)]
     return sorted(findings, key=lambda finding: not finding.is_proven)

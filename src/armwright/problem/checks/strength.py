@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.checks.finding import SUSPECTED, Finding
-from armwright.problem.checks.reach import base_box, longest_reach
+from armwright.problem.checks.reach import base_box
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
 from armwright.spaces.joint_modules import MODULES
@@ -14,33 +15,33 @@ HEAVY = 100.0  # times the heaviest arm
 
 
 def check_strength(problem: Problem) -> Iterator[Finding]:
-    """Find payloads that the strongest motor cannot hold at half reach, or that dwarf the arm itself."""
-    payload = float(problem.task.payloads.max())
-    if payload > 0.0:
-        yield from _at_half_reach(problem, payload)
-        yield from _of_toys(problem, payload)
+    """Find payloads that the strongest motor cannot hold at half reach, or that dwarf the arm itself.
 
-
-def _at_half_reach(problem: Problem, payload: float) -> Iterator[Finding]:
-    """Compare the payload [kg] with what the strongest motor holds about a horizontal axis at half reach.
-
-    Half reach is half of what the targets require of any base, at most half of the longest arm. Axes that are all
-    vertical would hold more.
+    Half reach is half of what the targets require of any base, at most half of the longest arm. The motor turns about a
+    horizontal axis; arms whose axes are all vertical would hold more.
     """
-    space, actuators = problem.space, problem.space.arm_actuators
+    space, actuators, payload = problem.space, problem.space.arm_actuators, float(problem.task.payloads.max())
     turns = any(MODULES[letter].is_revolute for letter in space.joint_types)
-    lever = min(longest_reach(problem), _needed_reach(problem)) / 2
-    if not actuators or not turns or lever <= 0.0:
-        return
-    strongest = max(actuators, key=lambda actuator: actuator.peak_torque)
-    allowed = strongest.peak_torque / space.safety_factor
-    needed = GRAVITY * (payload + problem.task.tool.mass) * lever
-    if needed > allowed:
+    lever = min(problem.max_reach, _needed_reach(problem)) / 2
+    if payload > 0.0 and actuators and turns and lever > 0.0:
+        strongest = max(actuators, key=lambda actuator: actuator.peak_torque)
+        allowed = strongest.peak_torque / space.safety_factor
+        needed = GRAVITY * (payload + problem.task.tool.mass) * lever
+        if needed > allowed:
+            yield Finding(
+                f"payload: {payload:g} kg take {needed:.3g} N m about a horizontal axis at {lever:.3g} m, half of the "
+                f"reach that the targets require; the strongest motor, {strongest.name}, has "
+                f"{strongest.peak_torque:g} N m, with the safety factor {allowed:.3g} N m; name stronger actuators, or "
+                "check that the payload is in kilograms",
+                SUSPECTED,
+            )
+    heaviest = max(known["mass"].high for known in intervals_by_modules(problem).values())
+    if payload > HEAVY * heaviest > 0.0:
+        toy = "; the links are a toy" if space.is_toy else ""
         yield Finding(
-            f"payload: {payload:g} kg take {needed:.3g} N m about a horizontal axis at {lever:.3g} m, half of the "
-            f"reach that the targets require; the strongest motor, {strongest.name}, has {strongest.peak_torque:g} "
-            f"N m, with the safety factor {allowed:.3g} N m; name stronger actuators, or check that the payload is in "
-            "kilograms",
+            f"payload: {payload:g} kg are {payload / heaviest:,.0f} times the mass of the heaviest arm of the space, "
+            f"{heaviest:.3g} kg{toy}; state mass and actuators of a real arm in the space, or check that the payload "
+            "is in kilograms",
             SUSPECTED,
         )
 
@@ -55,18 +56,3 @@ def _needed_reach(problem: Problem) -> float:
     # No base is nearer than this to both ends of the targets along an axis, or to the nearest part of its box.
     spread = float(np.ptp(carried, axis=0).max()) / 2
     return max(spread, float(np.linalg.norm(carried - np.clip(carried, low, high), axis=1).max()))
-
-
-def _of_toys(problem: Problem, payload: float) -> Iterator[Finding]:
-    """Compare the payload [kg] with the mass of the heaviest arm."""
-    space = problem.space
-    heaviest_motor = max((record.mass for record in space.actuators), default=0.0)
-    heaviest = space.max_joints * (space.heaviest_link + heaviest_motor + space.bracket_mass)
-    if payload > HEAVY * heaviest > 0.0:
-        toy = "; the links are a toy" if space.is_toy else ""
-        yield Finding(
-            f"payload: {payload:g} kg are {payload / heaviest:,.0f} times the mass of the heaviest arm of the space, "
-            f"{heaviest:.3g} kg{toy}; state mass and actuators of a real arm in the space, or check that the payload "
-            "is in kilograms",
-            SUSPECTED,
-        )

@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.exceptions import ArmwrightError, SettingsError
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import JOINTS, QUANTITIES
+from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
 from armwright.search.surrogate.custom_inputs import CustomInputs
@@ -189,7 +189,7 @@ class CheapFeatures:
         """Return the quantities that the task allows; clearances only if they matter, because they take long."""
         problem = self._problem
         clearances = bool(problem.task.obstacles) or problem.uses("clearance")
-        asked = [q for q in QUANTITIES.values() if q != JOINTS and (clearances or "clearance" not in q.needs)]
+        asked = [q for q in QUANTITIES.values() if q.name != "joints" and (clearances or "clearance" not in q.needs)]
         evaluation = problem.physics(self._probes[:8])
         return tuple(quantity for quantity in asked if _is_defined(quantity, evaluation))
 

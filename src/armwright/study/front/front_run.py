@@ -14,8 +14,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
+from armwright.problem.checks.requirements import refuse_unread_parameters
 from armwright.problem.problem import Problem
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import SEARCH, RunFolder, read_run
