@@ -9,7 +9,7 @@ import pytest
 from pydantic_ai.messages import ModelResponse
 from pydantic_ai.usage import RequestUsage
 
-from armwright import LlmProposer, ModelOptions
+from armwright import LlmProposer, ModelOptions, PromptOptions
 from armwright.exceptions import ProposalError
 from armwright.llm.backend import CHECK, LlmBackend, OutputFormat, Question, Reply, Turn
 from armwright.llm.budget import CallBudget
@@ -41,17 +41,13 @@ def notes(seen: list[Progress]) -> list[str]:
 class Greedy(LlmBackend):
     """Takes all requests that it may, each for 0.1 USD."""
 
-    model = "greedy"
-    origin = "scripted"
-
     def __init__(self, most: int = 3) -> None:
+        super().__init__("greedy", "scripted")
         self.most = most
         self.requests = 0
         self.asking = threading.Event()
         self.go_on = threading.Event()
         self._lock = threading.Lock()
-
-    def begin(self) -> None: ...
 
     def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
         return self.ask(CHECK)
@@ -69,8 +65,6 @@ class Greedy(LlmBackend):
         self.asking.set()
         self.go_on.wait()
         return Reply("so be it", taken, cost_usd=0.1 * taken)
-
-    def cancel(self) -> None: ...
 
 
 class Session(LlmSession):
@@ -150,15 +144,6 @@ def test_price_depends_on_the_host(model: str, address: str | None, words: str) 
         assert cost_of(response, server) == (12.5 if "12.50" in words else None)
 
 
-def test_forecast_of_a_resumed_run_uses_its_past_calls(chat_server: ChatServer, tmp_path: Path) -> None:
-    run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=6)
-    seen: list[Progress] = []
-    run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=12, seen=seen)
-    # the server counts 100 tokens in and 20 out for each of two calls
-    assert seen[0].doing == "beginning"
-    assert seen[0].note == "2 proposals: about 5 calls, 400 tokens in, 80 out; on a local server"
-
-
 @pytest.mark.parametrize("wire", ["openai", "anthropic"])
 def test_max_cost_bounds_the_requests_of_a_run(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
@@ -223,21 +208,21 @@ def test_refused_answers_in_flight_stay_within_the_budget(chat_server: ChatServe
 @pytest.mark.parametrize("threads", [3, 4, 8])
 def test_concurrent_calls_share_one_budget(budget: dict[str, Any], threads: int) -> None:
     backend = Greedy()
-    came = Session(backend, "asking", CallBudget(**budget)).ask_together(threads, lambda: None)
+    came = Session(backend, "asking", PromptOptions(), CallBudget(**budget)).ask_together(threads, lambda: None)
     assert backend.requests == min(10, 3 * threads)
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["budget"] * max(0, threads - 4)
 
 
 def test_unused_reservations_are_released() -> None:
     backend = Greedy(most=1)
-    came = Session(backend, "asking", CallBudget(max_calls=7)).ask_together(9, lambda: None)
+    came = Session(backend, "asking", PromptOptions(), CallBudget(max_calls=7)).ask_together(9, lambda: None)
     assert backend.requests == 7
     assert came.count("so be it") == 7
 
 
 def test_cancel_releases_calls_waiting_for_budget() -> None:
     backend = Greedy()
-    session = Session(backend, "asking", CallBudget(max_calls=3))
+    session = Session(backend, "asking", PromptOptions(), CallBudget(max_calls=3))
     came = session.ask_together(4, session.cancel)
     assert backend.requests == 3
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["cancelled"] * 3

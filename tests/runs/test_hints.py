@@ -168,7 +168,7 @@ def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: P
     for again in (tmp_path / "again", tmp_path / "third"):
         again.mkdir()
         add_hint(again, "another")
-        run(again, ReplayProposer(before, strict=True))
+        assert run(again, ReplayProposer(before)).summary["proposer"]["differing_prompts"] == 0
         assert lines(again) == lines(first)
         assert [call.hints for call in calls(again)] == [call.hints for call in calls(first)]
         before = again

@@ -1,8 +1,8 @@
-"""What answers questions: a model (client.py), a recording of one (replay_backend.py) or a person (manual.py)."""
+"""Questions, answers, and what answers them: a model (client.py) or a person (manual.py)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -98,15 +98,17 @@ class Interrupted(KeyboardInterrupt):
         self.reply = reply
 
 
-class LlmBackend(Protocol):
-    """Answer questions; several threads may ask at a time."""
+class LlmBackend:
+    """Answers questions; several threads may ask at a time. This base class is only a name for those of a record."""
 
-    model: str  # who answers, for the user
-    origin: str  # what answers: `model`, `manual` (a person) or `scripted` (a stand-in)
     note: str = ""  # message for the user about the last check; empty for none
 
+    def __init__(self, model: str = "none", origin: str = "model") -> None:
+        self.model = model  # who answers, for the user
+        self.origin = origin  # what answers: `model`, `manual` (a person) or `scripted` (a stand-in)
+
     def begin(self) -> None:
-        """Start a session; an earlier cancellation no longer counts. Does nothing by default."""
+        """Start a session; an earlier cancellation no longer counts."""
 
     def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
         """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default.
@@ -132,7 +134,7 @@ class LlmBackend(Protocol):
             most_requests: Limit of requests, those after invalid answers included; None for no limit.
             earlier: Turns of the conversation that the question continues; None for a question on its own.
         """
-        ...
+        raise NotImplementedError
 
     def cancel(self) -> None:
-        """Cancel all calls at once; none starts before the next session. Does nothing by default."""
+        """Cancel all calls at once; none starts before the next session."""

@@ -120,8 +120,7 @@ class ModelClient(LlmBackend):
             raise SettingsError(f'model "{model}" names no model; expected a name such as openai-chat:gpt-4o')
         if options.answer == "text":
             raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
-        self.model = model
-        self.origin = options.origin
+        super().__init__(model, options.origin)
         self.timeout = options.timeout
         self._server = server_of(options)
         seconds = options.timeout

@@ -34,7 +34,7 @@ from armwright.llm.draft_prompt import draft_prompt, draft_schema
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import estimated_tokens
 from armwright.llm.session import LlmSession
-from armwright.llm.transcript import Transcript
+from armwright.llm.transcript import Call, Transcript
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
 from armwright.proof.summary_file import ProposerSummary
@@ -106,7 +106,7 @@ class Drafter(LlmSession):
         from armwright.llm.client import ModelClient
 
         options = configured.options
-        super().__init__(ModelClient(options), "draft", CallBudget(options.max_calls, options.max_cost))
+        super().__init__(ModelClient(options), "draft", options, CallBudget(options.max_calls, options.max_cost))
         self.configured = configured
         self.out = out
         self.force = force
@@ -116,7 +116,6 @@ class Drafter(LlmSession):
                 out.mkdir(parents=True, exist_ok=True)
                 if not os.access(out, os.W_OK):
                     raise PermissionError(errno.EACCES, "no permission")
-            # Earlier drafts in this folder are only counted: each has a budget of its own.
             self._transcript = Transcript(out / DRAFTS)
 
     def forecast(self, description: str) -> str:
@@ -130,9 +129,9 @@ class Drafter(LlmSession):
             f"{ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
         )
 
-    def summary(self) -> ProposerSummary:
-        """Return calls, tokens and cost of the last draft."""
-        return self._summary([call for call in self._transcript.calls if call.proposal == self._identity])
+    def _calls(self) -> Sequence[Call]:
+        """Return the calls of this draft: each draft has a budget of its own."""
+        return [call for call in self._transcript.calls if call.proposal == self._identity]
 
     def draft(self, description: str) -> Draft:
         """Return the draft of a description, written if there is a folder.

@@ -23,10 +23,8 @@ class ManualBackend(LlmBackend):
         wait: Wait for a missing answer; if false, raise AnswerPendingError.
     """
 
-    model = "people"
-    origin = "manual"
-
     def __init__(self, folder: Path, wait: bool = True) -> None:
+        super().__init__("people", "manual")
         self.folder = folder
         self.wait = wait
         self._cancelled = threading.Event()

@@ -88,7 +88,6 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
     max_cost: float | None = Field(default=None, gt=0.0)  # limit of the cost of the whole run [USD]
     on_failure: str = "stop"  # if the model fails before the first trial; or "continue" without it
     origin: str = "model"  # recorded with every call; "scripted" if a stand-in answers instead of a model
-    replay_strict: bool = False  # with replay:RUN, treat a prompt that differs from the recorded one as an error
     wait: bool = True  # with manual:DIR, wait for each answer; if false, exit at the first open question
     _named_in: str = PrivateAttr(default="")  # the file that names base_url, if it may be somebody else's
 

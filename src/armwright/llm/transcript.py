@@ -101,12 +101,6 @@ def last_call(calls: Sequence[Call], proposal: str, *steps: str) -> Call | None:
     return next((call for call in reversed(calls) if call.proposal == proposal and call.step in steps), None)
 
 
-def tries(calls: Sequence[Call], proposal: str, step: str) -> list[Call]:
-    """Return the calls for a step of a proposal that a replay repeats: refusals as too long, then the last call."""
-    found = [call for call in calls if call.proposal == proposal and call.step == step]
-    return [call for call in found[:-1] if call.fault == "context"] + found[-1:]
-
-
 def _append(file: FileIO, line: bytes) -> None:
     """Append a whole line or nothing: a partial line would corrupt the next one, perhaps of another thread."""
     before = os.fstat(file.fileno()).st_size

@@ -95,9 +95,9 @@ class ProposalCallback:
             reported = self._given_up is not None  # by another thread in the meantime
             if error.final:
                 self._given_up = error.kind
-        if self.on_model_failure == "stop":
-            if not any("proposal" in other.user_attrs for other in study.get_trials(deepcopy=False)):
-                raise ModelError(str(error)) from error
+        has_proposals = any("proposal" in trial.user_attrs for trial in study.get_trials(deepcopy=False))
+        if self.on_model_failure == "stop" and not has_proposals:
+            raise ModelError(str(error)) from error
         if not reported:
             outcome = "no more proposals are requested" if error.final else "the study continues without this proposal"
             _logger.warning(f"{error}; {outcome}")
