@@ -98,12 +98,3 @@ def test_refused_values_are_requested_again_with_the_reason(
     assert failed.requests == 3
     assert "link_1" in failed.answer
     assert output == "tool" or failed.answer == refused  # with the text around it
-
-
-@every_output
-@both_formats
-@pytest.mark.fast_cases(3)
-def test_corrected_answers_are_accepted(chat_server: ChatServer, ask: Ask, wire: str, output: str) -> None:
-    answers = iter([LEFT_OUT, {**GOOD_DESIGN, "link_3": "NaN"}, GOOD_DESIGN])
-    chat_server.answer = lambda request: json.dumps(next(answers)) if wants_design(request) else designer(request)
-    assert dict(ask(wire, output=output).trials[4].design.params) == EXPECTED

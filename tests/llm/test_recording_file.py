@@ -33,10 +33,8 @@ def test_shipped_recordings_are_complete_and_small() -> None:
         assert name.endswith(f"seed{recording.config.seed}")
 
 
-def test_damaged_and_missing_lines_are_one_error(tmp_path: Path) -> None:
+def test_damaged_lines_are_one_error(tmp_path: Path) -> None:
     lines = lines_of("target-1-plus-seed0")
-    with pytest.raises(ReplayError, match=r"19 of its 20 calls; restore the file"):
-        read_recording(packed(tmp_path, lines[:7] + lines[8:]))
     for damaged in ([], [b"{}\n", *lines[1:]], [*lines[:5], lines[5][:40] + b"\n", *lines[6:]]):
         with pytest.raises(ReplayError, match="is damaged; restore the file"):
             read_recording(packed(tmp_path, damaged))

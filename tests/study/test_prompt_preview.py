@@ -141,7 +141,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["target-1", "--print-prompt", "al"], '--print-prompt "al": expected next, schema, or'),
         (["run", "--space", "space.yaml"], "--space space.yaml is for a new run; run has its own"),
         (["run", "--print-prompt", "5"], "trial 5: the proposals of run were requested for trials 4"),
-        (["run", *model_options(memory="all")], 'unknown memory "all"'),
+        (["run", *model_options(memory="all")], 'memory: expected none or chat, got "all"'),
     ],
 )
 def test_invalid_arguments_are_refused(

@@ -1,4 +1,4 @@
-"""Questions, answers, and what answers them: a model (client.py) or a person (manual.py)."""
+"""Questions, answers, and what answers them: a model (client.py) or a person (proposers/manual.py)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -110,13 +110,8 @@ class LlmBackend:
     def begin(self) -> None:
         """Start a session; an earlier cancellation no longer counts."""
 
-    def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
-        """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default.
-
-        Args:
-            output_mode: Mode in which an earlier session of the run asked; empty to choose one.
-            most_requests: Limit of requests; None for no limit.
-        """
+    def check(self, most_requests: int | None = None) -> Reply:
+        """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default."""
         return Reply()
 
     def ask(

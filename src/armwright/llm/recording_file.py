@@ -14,10 +14,10 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from armwright.exceptions import ReplayError, did_you_mean
-from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
+from armwright.llm.transcript import CALL, TRANSCRIPTS, Call, Transcript
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_config, read_run
 from armwright.runs.trial import FinishedTrial
@@ -49,9 +49,6 @@ class _Header(BaseModel, frozen=True, extra="forbid"):
     provenance: str
     calls: int  # number of lines that follow
     config: RunConfig
-
-
-_CALL = TypeAdapter(Call)
 
 
 @cache
@@ -94,9 +91,7 @@ def _unpacked(file: Path | Traversable) -> Recording:
     lines = text.split(b"\n")[:-1]
     try:
         header = _Header.model_validate_json(lines[0] if lines else b"")
-        calls = [_CALL.validate_json(line) for line in lines[1:]]
+        calls = [CALL.validate_json(line) for line in lines[1 : 1 + header.calls]]
     except ValidationError as fault:
         raise ReplayError(f"the recording {file} is damaged; restore the file") from fault
-    if len(calls) != header.calls:
-        raise ReplayError(f"the recording {file} has {len(calls)} of its {header.calls} calls; restore the file")
     return Recording(str(file), header.config, calls, header.provenance)

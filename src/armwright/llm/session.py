@@ -85,7 +85,7 @@ class LlmSession:
             ModelError: There is no answer, or its price is unknown under a cost limit.
         """
         try:
-            self._call(CHECK, partial(self.backend.check, output_mode_of(self._calls())), self._over)
+            self._call(CHECK, self.backend.check, self._over)
         except ProposalError as fault:
             if fault.kind == "budget":
                 return ""
@@ -135,11 +135,11 @@ class LlmSession:
     def _earlier(self, question: Question) -> Sequence[Turn] | None:
         """Return the turns that go with a question; None for the check and for second questions, which stand alone."""
         is_turn = self.chat and question.step in FIRST_STEPS
-        return conversation(self._transcript.calls, question.trial).turns if is_turn else None
+        return conversation(self._transcript.calls, question.trial) if is_turn else None
 
     def _part_to_ask(self, prompt: str, trial: int) -> str:
         """Return what a question for a trial says of a prompt: in a chat, what the turns before it do not."""
-        return new_part(prompt, conversation(self._transcript.calls, trial).turns) if self.chat else prompt
+        return new_part(prompt, conversation(self._transcript.calls, trial)) if self.chat else prompt
 
     def _call(self, question: Question, ask: Callable[[int | None], Reply], over: threading.Event) -> str:
         """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call.

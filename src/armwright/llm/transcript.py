@@ -5,12 +5,12 @@ import json
 import os
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from io import FileIO
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Any
 
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, open_to_append, read_records
@@ -31,6 +31,9 @@ class Call(Reply, Question):
     model: str = field(kw_only=True)
     fault: str | None = None  # kind of fault, if there was one; then the answer may be empty
     error: str | None = None  # its message
+
+
+CALL = TypeAdapter(Call)  # reads a line
 
 
 class Transcript:
@@ -137,17 +140,6 @@ def _read(path: Path, mend: bool) -> Iterator[Call]:
 
 def _call(line: bytes, where: str) -> Call:
     try:
-        return _CALL.validate_json(line)
+        return CALL.validate_json(line)
     except ValidationError as fault:
         raise RunFolderError(f"{where} is damaged; restore the file or delete the line") from fault
-
-
-def _check_complete(content: Any) -> Any:
-    """Refuse a line that lacks a key, although the fields of questions and replies have defaults."""
-    if isinstance(content, dict) and (missing := _REQUIRED - content.keys()):
-        raise ValueError(f"missing: {', '.join(sorted(missing))}")
-    return cast("Any", content)
-
-
-_REQUIRED = {field.name for field in fields(Call)} - {"hints", "output_mode", "fault", "error"}
-_CALL = TypeAdapter(Annotated[Call, BeforeValidator(_check_complete)])

@@ -28,7 +28,7 @@ class LlmProposer(PromptedProposer):
 
         options = ModelOptions.of(options)
         self.client = ModelClient(options)
-        super().__init__(self.client, options, options.source, CallBudget(options.max_calls, options.max_cost))
+        super().__init__(self.client, options.source, options, CallBudget(options.max_calls, options.max_cost))
         self.options = options
 
     def settings(self) -> Mapping[str, Any]:
@@ -57,12 +57,12 @@ class LlmProposer(PromptedProposer):
         second = estimated_tokens(parameters_prompt(problem, "")) + ANALYSIS_TOKENS if in_steps else 0
         if not self.chat:
             return n * (whole + second), n * written
-        turns = conversation(self._transcript.calls).turns
+        turns = conversation(self._transcript.calls)
         past = sum(estimated_tokens(turn.question) + estimated_tokens(turn.answer) for turn in turns)
         part = whole - estimated_tokens(prompt.rpartition(RESULTS)[0])  # of a question after the first
         first = past + part if turns else whole
-        asked = [min(first + k * (part + written), self.client.context_window) for k in range(n)]
-        return sum(asked) + n * second, n * written
+        asked = n * first + n * (n - 1) // 2 * (part + written)
+        return asked + n * second, n * written
 
     def _feedback_tokens(self, problem: Problem) -> int:
         """Estimate the tokens of the feedback late in a run without evaluating designs, which may be slow."""

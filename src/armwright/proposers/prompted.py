@@ -11,7 +11,6 @@ from armwright.exceptions import DesignError, ProposalError
 from armwright.llm.answer import answer_schema, read_answer, read_text, written_answer
 from armwright.llm.backend import LlmBackend, OutputFormat, Question
 from armwright.llm.budget import CallBudget
-from armwright.llm.conversation import conversation
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
@@ -27,20 +26,19 @@ class PromptedProposer(LlmSession, Proposer):
 
     Args:
         backend: Who answers.
-        options: How designs are asked for.
         name: The `source` of its trials.
+        options: How designs are asked for.
         budget: Limits of the whole run.
     """
 
     def __init__(
-        self, backend: LlmBackend, options: PromptOptions, name: str, budget: CallBudget | None = None
+        self, backend: LlmBackend, name: str, options: PromptOptions, budget: CallBudget | None = None
     ) -> None:
         super().__init__(backend, name, options, budget)
         self.overlaps = self.overlaps and not self.chat  # a turn follows the one before it
         self._folder: Path | None = None
         self._hints_under_way: set[Hint] = set()  # in questions that are not answered yet
         self._lock = threading.Lock()
-        self._told_dropped = False  # in this session
 
     def settings(self) -> Mapping[str, Any]:
         """Return prompt, memory and form of the answer."""
@@ -50,7 +48,6 @@ class PromptedProposer(LlmSession, Proposer):
         """Open the run's transcript and hints."""
         self._begin(None if folder is None else folder / TRANSCRIPTS)
         self._folder = folder
-        self._told_dropped = False
 
     def open_read_only(self, folder: Path) -> None:
         """Open the transcript and hints of a run without changing them."""
@@ -82,7 +79,7 @@ class PromptedProposer(LlmSession, Proposer):
         finally:  # the transcript shows which hints were used
             with self._lock:
                 self._hints_under_way.difference_update(question.hints)
-        return proposal_of(question, text, problem, self._note_dropped(number))
+        return proposal_of(question, text, problem)
 
     def question(self, history: History, seed: int, number: int) -> Question:
         """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
@@ -115,17 +112,6 @@ class PromptedProposer(LlmSession, Proposer):
         """Return the prompt for trial `number`; in a chat, the part of it that is new."""
         prompt = design_prompt(history, seed, self.options, name=self.name, hints=[hint.text for hint in hints])
         return self._part_to_ask(prompt, number)
-
-    def _note_dropped(self, number: int) -> str:
-        """Return a message about the turns that were dropped from the chat, once in a session."""
-        n_dropped = conversation(self._transcript.calls, number).n_dropped if self.chat else 0
-        if self._told_dropped or not n_dropped:
-            return ""
-        self._told_dropped = True
-        return (
-            f"the chat exceeds the context of {self.backend.model}; turns dropped so far, from the oldest after the "
-            f"first: {n_dropped}"
-        )
 
     def output_format(self, problem: Problem) -> OutputFormat:
         """Return the form of the answer that holds the design; it is recorded as JSON that `read_text` reads."""

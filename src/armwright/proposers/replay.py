@@ -39,7 +39,7 @@ class ReplayProposer(PromptedProposer):
         if first is None:
             raise ReplayError(f"{self.recording.file} holds no proposal")
         backend = LlmBackend(first.model, first.origin)
-        super().__init__(backend, recorded_options(self.recording.config), first.proposal.rpartition("-")[0])
+        super().__init__(backend, first.proposal.rpartition("-")[0], recorded_options(self.recording.config))
         self._differing: set[str] = set()  # ids of the proposals whose prompts differ
 
     def settings(self) -> Mapping[str, Any]:

@@ -37,7 +37,7 @@ def preview(
     history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
     assert history.method is not None
     history = replace(history, method=history.method.model_copy(update={"n_total": n_total}))
-    proposer = PromptedProposer(LlmBackend(), options, "llm")
+    proposer = PromptedProposer(LlmBackend(), "llm", options)
     text = proposer.prompt_for(history, proposal_seed(seed, n_init), n_init)
     return _preview(proposer, problem, n_init, text)
 
@@ -55,7 +55,7 @@ def preview_after(run: Path, options: PromptOptions | None = None, *, number: in
     given = {name: value for name, value in stated.items() if name in PromptOptions.model_fields}
     asked = recorded_options(config).model_copy(update=given)
     settings = config.study.proposer or {}
-    proposer = PromptedProposer(LlmBackend(), asked, settings["name"] if "prompt" in settings else "llm")
+    proposer = PromptedProposer(LlmBackend(), settings["name"] if "prompt" in settings else "llm", asked)
     proposer.open_read_only(run)
     if number is not None:
         past = _history_at(run, config, history, proposer.requested_trials(), number)

@@ -1,25 +1,18 @@
 """Proposals in a plain `study.optimize`."""
 
 import logging
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import optuna
 import pytest
 from optuna.samplers import NSGAIIISampler, NSGAIISampler, TPESampler
-from optuna.storages import JournalStorage
-from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
 from armwright import ProposalCallback, RulesProposer
 from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
-from tests.support.chat_server import ChatServer
 
 
 class Told(StudyProposer):
@@ -115,50 +108,6 @@ def test_each_block_has_one_proposal_with_threads(sampler: optuna.samplers.BaseS
     assert callback.proposed == 12
 
 
-WORKER = """
-import sys, warnings
-import optuna
-from optuna.storages import JournalStorage
-from optuna.storages.journal import JournalFileBackend
-import armwright as aw
-
-place, url, seed = sys.argv[1:]
-storage = JournalStorage(JournalFileBackend(place))
-sampler = optuna.samplers.NSGAIISampler(population_size=8, seed=int(seed))
-study = optuna.load_study(study_name="shared", storage=storage, sampler=sampler)
-
-def objective(trial):
-    x = trial.suggest_float("x", 0.0, 1.0)
-    return x, 1.0 - x
-
-options = aw.ModelOptions(model="test-model", base_url=url, origin="scripted", answer="one-step")
-proposer = aw.StudyLlmProposer(options, "two ends of a line")
-study.optimize(objective, n_trials=10, callbacks=[aw.ProposalCallback(proposer, every=5)])
-"""
-
-
-@pytest.mark.slow
-def test_processes_on_one_storage_share_proposals(chat_server: ChatServer, tmp_path: Path) -> None:
-    chat_server.answer = lambda request: '{"reasoning": "so", "parameters": {"x": 0.125}, "reason": "an eighth"}'
-    place = str(tmp_path / "journal")
-    storage = JournalStorage(JournalFileBackend(place))
-    study = optuna.create_study(study_name="shared", storage=storage, directions=["minimize"] * 2)
-    command = [sys.executable, "-c", WORKER, place, chat_server.url]
-    workers = [subprocess.Popen([*command, str(seed)]) for seed in range(3)]
-    assert [worker.wait() for worker in workers] == [0, 0, 0]
-    finished = [trial.number for trial in study.trials if trial.state.is_finished()]
-    assert len(finished) == 30
-    asked = {f"scripted-{number + 1:04d}" for number in finished if number % 5 == 3}
-    study.sampler = NSGAIISampler(population_size=8, seed=9)
-    study.optimize(lambda trial: (trial.suggest_float("x", 0.0, 1.0), 0.0), n_trials=3)  # what was left waiting
-    came = [trial for trial in study.trials if trial.user_attrs.get("source") == "scripted"]
-    assert Counter(trial.user_attrs["proposal"] for trial in came) == dict.fromkeys(asked, 1)
-    assert len(chat_server.requests) == len(asked) >= 5
-    assert {trial.params["x"] for trial in came} == {0.125}
-    assert {trial.state for trial in came} == {TrialState.COMPLETE}
-    assert all("NSGAIISampler:generation" in trial.system_attrs for trial in came)
-
-
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
 @pytest.mark.parametrize("genetic", [NSGAIISampler, NSGAIIISampler])
 def test_genetic_samplers_use_proposals_as_parents(genetic: type[NSGAIISampler]) -> None:
@@ -201,14 +150,6 @@ def test_proposals_outside_the_space_are_refused(others: dict[str, Any], words: 
     assert [line for line in log if words in line] == log
     assert len(log) == 2
     assert log[0].endswith("the study continues without this proposal")
-
-
-def test_proposed_values_have_optuna_types() -> None:
-    """Values are rounded to the step, and numpy scalars converted, as storages cannot hold them."""
-    study = tpe()
-    proposer = Told(x=np.float64(7.0), y=np.int64(5))
-    study.optimize(objective, n_trials=2, callbacks=[ProposalCallback(proposer, every=2)])
-    assert [type(value) for value in study.trials[1].system_attrs["fixed_params"].values()] == [float, int]
 
 
 def test_proposer_fault_does_not_stop_the_study(log: list[str]) -> None:
