@@ -11,7 +11,7 @@ from pydantic_ai.usage import RequestUsage
 
 from armwright import LlmProposer, ModelOptions, PromptOptions
 from armwright.exceptions import ProposalError
-from armwright.llm.backend import CHECK, LlmBackend, OutputFormat, Question, Reply, Turn
+from armwright.llm.backend import LlmBackend, OutputFormat, Question, Reply, Turn
 from armwright.llm.budget import CallBudget
 from armwright.llm.prices import describe_cost
 from armwright.llm.responses import cost_of
@@ -48,9 +48,6 @@ class Greedy(LlmBackend):
         self.asking = threading.Event()
         self.go_on = threading.Event()
         self._lock = threading.Lock()
-
-    def check(self, most_requests: int | None = None) -> Reply:
-        return self.ask(CHECK)
 
     def ask(
         self,

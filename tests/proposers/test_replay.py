@@ -196,16 +196,9 @@ def test_recording_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "mean", "last"),
-    [
-        ("target-1-plus-seed0", 9.06, 9.83),
-        ("target-2-plus-n5-seed0", 19.35, 20.36),
-        ("target-3-minus-seed0", 19.65, 21.10),
-    ],
-)
-def test_shipped_recording_reaches_its_recorded_hypervolume(name: str, mean: float, last: float) -> None:
+def test_shipped_recording_reaches_its_recorded_hypervolume() -> None:
     """Rounding differs between processors, so other black-box designs may be drawn; the model's stay the same."""
+    name, mean, last = "target-2-plus-n5-seed0", 19.35, 20.36
     recording = read_recording(name)
     study = recording.config.study
     schedule = {"n_init": study.n_init, "n_step": study.n_step, "n_total": study.n_total}

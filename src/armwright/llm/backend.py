@@ -1,5 +1,6 @@
 """Questions, answers, and what answers them: a model (client.py) or a person (proposers/manual.py)."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
@@ -43,9 +44,6 @@ class Turn:
     answer: str
 
 
-CHECK = Question("", "check", "Answer with one word: ready")
-
-
 @dataclass(frozen=True)
 class Reply:
     """An answer and its cost."""
@@ -80,6 +78,14 @@ class OutputFormat:
     read: Callable[[Mapping[str, Any] | str], str]
 
 
+# A tiny question, so that a wrong name, key or address is reported before any work is done. Its structured answer shows
+# the output modes that the server supports.
+CHECK = Question("", "check", "Answer with one word: ready")
+_WORD = {"answer": {"type": "string"}}
+_READY = {"type": "object", "properties": _WORD, "required": ["answer"], "additionalProperties": False}
+CHECK_FORMAT = OutputFormat(_READY, json.dumps)
+
+
 class CallError(ProposalError):
     """A call without a usable answer; `reply` holds its cost."""
 
@@ -101,7 +107,7 @@ class Interrupted(KeyboardInterrupt):
 class LlmBackend:
     """Answers questions; several threads may ask at a time. This base class is only a name for those of a record."""
 
-    note: str = ""  # message for the user about the last check; empty for none
+    note: str = ""  # message for the user about the output mode; empty for none
 
     def __init__(self, model: str = "none", origin: str = "model") -> None:
         self.model = model  # who answers, for the user
@@ -109,10 +115,6 @@ class LlmBackend:
 
     def begin(self) -> None:
         """Start a session; an earlier cancellation no longer counts."""
-
-    def check(self, most_requests: int | None = None) -> Reply:
-        """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default."""
-        return Reply()
 
     def ask(
         self,

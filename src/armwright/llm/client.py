@@ -1,7 +1,6 @@
 """Calls to a language model. Only this file, connections.py, errors.py and responses.py import pydantic-ai."""
 
 import asyncio
-import json
 import logging
 import threading
 import time
@@ -15,7 +14,6 @@ from typing import Any, TypeVar
 from armwright.exceptions import SettingsError, UsageError
 from armwright.extras import requires_extra
 from armwright.files import replace_surrogates
-from armwright.llm.answer import object_schema
 from armwright.llm.backend import (
     CHECK,
     MAX_REQUESTS,
@@ -56,7 +54,6 @@ RETRY_SECONDS = 0.5  # before the first retry, unless the server states it; doub
 _OUTPUTS: Mapping[str, Any] = {"tool": ToolOutput, "native": NativeOutput, "prompted": PromptedOutput}
 # Modes in the order in which `output: auto` tries them, with a vendor and with another server.
 HOSTED_MODES, SERVER_MODES = ("tool", "native", "prompted"), ("native", "tool", "prompted")
-_CHECK_FORMAT = OutputFormat(object_schema({"answer": {"type": "string"}}), json.dumps)
 
 # With OPENAI_LOG=debug and the like, libraries log requests and responses.
 for _logger in ("openai._base_client", "anthropic._base_client", "httpx2", "httpcore2.http11"):
@@ -130,18 +127,6 @@ class ModelClient(LlmBackend):
         """Start a session."""
         self._cancelled = False
 
-    def check(self, most_requests: int | None = None) -> Reply:
-        """Ask one tiny question, so that a wrong name, key or address is reported before any work is done.
-
-        It is asked for a structured answer, which shows the output modes that the server supports.
-        """
-        modes = self._modes
-        reply = self._ask_for(CHECK, _CHECK_FORMAT, most_requests)
-        unsupported = " and ".join(modes[: modes.index(reply.output_mode)])
-        note = f"{self.model} does not support output {unsupported}; this run uses output {reply.output_mode}"
-        self.note = note if unsupported else ""
-        return reply
-
     def ask(
         self,
         question: Question,
@@ -181,6 +166,8 @@ class ModelClient(LlmBackend):
                     raise
             else:
                 self._modes = (mode,)
+                if unsupported := " and ".join(modes[: modes.index(mode)]):
+                    self.note = f"{self.model} does not support output {unsupported}; this run uses output {mode}"
                 return replace(spent.plus(reply), output_mode=mode)
         raise AssertionError("there is at least one mode")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from armwright.exceptions import ModelError, ProposalError
 from armwright.llm.backend import (
     CHECK,
+    CHECK_FORMAT,
     MAX_REQUESTS,
     CallError,
     Interrupted,
@@ -85,7 +86,7 @@ class LlmSession:
             ModelError: There is no answer, or its price is unknown under a cost limit.
         """
         try:
-            self._call(CHECK, self.backend.check, self._over)
+            self._call(CHECK, partial(self._send, CHECK, CHECK_FORMAT), self._over)
         except ProposalError as fault:
             if fault.kind == "budget":
                 return ""

@@ -27,8 +27,8 @@ class LlmProposer(PromptedProposer):
         from armwright.llm.client import ModelClient
 
         options = ModelOptions.of(options)
-        self.client = ModelClient(options)
-        super().__init__(self.client, options.source, options, CallBudget(options.max_calls, options.max_cost))
+        budget = CallBudget(options.max_calls, options.max_cost)
+        super().__init__(ModelClient(options), options.source, options, budget)
         self.options = options
 
     def settings(self) -> Mapping[str, Any]:

@@ -14,7 +14,7 @@ from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
-from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Transcript, hints_of, used_hints
+from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Transcript, used_hints
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.control import Hint, read_control
@@ -53,10 +53,6 @@ class PromptedProposer(LlmSession, Proposer):
         """Open the transcript and hints of a run without changing them."""
         self._transcript = Transcript(folder / TRANSCRIPTS, read_only=True)
         self._folder = folder
-
-    def requested_trials(self) -> Mapping[int, int]:
-        """Return the trials with a proposal, each with the number of finished trials known when it was requested."""
-        return {call.trial: call.known for call in self._transcript.calls if call.proposal}
 
     def unused(self, history: History) -> Sequence[Proposal]:
         """Return recorded designs of a killed run that no trial has used yet."""
@@ -103,10 +99,6 @@ class PromptedProposer(LlmSession, Proposer):
             hints = tuple(hint for hint in read_control(self._folder).hints if hint not in used)
             self._hints_under_way.update(hints)
         return hints
-
-    def past_hints(self, number: int) -> tuple[Hint, ...]:
-        """Return the hints that the question for trial `number` contained."""
-        return hints_of(self._transcript.calls, self.identity(number))
 
     def prompt_for(self, history: History, seed: int, number: int, hints: Sequence[Hint] = ()) -> str:
         """Return the prompt for trial `number`; in a chat, the part of it that is new."""
