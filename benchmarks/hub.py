@@ -142,14 +142,9 @@ def study(cell: Cell) -> Path:
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     space, directions, evaluate = problem_of(cell.problem, cell.registry)
     base, _, proposer = cell.method.partition(" + ")
-    callbacks = {
-        "": [],
-        "rules": [aw.ProposalCallback(aw.StudyRulesProposer(), cell.every, seed=cell.seed)],
-        "arm rules": [],
-    }[proposer]
     if proposer == "arm rules":
-        arms = aw.Problem(aw.load_task("target-1"))
-        callbacks = [aw.ProposalCallback(aw.RulesProposer(), cell.every, problem=arms, seed=cell.seed)]
+        return arm_study(cell, base)
+    callbacks = [aw.ProposalCallback(aw.StudyRulesProposer(), cell.every, seed=cell.seed)] if proposer else []
     made = optuna.create_study(directions=directions, sampler=sampler_of(base, cell.seed, cell.registry))
 
     def objective(trial: optuna.Trial) -> tuple[float, ...]:
@@ -162,6 +157,23 @@ def study(cell: Cell) -> Path:
     values = np.array([trial.values for trial in made.trials])
     values *= [-1.0 if direction == "maximize" else 1.0 for direction in directions]
     np.savez(cell.file, values=values, seconds=seconds)
+    return cell.file
+
+
+def arm_study(cell: Cell, base: str) -> Path:
+    """The same of a study of arms with the rules for arms."""
+    n_init = cell.every - 1
+    schedule = {"n_init": n_init, "n_step": cell.every, "n_total": cell.n_trials - n_init}
+    began = perf_counter()
+    run = aw.optimize(
+        aw.Problem(aw.load_task("target-1")),
+        proposer="rules",
+        sampler=lambda seed: sampler_of(base, seed, cell.registry),
+        seed=cell.seed,
+        verify=False,
+        **schedule,
+    )
+    np.savez(cell.file, values=np.array([trial.values for trial in run.trials]), seconds=perf_counter() - began)
     return cell.file
 
 

@@ -134,5 +134,5 @@ def test_invalid_server_address_is_refused(url: str) -> None:
     from armwright.llm.client import ModelClient
     from armwright.llm.model_options import ModelOptions
 
-    with pytest.raises(SettingsError, match="is not an address"):
+    with pytest.raises(SettingsError, match="expected an address such as"):
         ModelClient(ModelOptions(model="openai-chat:x", base_url=url))

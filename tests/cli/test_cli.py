@@ -161,7 +161,7 @@ def test_no_bracket_of_a_help_text_is_taken_for_markup() -> None:
         (("target-1", "--sampler", "tpee"), 'Did you mean "tpe"?'),
         (("target-1", "--proposer", "llm"), "needs a language model"),
         (("target-1", "--model", "openai-chat:gpt-4o"), "OPENAI_API_KEY"),
-        (("target-1", "--memory", "chta"), 'unknown memory "chta". Did you mean "chat"?'),
+        (("target-1", "--memory", "chta"), 'memory: expected none or chat, got "chta"; try "chat"'),
         (("target-1", "--max-cost", "1"), "max_cost = 1.0 needs a language model, and none is configured"),
         (
             ("target-1", "--proposer", "replay:x", *model_options(temperature=0)),

@@ -59,20 +59,6 @@ def test_answers_are_read_in_any_form(chat_server: ChatServer, ask: Ask, wire: s
     assert len(chat_server.requests) == 3  # nothing is asked again
 
 
-@every_output
-@both_formats
-@pytest.mark.fast_cases(3)
-def test_one_step_answers_hold_reasoning_and_design(
-    chat_server: ChatServer, ask: Ask, tmp_path: Path, wire: str, output: str
-) -> None:
-    chat_server.answer = giving(json.dumps({"reasoning": "Step 1: {think}.", **GOOD_DESIGN}))
-    run = ask(wire, output=output, answer="one-step")
-    assert (run.trials[4].reason, dict(run.trials[4].design.params)) == (GOOD_DESIGN["reason"], EXPECTED)
-    assert len(chat_server.requests) == 2
-    call = Transcript(tmp_path / "run" / "transcripts.jsonl").calls[-1]
-    assert (call.step, json.loads(call.answer)["reasoning"]) == ("answer", "Step 1: {think}.")
-
-
 @pytest.mark.parametrize(
     ("wire", "output", "refused", "words"),
     [
@@ -98,12 +84,3 @@ def test_refused_values_are_requested_again_with_the_reason(
     assert failed.requests == 3
     assert "link_1" in failed.answer
     assert output == "tool" or failed.answer == refused  # with the text around it
-
-
-@every_output
-@both_formats
-@pytest.mark.fast_cases(3)
-def test_corrected_answers_are_accepted(chat_server: ChatServer, ask: Ask, wire: str, output: str) -> None:
-    answers = iter([LEFT_OUT, {**GOOD_DESIGN, "link_3": "NaN"}, GOOD_DESIGN])
-    chat_server.answer = lambda request: json.dumps(next(answers)) if wants_design(request) else designer(request)
-    assert dict(ask(wire, output=output).trials[4].design.params) == EXPECTED

@@ -79,15 +79,6 @@ def test_keys_of_other_hosts_are_never_sent_and_keys_never_written(
     assert not any(b"planted-secret" in content for content in written)
 
 
-def test_finished_and_extended_runs_keep_their_usage(chat_server: ChatServer, tmp_path: Path) -> None:
-    first = run(chat_server, tmp_path / "run", n_total=1)
-    assert first.summary["proposer"]["calls"] == 3
-    assert run(chat_server, tmp_path / "run", n_total=1).summary == first.summary
-    longer = run(chat_server, tmp_path / "run", n_total=2)  # no proposal is due
-    assert longer.summary["proposer"] == first.summary["proposer"]
-    assert len(chat_server.requests) == 3
-
-
 def test_folder_of_an_unreachable_model_accepts_another_proposer(tmp_path: Path) -> None:
     with pytest.raises(ModelError):
         optimize(PROBLEM, proposer=llm_proposer("http://127.0.0.1:9/v1", model="m"), n_total=1, out=tmp_path / "run")

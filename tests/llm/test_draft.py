@@ -21,7 +21,7 @@ from armwright.robot.actuators import catalogue
 from armwright.yaml_documents import document_keys
 from tests.support import wire_formats as wires
 from tests.support.chat_server import Answer, ChatServer, Request
-from tests.support.command_line import PATIENCE, armwright, press_ctrl_c, refused
+from tests.support.command_line import PATIENCE, armwright, press_ctrl_c
 from tests.support.wire_formats import model_options
 
 DESCRIPTION = "paint a 1 × 2 m wall from a cart, payload 0.5 kg, cheap servos"
@@ -178,12 +178,6 @@ def test_invalid_draft_is_returned_with_the_reason_and_not_written(
     assert len(chat_server.requests) == 2 + 3
 
 
-@pytest.mark.parametrize("wrong", [ANSWER[: ANSWER.index("payload")], "[" * 20_000, "null"])
-def test_answer_without_an_object_is_returned(chat_server: ChatServer, tmp_path: Path, wrong: str) -> None:
-    draft = drafted(chat_server, [wrong, ANSWER], tmp_path)
-    assert (draft.task.name, draft.usage.calls) == ("wall", 2)
-
-
 def test_invisible_characters_do_not_reach_files_and_terminal(chat_server: ChatServer, tmp_path: Path) -> None:
     hostile = answer_with(
         {**FULL, "assumptions": ["0.6 m \x1b[31m\u2028in\x85front"]},
@@ -229,13 +223,6 @@ def test_taken_name_is_returned_to_the_model(chat_server: ChatServer, tmp_path: 
         assert aw.load_task(folder / "wall.yaml") == forced.task
 
 
-def test_dangling_link_counts_as_a_taken_name(chat_server: ChatServer, tmp_path: Path) -> None:
-    (tmp_path / "wall.yaml").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(ModelError, match="is taken"):
-        drafted(chat_server, ANSWER, tmp_path)
-    assert not (tmp_path / "elsewhere").exists()
-
-
 def test_file_created_during_the_call_is_kept(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -244,13 +231,6 @@ def test_file_created_during_the_call_is_kept(
     with pytest.raises(FailureError, match=r"cannot write .*wall\.yaml: File exists\. The answer is in"):
         drafted(chat_server, ANSWER, tmp_path)
     assert (tmp_path / "wall.yaml").read_text(encoding="utf-8") == "mine"
-
-
-def test_invalid_folder_is_reported_before_a_call(chat_server: ChatServer, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(FailureError, match="cannot write"):
-        drafted(chat_server, ANSWER, tmp_path / "file")
-    assert chat_server.requests == []
 
 
 def test_scripted_draft_is_not_attributed_to_a_model(chat_server: ChatServer, tmp_path: Path) -> None:
@@ -291,13 +271,6 @@ def test_cost_of_a_draft_is_bounded_by_public_prices(
     assert 0.0 < draft.usage.cost_usd < 0.01
 
 
-def test_draft_without_a_model_says_what_to_do(in_folder: Path) -> None:
-    assert "armwright init my-task.yaml" in refused(2, "draft", DESCRIPTION)
-    assert files(in_folder) == set()
-    with pytest.raises(SettingsError, match="a draft needs a language model"):
-        aw.draft(DESCRIPTION)
-
-
 @pytest.mark.parametrize("description", ["", " \n ", "\x1b[0m"])
 def test_empty_and_overlong_descriptions_are_refused(chat_server: ChatServer, description: str) -> None:
     options = aw.ModelOptions(model="m", base_url=chat_server.url)
@@ -336,10 +309,6 @@ def test_draft_prompt_is_shown_without_a_model(in_folder: Path) -> None:
     shown = f"{draft_prompt(DESCRIPTION)}\n{json.dumps(draft_schema(), indent=2)}\n"
     assert (done.returncode, done.stderr, done.stdout) == (0, "", shown)
     assert files(in_folder) == set()
-
-
-def test_draft_without_a_folder_writes_nothing(chat_server: ChatServer, in_folder: Path) -> None:
-    assert (drafted(chat_server, ANSWER).files, files(in_folder)) == ((), set())
 
 
 @pytest.mark.parametrize("refused", [0, 1])

@@ -78,7 +78,7 @@ def test_address_of_the_users_configuration_gets_the_key(
 
 def test_address_of_python_code_gets_the_key(server: ChatServer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARMWRIGHT_API_KEY", SERVER_KEY)
-    LlmProposer(ModelOptions(model="m", base_url=server.url)).client.check()
+    LlmProposer(ModelOptions(model="m", base_url=server.url)).check()
     assert {headers["authorization"] for headers in server.headers} == {f"Bearer {SERVER_KEY}"}
 
 

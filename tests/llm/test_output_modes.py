@@ -102,38 +102,16 @@ def test_first_mode_that_the_server_heeds_is_used(
 
 def test_check_stays_within_the_budget(chat_server: ChatServer) -> None:
     chat_server.answer = ignoring(*STRUCTURED)
-    result = run(llm_proposer(chat_server.url, max_calls=2), None, n_total=1)
-    assert result.trials[4].fault == "budget"
+    with pytest.raises(ModelError):
+        run(llm_proposer(chat_server.url, max_calls=2), None)
     assert len(chat_server.requests) == 2
 
 
-@pytest.mark.parametrize("output", ["auto", "native", "tool", "prompted"])
-def test_model_without_json_in_the_check_is_used_and_reported(
-    chat_server: ChatServer, tmp_path: Path, output: str
-) -> None:
+def test_model_without_json_in_any_mode_is_refused(chat_server: ChatServer) -> None:
     chat_server.answer = lambda request: "ready" if is_check(request) else designer(request)
-    seen: list[Progress] = []
-    result = run(llm_proposer(chat_server.url, output=output), tmp_path / "run", n_total=1, seen=seen)
-    used = "prompted" if output == "auto" else output
-    told = (
-        "test-model answered the check in another form than its JSON schema; its proposals may fail; "
-        f"this run uses output {used}"
-    )
-    assert told in [progress.note for progress in seen]
-    assert (result.trials[4].source, result.summary["proposer"]["output_mode"]) == ("llm", used)
-    assert len(chat_server.requests) == (3 if output == "auto" else 1) + 2
-
-
-def test_resumed_run_keeps_its_mode(chat_server: ChatServer, tmp_path: Path) -> None:
-    chat_server.answer = refusing(*STRUCTURED)
-    run(llm_proposer(chat_server.url), tmp_path / "run", n_total=1)
-    chat_server.requests.clear()
-    chat_server.answer = designer  # updated meanwhile
-    seen: list[Progress] = []
-    again = run(llm_proposer(chat_server.url), tmp_path / "run", seen=seen)
-    assert again.trials[7].source == "llm"
-    assert not any(request.keys() & set(STRUCTURED) for request in chat_server.requests)
-    assert not any("does not support output" in progress.note for progress in seen)
+    with pytest.raises(ModelError, match="test-model: "):
+        run(llm_proposer(chat_server.url), None)
+    assert len(chat_server.requests) == 3
 
 
 @pytest.mark.parametrize("output", ["tool", "native"])

@@ -8,7 +8,6 @@ import os
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from hypothesis import strategies as st
 from armwright import DesignSpace, History, Problem, Task, load_task, paper_space
 from armwright.llm.answer import answer_schema
 from armwright.llm.feedback import Feedback
-from armwright.llm.model_options import ANSWERS, PROMPTS, PromptOptions
+from armwright.llm.model_options import ANSWERS, PromptOptions
 from armwright.llm.prompt import MAX_TOKENS, design_prompt, estimated_tokens, parameters_prompt
 from armwright.llm.prompt_values import spread
 from armwright.runs.config import Method
@@ -39,6 +38,7 @@ from tests.support.fixed_problem import (
     proposal,
 )
 
+PROMPTS = ("plus", "minus", "full")
 GOLDEN = Path(__file__).parent / "golden"
 PAPER = FixedProblem(load_task("target-1"))
 OPEN = load_task("target-1").model_copy(update={"reference_point": None})  # for other objectives than the paper's
@@ -304,19 +304,6 @@ def test_prompt_of_any_problem_is_complete_and_bounded(data: st.DataObject, spac
     assert "None" not in text
 
 
-@pytest.mark.slow
-def test_longest_prompt_is_bounded() -> None:
-    """8 joints, 10,000 targets."""
-    space = paper_space(8).model_copy(update={"link": (0.030123456789, 0.300123456789)})
-    points = np.random.default_rng(0).uniform(-999, 999, (10_000, 3)).tolist()
-    task = Task(name="t" * 64, targets=tuple(map(tuple, points)), description="設計" * 5_000)  # type: ignore[arg-type]
-    history = fixed_history(FixedProblem(task, space), 70)
-    for answer, prompt in product(ANSWERS, PROMPTS):
-        text = rendered(history, prompt, answer=answer)
-        assert estimated_tokens(text) <= MAX_TOKENS
-        assert "of them, spread evenly" in text
-
-
 def test_full_prompt_shows_the_whole_front_and_all_targets_of_a_long_run() -> None:
     """50 members of the front and 20 targets fit into the limit."""
     history = front_of(50, FixedProblem(grid_task(20)))
@@ -364,13 +351,6 @@ def test_full_prompt_shows_the_latest_own_designs_with_their_joint_angles() -> N
         assert numbers(lines["Q_IK"]) == pytest.approx(q.ravel(), abs=0.0006)
         assert numbers(lines["ORIGIN"]) == pytest.approx(history.trials[number].design.origin, abs=0.00006)
     assert text.count("\nDesign 14\n") == 1
-
-
-@pytest.mark.parametrize(("n_front", "n_others"), [(1, 13), (2, 12)])
-def test_five_other_designs_are_shown_beside_a_small_front(n_front: int, n_others: int) -> None:
-    problem = FixedProblem(load_task("target-2"), SIX_AXIS) if n_front == 1 else PAPER
-    feedback = Feedback(fixed_history(problem), 0)
-    assert (len(feedback.front), len(feedback.others)) == (n_front, min(5, n_others))
 
 
 def test_shown_designs_depend_only_on_the_seed() -> None:

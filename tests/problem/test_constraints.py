@@ -27,7 +27,6 @@ from armwright.proof.attribution import attribution_by_source
 from armwright.proof.front_gap import known_front
 from armwright.proof.results import verify_run
 from armwright.proof.selection import numbers_of, pick
-from armwright.proposers.for_optuna.proposer import study_history
 from armwright.runs.folder import read_run
 from armwright.runs.history import History, found_reference_point
 from armwright.runs.trial import FinishedTrial
@@ -237,22 +236,6 @@ def test_reference_point_comes_from_feasible_designs() -> None:
     open_ = task("length >= 0.2", reference_point=None)
     run = optimize(Problem(open_), proposer="none", sampler="random", n_total=2, seed=0)
     assert run.history.reference_point == run.history.found_reference_point()
-
-
-def test_custom_study_states_its_violations() -> None:
-    problem = Problem(task(*BOUNDS))
-    designs = SPACE.sample(6, 0)
-    outcomes = problem.evaluate(designs)
-    values, broken = outcomes.values, outcomes.violations
-    box = BlackBox(SPACE, "random", 0, constraints=[constraint.description for constraint in problem.constraints])
-    rows = zip(designs, values.tolist(), broken.tolist(), strict=True)
-    trials = [FinishedTrial(i, "bbo", d, tuple(v), violations=tuple(b)) for i, (d, v, b) in enumerate(rows)]
-    box.restore(trials)
-    assert np.array_equal(study_history(box.study, problem).violations, broken)
-    silent = BlackBox(SPACE, "random", 0)
-    silent.restore([replace(trial, violations=()) for trial in trials])
-    with pytest.raises(SettingsError, match=r'set_constraint\("worst_error <= 0.4"'):
-        study_history(silent.study, problem)
 
 
 def test_front_search_reports_feasible_designs_only() -> None:

@@ -20,7 +20,7 @@ from armwright import (
 from armwright.exceptions import AnswerPendingError
 from armwright.llm.backend import Turn
 from armwright.llm.conversation import RESULTS, conversation, new_part
-from armwright.llm.model_options import PROMPTS, ModelOptions, PromptOptions
+from armwright.llm.model_options import ModelOptions, PromptOptions
 from armwright.llm.prompt import design_prompt
 from armwright.llm.transcript import Call, Transcript
 from armwright.study.progress import Progress, StudyResult
@@ -157,8 +157,7 @@ def limited(turns: int, refusal: Answer) -> Callable[[Request], Answer]:
 @pytest.mark.parametrize("refusal", TOO_LONG)
 def test_oldest_turns_are_dropped_beyond_the_context(server: ChatServer, tmp_path: Path, refusal: str) -> None:
     server.answer = limited(4, TOO_LONG[refusal])
-    seen: list[Progress] = []
-    result = run(chat(server), tmp_path / "run", n_total=10, n_step=1, seen=seen)
+    result = run(chat(server), tmp_path / "run", n_total=10, n_step=1)
     assert [trial.source for trial in result.trials[4:]] == ["llm"] * 10
     sent = conversations(server, free)
     users = [content(messages, "user") for messages in sent]
@@ -168,17 +167,13 @@ def test_oldest_turns_are_dropped_beyond_the_context(server: ChatServer, tmp_pat
     assert [len(messages) // 2 for messages in sent] == [0, 1, 2, 3, 4, 5, 3, 4, 5, 3, 4, 5, 3]
     assert {own[0] for own in users} == {first}
     assert users[6] == [first, asked[3], asked[4], asked[5]]
-    notes = [progress.note for progress in seen if "chat exceeds" in progress.note]
-    assert notes == [
-        "the chat exceeds the context of test-model; turns dropped so far, from the oldest after the first: 2"
-    ]
     assert result.summary["proposer"]["call_failures"] == {"context": 3}
     assert result.summary["proposer"]["failures"] == {}
     calls = Transcript(tmp_path / "run" / "transcripts.jsonl").calls
-    assert conversation(calls).n_dropped == 6
     # A replay fails and drops as the run did.
-    again = run(ReplayProposer(tmp_path / "run", strict=True), tmp_path / "again", n_total=10, n_step=1)
+    again = run(ReplayProposer(tmp_path / "run"), tmp_path / "again", n_total=10, n_step=1)
     assert [trial.values for trial in again.trials] == [trial.values for trial in result.trials]
+    assert again.summary["proposer"]["differing_prompts"] == 0
     assert again.summary["proposer"]["calls"] == result.summary["proposer"]["calls"]
     played = Transcript(tmp_path / "again" / "transcripts.jsonl").calls
     assert [(call.prompt, call.fault) for call in played] == [(call.prompt, call.fault) for call in calls]
@@ -202,13 +197,6 @@ def test_dropping_stays_within_the_requests_of_a_question(
     assert [len(messages) // 2 for messages in conversations(server, free)] == turns
     assert result.trials[14].fault == "context"
     assert result.trials[-1].fault == last
-
-
-def test_question_too_long_for_the_first_turn_fails_once(server: ChatServer) -> None:
-    server.answer = limited(0, TOO_LONG["openai"])
-    result = run(chat(server))
-    assert [trial.fault for trial in result.trials[4::3]] == [None, "context", "context"]
-    assert len(conversations(server, free)) == 3
 
 
 def test_failed_proposals_are_no_turns(server: ChatServer) -> None:
@@ -236,7 +224,7 @@ def test_manual_questions_of_a_chat_contain_what_is_new(tmp_path: Path) -> None:
     assert second.startswith(RESULTS)
 
 
-@pytest.mark.parametrize("name", PROMPTS)
+@pytest.mark.parametrize("name", ["plus", "minus", "full"])
 def test_built_in_prompts_change_below_their_results_only(name: str) -> None:
     history = optimize(PROBLEM, proposer="rules", n_init=5, n_total=20, seed=0).history
     early, late = (design_prompt(history.before(n), n, PromptOptions(prompt=name)) for n in (5, 25))
@@ -270,8 +258,8 @@ def test_conversation_of_a_repeated_question_holds_its_last_answer() -> None:
         call("llm-0007", "answer", "three"),
         call("llm-0010", "answer", "four"),
     ]
-    assert [turn.answer for turn in conversation(calls).turns] == ["one", "three", "four"]
-    assert conversation(calls, 10).turns == conversation(calls[:-1]).turns  # as it was then
+    assert [turn.answer for turn in conversation(calls)] == ["one", "three", "four"]
+    assert conversation(calls, 10) == conversation(calls[:-1])  # as it was then
 
 
 def test_forecast_of_input_grows_with_the_square(server: ChatServer, tmp_path: Path) -> None:

@@ -21,7 +21,6 @@ OPTIONS: dict[str, Any] = {
     "max_calls": 1,
     "max_cost": 1.0,
     "on_failure": "stop",
-    "replay_strict": False,
     "wait": True,
 }
 
@@ -33,7 +32,7 @@ def test_option_without_effect_is_refused(tmp_path: Path, name: str, option: str
     chosen, options = name.replace("x", str(tmp_path / "x")), ModelOptions(**{option: OPTIONS[option]})
     if name == "manual:x" and option in ("prompt", "memory", "wait"):
         assert choose_proposer(chosen, options).proposer is not None
-    elif name == "replay:x" and option in ("in_flight", "replay_strict"):
+    elif name == "replay:x" and option == "in_flight":
         with pytest.raises(ReplayError, match="to replay"):
             choose_proposer(chosen, options)
     else:

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from armwright import Problem, ReplayProposer, StudyResult, load_task, optimize
-from armwright.exceptions import ReplayError, RunFolderError, SettingsError
-from armwright.llm.recording_file import find_recording
-from armwright.llm.transcript import Call, Transcript
+from armwright.exceptions import ReplayError, SettingsError
+from armwright.llm.recording_file import read_recording
+from armwright.llm.transcript import Transcript
 from armwright.proposers import prompted
 from armwright.proposers.factory import choose_proposer
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
@@ -42,8 +42,10 @@ def recorded(server: ChatServer, out: Path, asking: dict[str, Any] | None = None
     return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
 
 
-def replayed(run: Path, out: Path | None = None, strict: bool = False, **settings: Any) -> StudyResult:
-    return optimize(PROBLEM, proposer=ReplayProposer(run, strict=strict), out=out, **{**SETTINGS, **settings})
+def replayed(run: Path, out: Path | None = None, differing: int = 0, **settings: Any) -> StudyResult:
+    again = optimize(PROBLEM, proposer=ReplayProposer(run), out=out, **{**SETTINGS, **settings})
+    assert again.summary["proposer"]["differing_prompts"] == differing
+    return again
 
 
 def lines(folder: Path) -> list[dict[str, Any]]:
@@ -55,7 +57,7 @@ def lines(folder: Path) -> list[dict[str, Any]]:
 def test_replay_equals_its_recording(varied: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
     first = recorded(varied, tmp_path / "first", asking)
     varied.requests.clear()
-    again = replayed(tmp_path / "first", tmp_path / "again", strict=True)
+    again = replayed(tmp_path / "first", tmp_path / "again")
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
     assert not varied.requests
     # the account is the recorded one, and the origin stays what it was
@@ -64,15 +66,9 @@ def test_replay_equals_its_recording(varied: ChatServer, tmp_path: Path, asking:
     assert all(own[key] == told[key] for key in ("name", "calls", "tokens", "origin"))
     assert (own["origin"], own["replay"], own["differing_prompts"]) == ("scripted", str(tmp_path / "first"), 0)
     # and so a replay can be replayed
-    third = replayed(tmp_path / "again", tmp_path / "third", strict=True)
+    third = replayed(tmp_path / "again", tmp_path / "third")
     assert lines(tmp_path / "third") == lines(tmp_path / "first")
     assert third.summary["proposer"]["calls"] == own["calls"]
-
-
-def test_overlapped_run_is_replayed_with_its_arrivals(varied: ChatServer, tmp_path: Path) -> None:
-    recorded(varied, tmp_path / "first", in_flight=2)
-    replayed(tmp_path / "first", tmp_path / "again", strict=True)
-    assert lines(tmp_path / "again") == lines(tmp_path / "first")
 
 
 def test_late_answers_are_replayed_when_they_arrived(chat_server: ChatServer, tmp_path: Path) -> None:
@@ -93,7 +89,7 @@ def test_late_answers_are_replayed_when_they_arrived(chat_server: ChatServer, tm
     assert proposals[0].number - (proposals[0].feedback or 0) >= 5
     assert len({trial.asked or trial.number for trial in proposals}) == 8
     chat_server.requests.clear()
-    again = replayed(tmp_path / "first", tmp_path / "again", strict=True, **settings)
+    again = replayed(tmp_path / "first", tmp_path / "again", **settings)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
     assert again.summary["proposer"]["overlap"] == run.summary["proposer"]["overlap"]
     assert not chat_server.requests
@@ -152,18 +148,15 @@ def test_proposals_of_a_truncated_recording_are_missing(
     assert {trial.fault for trial in turns if trial.number >= there} == {"missing"}
 
 
-def test_differing_prompt_is_reported_or_refused_when_strict(varied: ChatServer, tmp_path: Path) -> None:
+def test_differing_prompt_is_reported(varied: ChatServer, tmp_path: Path) -> None:
     recorded(varied, tmp_path / "first")
     file = tmp_path / "first" / "transcripts.jsonl"
     file.write_text(
         file.read_text(encoding="utf-8").replace("You are an expert", "You are a layman", 1), encoding="utf-8"
     )
     notes: list[str] = []
-    run = replayed(tmp_path / "first", watch=lambda progress: notes.append(progress.note))
+    replayed(tmp_path / "first", differing=1, watch=lambda progress: notes.append(progress.note))
     assert [note for note in notes if note] == ["the prompt for scripted-0004 differs from the recorded one"]
-    assert run.summary["proposer"]["differing_prompts"] == 1
-    with pytest.raises(ReplayError, match="reasoning prompt for scripted-0004 differs"):
-        replayed(tmp_path / "first", strict=True)
 
 
 def test_recording_with_other_settings_is_reported(varied: ChatServer, tmp_path: Path) -> None:
@@ -175,19 +168,6 @@ def test_recording_with_other_settings_is_reported(varied: ChatServer, tmp_path:
     assert run.trials[5].fault == "missing"
     assert "holds no proposal for trial 5; check n_init and n_step" in "".join(notes)
     assert run.summary["proposer"]["flagged"]
-
-
-@pytest.mark.parametrize("key", ["answer", "known", "requests", "cost_usd", "seconds"])
-def test_a_recorded_call_without_a_key_is_damaged(tmp_path: Path, key: str) -> None:
-    call = Call("llm-0004", "answer", "Which?", answer="{}", origin="model", model="m")
-    path = tmp_path / "transcripts.jsonl"
-    Transcript(path).add(call)
-    assert Transcript(path).calls == (call,)
-    content = json.loads(path.read_text(encoding="utf-8"))
-    del content[key]
-    path.write_text(json.dumps(content) + "\n", encoding="utf-8")
-    with pytest.raises(RunFolderError, match="line 1 is damaged"):
-        Transcript(path)
 
 
 def test_invalid_recordings_are_refused(tmp_path: Path) -> None:
@@ -216,18 +196,10 @@ def test_recording_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "mean", "last"),
-    [
-        ("target-1-plus-seed0", 9.06, 9.83),
-        ("target-2-plus-n5-seed0", 19.35, 20.36),
-        ("target-3-minus-seed0", 19.65, 21.10),
-    ],
-)
-def test_shipped_recording_reaches_its_recorded_hypervolume(name: str, mean: float, last: float) -> None:
+def test_shipped_recording_reaches_its_recorded_hypervolume() -> None:
     """Rounding differs between processors, so other black-box designs may be drawn; the model's stay the same."""
-    recording = find_recording(name)
-    assert recording is not None
+    name, mean, last = "target-2-plus-n5-seed0", 19.35, 20.36
+    recording = read_recording(name)
     study = recording.config.study
     schedule = {"n_init": study.n_init, "n_step": study.n_step, "n_total": study.n_total}
     settings = {**schedule, "seed": recording.config.seed, "verify": False}
@@ -242,8 +214,7 @@ def test_shipped_recording_reaches_its_recorded_hypervolume(name: str, mean: flo
 
 def test_prompts_of_a_recording_are_shown_as_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(prompted, "design_prompt")  # today's templates are not used
-    recording = find_recording("target-1-plus-seed0")
-    assert recording is not None
+    recording = read_recording("target-1-plus-seed0")
     # With another seed, the prompts would differ from the recorded ones.
     settings = {**SETTINGS, "n_init": 10, "n_step": 10}
     run = optimize(PROBLEM, proposer=ReplayProposer("target-1-plus-seed0"), out=tmp_path / "run", **settings)

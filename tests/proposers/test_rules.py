@@ -10,12 +10,19 @@ from hypothesis import strategies as st
 
 from armwright import DesignSpace, FinishedTrial, Problem, Proposal, Task, paper_space, random_task
 from armwright.pareto import front_mask, hypervolume
-from armwright.proposers.rule_candidates import candidates
 from armwright.proposers.rule_feedback import RULES, members_inside
-from armwright.proposers.rule_forecast import forecast, gains, gravity_share
-from armwright.proposers.rule_geometry import median, needed_length, shoulders
+from armwright.proposers.rule_forecast import candidates, forecast, gains, gravity_share
 from armwright.proposers.rule_helpers import rule_of
-from armwright.proposers.rule_structures import STRUCTURES, Structure, adapted, fitted, fitted_structures
+from armwright.proposers.rule_structures import (
+    STRUCTURES,
+    Structure,
+    adapted,
+    fitted,
+    fitted_structures,
+    median,
+    needed_length,
+    shoulders,
+)
 from armwright.proposers.rules import EXPECTED, STRUCTURE, RulesProposer
 from armwright.runs.history import RANDOM, History
 from armwright.spaces.link_mass import MassModel, MassPerLink, MassPerMetre

@@ -140,7 +140,6 @@ def test_previewed_hints_are_those_sent(chat_server: ChatServer, tmp_path: Path)
     assert NOTE in preview_after(out, PromptOptions(prompt="minus")).prompt
     run(out, asks(chat_server), n_total=6)
     assert [call.prompt for call in calls(out) if call.hints] == [shown]
-    assert preview_after(out, number=7).prompt == shown
     assert NOTE not in preview_after(out).prompt
 
 
@@ -168,7 +167,7 @@ def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: P
     for again in (tmp_path / "again", tmp_path / "third"):
         again.mkdir()
         add_hint(again, "another")
-        run(again, ReplayProposer(before, strict=True))
+        assert run(again, ReplayProposer(before)).summary["proposer"]["differing_prompts"] == 0
         assert lines(again) == lines(first)
         assert [call.hints for call in calls(again)] == [call.hints for call in calls(first)]
         before = again

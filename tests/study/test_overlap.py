@@ -22,8 +22,7 @@ class Held(Proposer):
 
     name = "held"
 
-    def __init__(self, per_call: int = 1, faulty: tuple[int, ...] = ()) -> None:
-        self.per_call = per_call
+    def __init__(self, faulty: tuple[int, ...] = ()) -> None:
         self.faulty = faulty
         self.known: dict[int, int] = {}
         self.most_under_way = 0
@@ -42,7 +41,7 @@ class Held(Proposer):
             if thread.name == f"armwright-request-{number}" and thread is not threading.current_thread():
                 thread.join()
 
-    def propose(self, history: History, seed: int, number: int) -> list[Proposal]:
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
         with self._lock:
             gate = self._gates.setdefault(number, threading.Event())
             self.known[number] = len(history)
@@ -50,8 +49,7 @@ class Held(Proposer):
         gate.wait()
         if number in self.faulty:
             raise ProposalError("timeout", "it did not answer")
-        designs = history.problem.space.sample(self.per_call, seed)
-        return [Proposal(design, f"held-{number}.{i}") for i, design in enumerate(designs)]
+        return Proposal(history.problem.space.sample(1, seed)[0], f"held-{number}")
 
 
 class Releasing(threading.Thread):
@@ -93,22 +91,18 @@ def test_answer_becomes_the_next_trial_after_its_arrival() -> None:
     run = search(proposer, n_total=10, watch=watch)
     assert [trial.number for trial in run.trials if trial.source == "held"] == [7, 11]
     first, second = run.trials[7], run.trials[11]
-    assert (first.proposal, first.asked, first.feedback) == ("held-4.0", 4, 4)
-    assert (second.proposal, second.asked, second.feedback) == ("held-9.0", 9, 9)
+    assert (first.proposal, first.asked, first.feedback) == ("held-4", 4, 4)
+    assert (second.proposal, second.asked, second.feedback) == ("held-9", 9, 9)
     ratios = dict.fromkeys(("ratio_planned", "ratio", "ratio_with_failures"), 0.2)
     age = {"mean": 2.5, "max": 3}
     assert run.summary["proposer"]["overlap"] == {"in_flight": 1, **ratios, "feedback_age": age}
 
 
 @pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize(("n_step", "n_total", "in_flight", "per_call"), [
-    (5, 23, 1, 1), (5, 40, 3, 1), (1, 12, 4, 1), (4, 30, 2, 3), (30, 20, 2, 1), (2, 9, 1, 4),
-])  # fmt: skip
+@pytest.mark.parametrize(("n_step", "n_total", "in_flight"), [(5, 23, 1), (5, 40, 3), (1, 12, 4), (30, 20, 2)])
 @pytest.mark.fast_cases(3)
-def test_ratio_does_not_depend_on_the_order_of_answers(
-    seed: int, n_step: int, n_total: int, in_flight: int, per_call: int
-) -> None:
-    proposer = Held(per_call)
+def test_ratio_does_not_depend_on_the_order_of_answers(seed: int, n_step: int, n_total: int, in_flight: int) -> None:
+    proposer = Held()
     run = released(proposer, seed, n_step, n_total, in_flight)
     sources = [trial.source for trial in run.trials[N_INIT:]]
     planned = -(-n_total // n_step)
@@ -117,7 +111,7 @@ def test_ratio_does_not_depend_on_the_order_of_answers(
     entered = 0
     for i, source in enumerate(sources):
         entered += source == "held"
-        assert i + 1 - entered <= (n_step - 1) * (entered + in_flight * per_call)
+        assert i + 1 - entered <= (n_step - 1) * (entered + in_flight)
     ids = [trial.proposal for trial in run.trials if trial.proposal]
     assert len(set(ids)) == planned
     for trial in run.trials:
@@ -133,21 +127,6 @@ def test_failed_call_becomes_a_black_box_trial() -> None:
     assert run.summary["proposer"]["failures"] == {"timeout": 1}
     overlap = run.summary["proposer"]["overlap"]  # a failure is a turn, and no proposal
     assert (overlap["ratio_planned"], overlap["ratio"], overlap["ratio_with_failures"]) == (0.2, 0.15, 0.2)
-
-
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize(("in_flight", "per_call"), [(1, 3), (2, 3), (4, 2)])
-@pytest.mark.fast_cases(3)
-def test_further_designs_of_an_answer_wait_for_their_blocks(seed: int, in_flight: int, per_call: int) -> None:
-    run = released(Held(per_call), seed, 4, 36, in_flight)
-    entered = [trial for trial in run.trials if trial.proposal]
-    assert len(entered) == 9
-    asked: list[int] = []
-    for place, trial in enumerate(entered):
-        call, _, design = str(trial.proposal).partition(".")
-        assert int(design) == asked.count(int(call[5:]))  # in their order
-        asked.append(int(call[5:]))
-        assert design == "0" or trial.number >= N_INIT + 4 * place
 
 
 def test_permanent_fault_of_concurrent_calls_is_reported_once() -> None:

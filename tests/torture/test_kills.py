@@ -94,7 +94,7 @@ def model_in_flight(_: Path, server: ChatServer) -> Scenario:
         assert sum(trial["source"] == "llm" for trial in trials(folder)) == 10
         n_requests = len(server.requests)
         again = folder.with_name(f"{folder.name}-again")
-        replay = ("--proposer", f"replay:{folder}", *model_options(replay_strict=True), "--no-figures")
+        replay = ("--proposer", f"replay:{folder}", "--no-figures")
         done_here(study(40, *replay).arguments(again))
         assert trials(again) == trials(folder)
         assert len(server.requests) == n_requests

@@ -9,7 +9,7 @@ from importlib import metadata
 
 from armwright.exceptions import ArmwrightError, ModelError
 from armwright.extras import EXTRAS, install_command, is_installed, missing_packages
-from armwright.llm.backend import CallError, Reply
+from armwright.llm.backend import CHECK, CHECK_FORMAT, CallError, Reply
 from armwright.llm.configuration import configuration_path, configured_model
 from armwright.llm.model_options import ModelOptions
 from armwright.runs.config import versions
@@ -60,7 +60,7 @@ def try_model(options: ModelOptions | None = None) -> str:
 
     client = ModelClient(configured.options)
     try:
-        reply = client.check()
+        reply = client.ask(CHECK, CHECK_FORMAT)
     except CallError as fault:
         raise ModelError(f"{fault} ({fault.kind})") from fault
     cost = "price unknown" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"

@@ -156,8 +156,8 @@ def optimize(
     print_prompt: Annotated[
         str | None,
         option(
-            "Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run folder), the "
-            "number of a trial of a run, or schema (of the answer).",
+            "Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run folder), or "
+            "schema (of the answer).",
             panel=MODEL,
             metavar="WHAT",
         ),

@@ -27,8 +27,8 @@ def show_prompt(
     """Print the prompt, or the schema of its answer.
 
     Args:
-        what: One of WHAT, or the number of a trial.
-        task: A run folder for the prompts of that run; else the task of a new run.
+        what: One of WHAT.
+        task: A run folder for the next prompt of that run; else the task of a new run.
         space: The design space of a new run, if stated.
         load: Loads the problem of a new run.
         options: The options of the model.
@@ -36,17 +36,14 @@ def show_prompt(
         n_total: Counted trials of a new run.
         seed: Seed of a new run.
     """
-    number = int(what) if what.isdecimal() else None
-    if number is None and what not in WHAT:
-        raise SettingsError(f'--print-prompt "{what}": expected {", ".join(WHAT)}, or the number of a trial of a run')
+    if what not in WHAT:
+        raise SettingsError(f'--print-prompt "{what}": expected {" or ".join(WHAT)}')
     if os.path.isfile(os.path.join(task, CONFIG)):
         if space is not None:
             raise SettingsError(f"--space {space} is for a new run; {task} has its own")
-        shown = preview_after(Path(task), options, number=number)
-    elif number is None:
-        shown = preview(load(), options, n_init=n_init, n_total=n_total, seed=seed)
+        shown = preview_after(Path(task), options)
     else:
-        raise SettingsError(f"--print-prompt {number}: expected a run folder, got {task}")
+        shown = preview(load(), options, n_init=n_init, n_total=n_total, seed=seed)
     if what == "schema":
         print_json(shown.schema)
         return

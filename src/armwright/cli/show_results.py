@@ -279,10 +279,7 @@ def _show_proposer(console: Console, proposer: dict[str, Any]) -> None:
             "proposer and is left out of its row in tables"
         )
     if proposer.get("differing_prompts"):
-        console.print(
-            f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones; "
-            "the model option `replay_strict: true` makes that an error"
-        )
+        console.print(f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones")
     overlap = proposer["overlap"]
     if overlap is not None:
         age = overlap["feedback_age"]

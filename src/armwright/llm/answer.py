@@ -7,7 +7,7 @@ strict about content: nothing is guessed, and errors are those of the design spa
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -98,13 +98,9 @@ def read_text(text: str, problem: Problem) -> Answer:
 def last_json_object(text: str) -> str:
     """Return the last JSON object of a text as it is written there, or the text if it holds none."""
     text = text[-MAX_ANSWER_LENGTH:]
-    last, end = text, 0
-    for brace in islice(re.finditer(r"\{", text), MAX_OBJECTS):
-        if brace.start() >= end:
-            with suppress(ValueError, RecursionError):
-                _, end = _decoder.raw_decode(text, brace.start())
-                last = text[brace.start() : end]
-    return last
+    starts = (match.start() for match in islice(re.finditer(r"\{", text), MAX_OBJECTS))
+    spans = [(start, end) for start, end, content in _outermost_objects(text, starts) if content is not None]
+    return text[slice(*spans[-1])] if spans else text
 
 
 def per_joint(space: DesignSpace) -> dict[str, bool]:
@@ -195,6 +191,19 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 _decoder = json.JSONDecoder(object_pairs_hook=_without_repeats)
 
 
+def _outermost_objects(text: str, starts: Iterable[int]) -> Iterator[tuple[int, int, dict[str, Any] | None]]:
+    """Yield the positions and the content of JSON objects that begin there; no content if one is incomplete."""
+    end = 0
+    for start in starts:
+        if start < end:
+            continue
+        try:
+            content, end = _decoder.raw_decode(text, start)
+        except (ValueError, RecursionError):
+            content = None
+        yield start, end, content
+
+
 def _last_object(text: str, names: set[str]) -> tuple[int, dict[str, Any], int]:
     """Return the last outermost JSON object with a parameter, after its position, before that of an incomplete one.
 
@@ -204,20 +213,14 @@ def _last_object(text: str, names: set[str]) -> tuple[int, dict[str, Any], int]:
     # Trailing commas and comments are common; blanks in their place keep the positions.
     text = "\n".join(map(_without_comment, text.split("\n")))
     text = re.sub(r",(?=\s*[}\]])", " ", text)
-    last, found = -1, dict[str, Any]()
-    end, incomplete = 0, -1
-    for position in [match.start() for match in re.finditer(r'\{\s*"', text)][-MAX_OBJECTS:]:
-        if position < end:
-            continue
-        try:
-            content, end = _decoder.raw_decode(text, position)
-        except (ValueError, RecursionError):
-            beginning = text[position : position + 200].lower()
-            if any(f'"{name}"' in beginning for name in names):
-                incomplete = position
-            continue
-        if names & {str(name).lower() for name in content}:
-            last, found = position, content
+    last, found, incomplete = -1, dict[str, Any](), -1
+    starts = [match.start() for match in re.finditer(r'\{\s*"', text)][-MAX_OBJECTS:]
+    for start, _, content in _outermost_objects(text, starts):
+        if content is not None:
+            if names & {str(name).lower() for name in content}:
+                last, found = start, content
+        elif any(f'"{name}"' in text[start : start + 200].lower() for name in names):
+            incomplete = start
     return last, found, incomplete
 
 

@@ -31,6 +31,15 @@ _NAMED = re.compile(rf"((?:origin|link|stroke|limit)_\w{{1,40}})\s*[:=]\s*({_NUM
 _NAMES_ALONE = re.compile(
     r"\((?:(?:origin|link|joint|stroke|limit|direction|tube|motor)_\w++|\.\.\.|…|[,\s])++\)\s*[:=]", re.IGNORECASE
 )
+# Items of the lines that hold names; "-" stands for a module without such a value.
+_SIZE = r"(?<!\S)-(?!\S)|[\d.]{1,20} ?[x×] ?[\d.]*\d"
+_WORDS = {
+    "mount": r"[A-Za-z]+(?:[-+][xy])?",
+    "tube": _SIZE,
+    "tubes": _SIZE,
+    "motors": r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*",
+    "directions": r"[-+] ?[xyzXYZ]",
+}
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
 _HAS_NUMBER, _HAS_LETTER = re.compile(r"\d|nan|inf", re.IGNORECASE), re.compile(r"[A-Za-z]")
@@ -95,14 +104,13 @@ def expand_lists(content: Mapping[str, Any], custom: Mapping[str, bool] = NO_CUS
         content: the object.
         custom: whether each custom parameter has a value per joint.
     """
-    lists = (*GROUPS, *(name for name, per_joint in custom.items() if per_joint))
+    lists = {name for name, per_joint in custom.items() if per_joint}
     values: dict[str, Any] = {}
     for name, value in content.items():
-        if name in GROUPS and isinstance(value, str):
-            values.update(_values(name, value) or {name: value})
-        elif name in lists and isinstance(value, str):
-            values.update(_custom_values(name, value, True) or {name: value})
-        elif name in lists and isinstance(value, (list, tuple)):
+        if name in (*GROUPS, *lists) and isinstance(value, str):
+            found = _custom_values(name, value, True) if name in lists else _values(name, value)
+            values.update(found or {name: value})
+        elif name in (*GROUPS, *lists) and isinstance(value, (list, tuple)):
             items: list[Any] = list(value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
             values.update({_parameter(name, i): item for i, item in enumerate(items) if item not in (None, NOTHING)})
         else:
@@ -142,19 +150,11 @@ def _values(name: str, text: str) -> dict[str, Any] | None:
     text = _LATEX.sub(" ", text.translate(_MINUS))
     if name == "joints":
         return _joints(text)
-    if name == "mount":
-        mounts = re.findall(r"[A-Za-z]+(?:[-+][xy])?", text)
-        return {"mount": mounts[0].lower()} if len(mounts) == 1 else None
-    if name in ("tube", "tubes"):
-        sizes = re.findall(r"(?<!\S)-(?!\S)|[\d.]{1,20} ?[x×] ?[\d.]*\d", _spaced(re.sub(r"tube_\d+\s*[:=]", "", text)))
-        sizes = [size.replace("×", "x").replace(" ", "") for size in sizes]
-        return _listed(name, sizes) if name == "tubes" else {"tube": sizes[0]} if len(sizes) == 1 else None
-    if name == "motors":
-        names = re.findall(r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*", _spaced(re.sub(r"motor_\d+\s*[:=]", "", text)))
-        return _listed(name, [motor.rstrip(".") for motor in names])
-    if name == "directions":
-        signed = re.findall(r"[-+] ?[xyzXYZ]", re.sub(r"direction_\d+\s*[:=]", "", text))
-        return _listed(name, [direction.replace(" ", "").lower() for direction in signed])
+    if name in _WORDS:
+        words = re.findall(_WORDS[name], _spaced(re.sub(rf"{LISTS.get(name, name)}_\d+\s*[:=]", "", text)))
+        words = [word.replace("×", "x").replace(" ", "").rstrip(".") for word in words]
+        words = words if name == "motors" else [word.lower() for word in words]
+        return _listed(name, words) if name in LISTS else {name: words[0]} if len(words) == 1 else None
     if name == "origin":
         text = re.sub(r"(?<!\w)([xyz])\s*[:=]", r"origin_\1 =", text)
     elif name == "links":
@@ -169,9 +169,8 @@ def _values(name: str, text: str) -> dict[str, Any] | None:
     items = _ITEM.findall(text)
     if not items or not _LEFT_OVER.fullmatch(_ITEM.sub("", text)):
         return None
-    if name in ("strokes", "ranges"):
-        return _listed(name, [NOTHING if number == "nan" else _with_unit(number, unit) for number, unit in items])
-    return {_parameter(name, i): _with_unit(*item) for i, item in enumerate(items)}
+    has_gaps = name in ("strokes", "ranges")
+    return _listed(name, [NOTHING if has_gaps and item[0] == "nan" else _with_unit(*item) for item in items])
 
 
 def _spaced(text: str) -> str:

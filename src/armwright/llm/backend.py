@@ -1,8 +1,9 @@
-"""What answers questions: a model (client.py), a recording of one (replay_backend.py) or a person (manual.py)."""
+"""Questions, answers, and what answers them: a model (client.py) or a person (proposers/manual.py)."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -43,9 +44,6 @@ class Turn:
     answer: str
 
 
-CHECK = Question("", "check", "Answer with one word: ready")
-
-
 @dataclass(frozen=True)
 class Reply:
     """An answer and its cost."""
@@ -80,6 +78,14 @@ class OutputFormat:
     read: Callable[[Mapping[str, Any] | str], str]
 
 
+# A tiny question, so that a wrong name, key or address is reported before any work is done. Its structured answer shows
+# the output modes that the server supports.
+CHECK = Question("", "check", "Answer with one word: ready")
+_WORD = {"answer": {"type": "string"}}
+_READY = {"type": "object", "properties": _WORD, "required": ["answer"], "additionalProperties": False}
+CHECK_FORMAT = OutputFormat(_READY, json.dumps)
+
+
 class CallError(ProposalError):
     """A call without a usable answer; `reply` holds its cost."""
 
@@ -98,24 +104,17 @@ class Interrupted(KeyboardInterrupt):
         self.reply = reply
 
 
-class LlmBackend(Protocol):
-    """Answer questions; several threads may ask at a time."""
+class LlmBackend:
+    """Answers questions; several threads may ask at a time. This base class is only a name for those of a record."""
 
-    model: str  # who answers, for the user
-    origin: str  # what answers: `model`, `manual` (a person) or `scripted` (a stand-in)
-    note: str = ""  # message for the user about the last check; empty for none
+    note: str = ""  # message for the user about the output mode; empty for none
+
+    def __init__(self, model: str = "none", origin: str = "model") -> None:
+        self.model = model  # who answers, for the user
+        self.origin = origin  # what answers: `model`, `manual` (a person) or `scripted` (a stand-in)
 
     def begin(self) -> None:
-        """Start a session; an earlier cancellation no longer counts. Does nothing by default."""
-
-    def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
-        """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default.
-
-        Args:
-            output_mode: Mode in which an earlier session of the run asked; empty to choose one.
-            most_requests: Limit of requests; None for no limit.
-        """
-        return Reply()
+        """Start a session; an earlier cancellation no longer counts."""
 
     def ask(
         self,
@@ -132,7 +131,7 @@ class LlmBackend(Protocol):
             most_requests: Limit of requests, those after invalid answers included; None for no limit.
             earlier: Turns of the conversation that the question continues; None for a question on its own.
         """
-        ...
+        raise NotImplementedError
 
     def cancel(self) -> None:
-        """Cancel all calls at once; none starts before the next session. Does nothing by default."""
+        """Cancel all calls at once; none starts before the next session."""

@@ -2,12 +2,14 @@
 
 import math
 import threading
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 
 from armwright.exceptions import ProposalError
 from armwright.llm.backend import MAX_REQUESTS
 from armwright.llm.transcript import Call, n_requests, total_cost
+
+POLL_SECONDS = 0.1  # between two looks whether the session of a waiting question is over
 
 
 class CallBudget:
@@ -23,31 +25,27 @@ class CallBudget:
         self.max_cost = max_cost
         self._change = threading.Condition()
         self._reserved = 0  # requests of the questions in flight
-        self._calls: list[Call] = []
-
-    def begin(self, calls: Iterable[Call]) -> None:
-        """Start a session, given the calls of earlier ones."""
-        self._calls = list(calls)
-
-    def spend(self, call: Call) -> None:
-        """Count a call."""
-        self._calls.append(call)
-
-    @property
-    def price_is_missing(self) -> bool:
-        """True if the cost is limited but unknown for some answer."""
-        return self.max_cost is not None and total_cost(self._calls) is None
 
     @contextmanager
-    def reserved(self, is_over: Callable[[], bool]) -> Generator[int | None]:
+    def reserved(self, calls: Callable[[], Sequence[Call]], over: threading.Event) -> Generator[int | None]:
         """Reserve what a prompt may cost and return its number of requests; None if there is no limit.
 
         Waits while the rest is reserved for others, until they have returned or the session is over.
 
+        Args:
+            calls: Returns the calls so far, earlier sessions included.
+            over: Set once the session is over.
+
         Raises:
             ProposalError: The budget is used up, or the session is over.
         """
-        requests = self._reserve(is_over)
+        requests = None
+        with self._change:
+            while not over.is_set() and (requests := self._left(calls())) is not None and requests < 1:
+                self._change.wait(POLL_SECONDS)
+            if over.is_set():
+                raise ProposalError("cancelled", "the study is over")
+            self._reserved += requests or 0
         try:
             yield requests
         finally:
@@ -55,49 +53,29 @@ class CallBudget:
                 self._reserved -= requests or 0
                 self._change.notify_all()
 
-    def wake(self) -> None:
-        """Wake up waiting questions after the session is over."""
-        with self._change:
-            self._change.notify_all()
+    def _left(self, calls: Sequence[Call]) -> int | None:
+        """Return the requests left for the next question; None if there is no limit.
 
-    def _reserve(self, is_over: Callable[[], bool]) -> int | None:
-        with self._change:
-            while not is_over():
-                if self.max_calls is None and self.max_cost is None:
-                    return None
-                self._check()
-                requests = self._left(self._reserved)
-                if requests >= 1:
-                    self._reserved += requests
-                    return requests
-                self._change.wait()
-        raise ProposalError("cancelled", "the study is over")
-
-    def _check(self) -> None:
-        """Raise ProposalError if nothing would be left even if the questions in flight needed nothing."""
-        if self.price_is_missing:
-            reason = f"the cost of its calls is unknown, so max_cost {self.max_cost:g} cannot hold; use max_calls"
-        elif self.max_calls is not None and n_requests(self._calls) >= self.max_calls:
-            reason = f"max_calls {self.max_calls} is used up"
-        elif self._left(0) < 1:
-            reason = f"max_cost {self.max_cost:g} USD is used up"
-        else:
-            return
-        raise ProposalError("budget", reason, final=True)
-
-    def _left(self, reserved: int) -> int:
-        """Return the requests left for the next prompt while this many are reserved for others."""
-        left = MAX_REQUESTS
-        if self.max_calls is not None:
-            left = min(left, self.max_calls - n_requests(self._calls) - reserved)
+        Raises:
+            ProposalError: Nothing would be left even if the questions in flight needed nothing.
+        """
+        limits: list[int] = []
         if self.max_cost is not None:
-            rest = self.max_cost - (total_cost(self._calls) or 0.0)
-            priced = [call for call in self._calls if call.requests and call.proposal]
-            each = (total_cost(priced) or 0.0) / max(1, n_requests(priced))
-            if rest <= 0.0:
-                left = 0
-            elif not priced:
-                left = min(left, MAX_REQUESTS - reserved)
-            elif each:
-                left = min(left, math.floor(rest / each + 1e-9) - reserved)  # 5 of 5 despite rounding
-        return left
+            limits.append(self._affordable(self.max_cost, calls))
+        if self.max_calls is not None:
+            left = self.max_calls - n_requests(calls)
+            if left < 1:
+                raise ProposalError("budget", f"max_calls {self.max_calls} is used up", final=True)
+            limits.append(left - self._reserved)
+        return min(MAX_REQUESTS, *limits) if limits else None
+
+    def _affordable(self, max_cost: float, calls: Sequence[Call]) -> int:
+        spent, priced = total_cost(calls), [call for call in calls if call.requests and call.proposal]
+        if spent is None:
+            reason = f"the cost of its calls is unknown, so max_cost {max_cost:g} cannot hold; use max_calls"
+            raise ProposalError("budget", reason, final=True)
+        each = (total_cost(priced) or 0.0) / max(1, n_requests(priced))
+        left = math.floor((max_cost - spent) / each + 1e-9) if each else MAX_REQUESTS  # 5 of 5 despite rounding
+        if spent >= max_cost or left < 1:
+            raise ProposalError("budget", f"max_cost {max_cost:g} USD is used up", final=True)
+        return left - self._reserved if each or not priced else MAX_REQUESTS

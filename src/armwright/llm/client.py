@@ -2,20 +2,18 @@
 
 import asyncio
 import logging
-import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Coroutine, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from typing import Any, TypeVar
 
 from armwright.exceptions import SettingsError, UsageError
 from armwright.extras import requires_extra
 from armwright.files import replace_surrogates
-from armwright.llm.answer import object_schema
 from armwright.llm.backend import (
     CHECK,
     MAX_REQUESTS,
@@ -35,13 +33,7 @@ from armwright.text import map_text
 with requires_extra("llm", "a language model"):
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
-    from pydantic_ai.messages import (
-        ModelMessage,
-        ModelRequest,
-        ModelResponse,
-        TextPart,
-        UserPromptPart,
-    )
+    from pydantic_ai.messages import ModelMessage, ModelRequest, ModelResponse, TextPart, UserPromptPart
     from pydantic_ai.models import ModelRequestParameters
     from pydantic_ai.models.wrapper import WrapperModel
     from pydantic_ai.output import StructuredDict
@@ -62,7 +54,6 @@ RETRY_SECONDS = 0.5  # before the first retry, unless the server states it; doub
 _OUTPUTS: Mapping[str, Any] = {"tool": ToolOutput, "native": NativeOutput, "prompted": PromptedOutput}
 # Modes in the order in which `output: auto` tries them, with a vendor and with another server.
 HOSTED_MODES, SERVER_MODES = ("tool", "native", "prompted"), ("native", "tool", "prompted")
-_CHECK_SCHEMA = object_schema({"answer": {"type": "string"}})
 
 # With OPENAI_LOG=debug and the like, libraries log requests and responses.
 for _logger in ("openai._base_client", "anthropic._base_client", "httpx2", "httpcore2.http11"):
@@ -120,8 +111,7 @@ class ModelClient(LlmBackend):
             raise SettingsError(f'model "{model}" names no model; expected a name such as openai-chat:gpt-4o')
         if options.answer == "text":
             raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
-        self.model = model
-        self.origin = options.origin
+        super().__init__(model, options.origin)
         self.timeout = options.timeout
         self._server = server_of(options)
         seconds = options.timeout
@@ -133,58 +123,38 @@ class ModelClient(LlmBackend):
         self._pending: set[Future[Any]] = set()
         self._cancelled = False
 
-    @property
-    def context_window(self) -> int:
-        """Tokens that the model can handle in one request; huge if unknown."""
-        return self._model.profile.get("context_window") or sys.maxsize
-
     def begin(self) -> None:
         """Start a session."""
         self._cancelled = False
 
-    def check(self, output_mode: str = "", most_requests: int | None = None) -> Reply:
-        """Ask one tiny question, so that a wrong name, key or address is reported before any work is done.
-
-        It is asked for a structured answer, which shows the output modes that the server supports.
-        """
-        if output_mode in self._modes:
-            self._modes = (output_mode,)
-        modes, note = self._modes, ""
-        try:
-            reply = self._in_supported_mode(lambda mode, _: self._check(mode), most_requests)
-        except _FormError as fault:
-            if not fault.reply.answer.strip():
-                raise
-            reply = replace(fault.reply, output_mode=self._modes[-1])  # the model is there
-            note = f"{self.model} answered the check in another form than its JSON schema; its proposals may fail"
-        self._modes = (reply.output_mode,)
-        unsupported = modes[: modes.index(reply.output_mode)]
-        if unsupported and not note:
-            note = f"{self.model} does not support output {' and '.join(unsupported)}"
-        self.note = f"{note}; this run uses output {reply.output_mode}" if note else ""
+    def ask(
+        self,
+        question: Question,
+        output: OutputFormat | None = None,
+        most_requests: int | None = None,
+        earlier: Sequence[Turn] | None = None,
+    ) -> Reply:
+        """Return the answer to a prompt; refusals of its output format are sent back to the model."""
+        if output is not None:
+            return self._ask_for(question, output, most_requests, earlier)
+        reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, earlier)
+        if not reply.answer.strip():
+            raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
 
-    def _check(self, mode: str) -> Reply:
-        agent: Agent[None, Any] = Agent(self._model, output_type=_output_type(mode, _CHECK_SCHEMA), retries=0)
-        try:
-            return self._run(agent, CHECK, self.timeout)
-        except CallError as fault:
-            if fault.kind == "answer" and fault.reply.requests:
-                raise _FormError(fault.kind, str(fault), fault.reply) from fault
-            raise
-
-    def _in_supported_mode(self, ask: Callable[[str, int | None], Reply], most_requests: int | None) -> Reply:
-        """Ask in the first output mode that the server accepts and respects, which is used from then on.
-
-        Args:
-            ask: Asks in a mode, with at most this number of requests.
-            most_requests: Limit of the requests in all modes; None for no limit.
-        """
+    def _ask_for(
+        self,
+        question: Question,
+        output: OutputFormat,
+        most_requests: int | None,
+        earlier: Sequence[Turn] | None = None,
+    ) -> Reply:
+        """Ask in the first output mode that the server accepts and respects, which is used from then on."""
         spent, modes = Reply(), self._modes
         for mode in modes:
             left = None if most_requests is None else most_requests - spent.requests
             try:
-                reply = ask(mode, left)
+                reply = self._ask_in(mode, question, output, left, earlier)
             except (CallError, Interrupted) as fault:
                 fault.reply = spent = spent.plus(fault.reply)
                 others = modes[modes.index(mode) + 1 :]
@@ -196,28 +166,20 @@ class ModelClient(LlmBackend):
                     raise
             else:
                 self._modes = (mode,)
+                if unsupported := " and ".join(modes[: modes.index(mode)]):
+                    self.note = f"{self.model} does not support output {unsupported}; this run uses output {mode}"
                 return replace(spent.plus(reply), output_mode=mode)
         raise AssertionError("there is at least one mode")
 
-    def ask(
+    def _ask_in(
         self,
+        mode: str,
         question: Question,
-        output: OutputFormat | None = None,
-        most_requests: int | None = None,
-        earlier: Sequence[Turn] | None = None,
+        output: OutputFormat,
+        most_requests: int | None,
+        earlier: Sequence[Turn] | None,
     ) -> Reply:
-        """Return the answer to a prompt; refusals of its output format are sent back to the model."""
-        run = partial(self._run, question=question, seconds=self.timeout, earlier=earlier)
-        if output is not None:
-            return self._in_supported_mode(
-                lambda mode, left: self._ask_for(output, mode, partial(run, most_requests=left)), most_requests
-            )
-        reply = run(Agent(self._model, retries=REASKS), most_requests=most_requests)
-        if not reply.answer.strip():
-            raise CallError("answer", f"{self.model} gave an empty answer", reply)
-        return reply
-
-    def _ask_for(self, output: OutputFormat, mode: str, run: Callable[[Agent[None, Any]], Reply]) -> Reply:
+        """Ask in one output mode; refusals go back to the model, except in a check."""
         accepted: list[str] = []
         refusals: list[str] = []
 
@@ -230,10 +192,12 @@ class ModelClient(LlmBackend):
                 raise ModelRetry(str(refusal)) from refusal
             return answer
 
-        agent: Agent[None, Any] = Agent(self._model, output_type=_output_type(mode, output.schema), retries=REASKS)
+        schema = _OUTPUTS[mode](StructuredDict(dict(output.schema)))
+        retries = 0 if question is CHECK else REASKS
+        agent: Agent[None, Any] = Agent(self._model, output_type=schema, retries=retries)
         agent.output_validator(accept)
         try:
-            reply = run(agent)
+            reply = self._run(agent, question, most_requests, earlier)
         except CallError as fault:
             if fault.kind in ("answer", "limit") and fault.reply.requests and not refusals:
                 raise _FormError(fault.kind, str(fault), fault.reply) from fault
@@ -255,15 +219,16 @@ class ModelClient(LlmBackend):
         self,
         agent: Agent[None, Any],
         question: Question,
-        seconds: float,
-        most_requests: int | None = None,
-        earlier: Sequence[Turn] | None = None,
+        most_requests: int | None,
+        earlier: Sequence[Turn] | None,
     ) -> Reply:
         started = time.perf_counter()
-        settings = ModelSettings(**self._settings, request_timeout=seconds, max_retries=0)
+        settings = ModelSettings(**self._settings, request_timeout=self.timeout, max_retries=0)
         if earlier is not None:
             settings["cache"] = True  # where a provider does not cache by itself: the next question repeats this one
-        past = _messages(earlier or ())
+        past: list[ModelMessage] = []
+        for turn in earlier or ():  # structured answers are text, whichever output mode they were given in
+            past += [ModelRequest([UserPromptPart(turn.question)]), ModelResponse([TextPart(turn.answer)])]
         limits = UsageLimits(request_limit=most_requests)
         call = agent.run(question.prompt, message_history=past, model_settings=settings, usage_limits=limits)
         with capture_run_messages() as messages:
@@ -306,22 +271,6 @@ class ModelClient(LlmBackend):
             raise
         finally:
             self._pending.discard(future)
-
-
-def _output_type(mode: str, schema: Mapping[str, Any]) -> Any:
-    return _OUTPUTS[mode](StructuredDict(dict(schema)))
-
-
-def _messages(turns: Sequence[Turn]) -> list[ModelMessage]:
-    """Return turns as messages; structured answers are text, whichever output mode they were given in."""
-    return [
-        message
-        for turn in turns
-        for message in (
-            ModelRequest([UserPromptPart(turn.question)]),
-            ModelResponse([TextPart(turn.answer)]),
-        )
-    ]
 
 
 @cache

@@ -1,7 +1,6 @@
 """The conversation of a run with `memory: chat`, rebuilt from its transcript, so that nothing is stored twice."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from armwright.llm.backend import Turn
 from armwright.llm.transcript import FIRST_STEPS, LAST_STEPS, Call
@@ -10,15 +9,7 @@ from armwright.text import without_thoughts
 RESULTS = "# Results so far"  # heading in a prompt; all that changes from question to question stands below it
 
 
-@dataclass(frozen=True)
-class Conversation:
-    """The turns that are sent with a question."""
-
-    turns: tuple[Turn, ...]  # the turns in their order
-    n_dropped: int = 0  # number of turns that were dropped because they exceeded the model's context
-
-
-def conversation(calls: Iterable[Call], trial: int | None = None) -> Conversation:
+def conversation(calls: Iterable[Call], trial: int | None = None) -> tuple[Turn, ...]:
     """Return the turns before the question for a trial; None: before the next question.
 
     A turn is the prompt of a proposal with all of its answers. Of a proposal in two steps these are the reasoning and
@@ -31,21 +22,19 @@ def conversation(calls: Iterable[Call], trial: int | None = None) -> Conversatio
     """
     asked: dict[str, Call] = {}
     turns: dict[str, Turn] = {}
-    n_dropped = 0
     for call in calls:
         if not call.proposal or (trial is not None and call.trial > trial):
             continue
         if call.fault == "context" and call.step in FIRST_STEPS:
             for proposal in list(turns)[1 : len(turns) // 2 + 1]:
                 del turns[proposal]
-                n_dropped += 1
         if call.fault is not None or call.trial == trial:
             continue
         if call.step in FIRST_STEPS:
             asked[call.proposal] = call
         if call.step in LAST_STEPS and call.proposal in asked:
             turns[call.proposal] = _turn(asked[call.proposal], call)
-    return Conversation(tuple(turns.values()), n_dropped)
+    return tuple(turns.values())
 
 
 def new_part(prompt: str, turns: Sequence[Turn]) -> str:

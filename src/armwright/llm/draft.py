@@ -9,7 +9,7 @@ import os
 import shlex
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
@@ -34,7 +34,7 @@ from armwright.llm.draft_prompt import draft_prompt, draft_schema
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import estimated_tokens
 from armwright.llm.session import LlmSession
-from armwright.llm.transcript import Transcript
+from armwright.llm.transcript import Call, Transcript
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
 from armwright.proof.summary_file import ProposerSummary
@@ -51,6 +51,7 @@ MAX_NOTE_LENGTH, MAX_COMMAND_LENGTH = 1000, 4000  # characters in a file's comme
 MAX_LINE_LENGTH, MAX_LINES = 400, 40  # of assumptions and of questions
 MAX_FAULT_LENGTH = 600  # characters
 WIDTH = 110  # of comments
+WITHOUT_A_MODEL = "armwright init my-task.yaml writes a task to edit without a model"
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -77,15 +78,16 @@ class Draft:
     @property
     def command(self) -> str:
         """The command that searches it, for a shell."""
-        return _command(self.files or _places(None, self.task.name, self.space))
+        task, *spaces = map(str, self.files or _places(Path(), self.task.name, self.space is not None))
+        return shlex.join(["armwright", "optimize", task, *(part for space in spaces for part in ("--space", space))])
 
     def record(self) -> dict[str, Any]:
         """Return the draft as JSON."""
-        usage = ("origin", "calls", "input_tokens", "output_tokens", "cost_usd")
+        usage = asdict(self.usage)
         return {
             "files": [str(path) for path in self.files],
             "by": self.by,
-            **{name: getattr(self.usage, name) for name in usage},
+            **{name: usage[name] for name in ("origin", "calls", "input_tokens", "output_tokens", "cost_usd")},
             "assumptions": list(self.assumptions),
             "questions": list(self.questions),
             "task": self.task.model_dump(mode="json"),
@@ -106,7 +108,7 @@ class Drafter(LlmSession):
         from armwright.llm.client import ModelClient
 
         options = configured.options
-        super().__init__(ModelClient(options), "draft", CallBudget(options.max_calls, options.max_cost))
+        super().__init__(ModelClient(options), "draft", options, CallBudget(options.max_calls, options.max_cost))
         self.configured = configured
         self.out = out
         self.force = force
@@ -116,7 +118,6 @@ class Drafter(LlmSession):
                 out.mkdir(parents=True, exist_ok=True)
                 if not os.access(out, os.W_OK):
                     raise PermissionError(errno.EACCES, "no permission")
-            # Earlier drafts in this folder are only counted: each has a budget of its own.
             self._transcript = Transcript(out / DRAFTS)
 
     def forecast(self, description: str) -> str:
@@ -130,9 +131,9 @@ class Drafter(LlmSession):
             f"{ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
         )
 
-    def summary(self) -> ProposerSummary:
-        """Return calls, tokens and cost of the last draft."""
-        return self._summary([call for call in self._transcript.calls if call.proposal == self._identity])
+    def _calls(self) -> Sequence[Call]:
+        """Return the calls of this draft: each draft has a budget of its own."""
+        return [call for call in self._transcript.calls if call.proposal == self._identity]
 
     def draft(self, description: str) -> Draft:
         """Return the draft of a description, written if there is a folder.
@@ -157,7 +158,7 @@ class Drafter(LlmSession):
         except ProposalError as fault:
             raise self._failure(fault) from fault
         draft = replace(drafts[-1], usage=self.summary())
-        return draft if self.out is None else replace(draft, files=self._write(draft, description, self.out))
+        return draft if self.out is None else self._written(draft, description, self.out)
 
     def _read(self, content: Mapping[str, Any]) -> Draft:
         """Return the draft that an answer holds; UsageError refuses it."""
@@ -181,22 +182,22 @@ class Drafter(LlmSession):
             raise SpaceError(f'the space needs its own name; "{space.name}" is the default\'s')
         if self.out is None or self.force:
             return
-        for place in _places(self.out, task.name, DesignSpace()):
+        for place in _places(self.out, task.name, True):
             if os.path.lexists(place):
                 raise TaskError(
                     f'the name "{task.name}" is taken: {place.name} exists (--force replaces it); choose another'
                 )
 
-    def _write(self, draft: Draft, description: str, out: Path) -> tuple[Path, ...]:
-        """Write the files; without `force`, never replace one that appeared meanwhile."""
-        places = _places(out, draft.task.name, draft.space)
-        head = _head(draft, description, _command(places))
-        for place, text in reversed(list(zip(places, (draft.task_yaml, draft.space_yaml), strict=False))):
+    def _written(self, draft: Draft, description: str, out: Path) -> Draft:
+        """Return the draft with its files, which are written; without `force`, none that appeared is replaced."""
+        draft = replace(draft, files=_places(out, draft.task.name, draft.space is not None))
+        head = _head(draft, description)
+        for place, text in reversed(list(zip(draft.files, (draft.task_yaml, draft.space_yaml), strict=False))):
             with naming_write_errors(place, f". {self._kept()}", FailureError):
                 if not self.force:
                     place.touch(exist_ok=False)
                 replace_file(place, (head + text).encode())
-        return places
+        return draft
 
     def _by(self) -> str:
         """Return who answers; a stand-in is never called a model."""
@@ -221,8 +222,7 @@ class Drafter(LlmSession):
         advice = "Describe it in other words" if answered else "Check the model, its key and base_url"
         reason = one_line(str(fault), MAX_FAULT_LENGTH).rstrip(".")
         return ModelError(
-            f"no draft: {reason}. {self._kept() if answered else ''}{advice}; "
-            "armwright init my-task.yaml writes a task to edit without a model",
+            f"no draft: {reason}. {self._kept() if answered else ''}{advice}; {WITHOUT_A_MODEL}",
             final=fault.kind if fault.final else None,
         )
 
@@ -254,8 +254,7 @@ def drafting_model(options: ModelOptions | str | None = None) -> ConfiguredModel
     if configured is None:
         raise SettingsError(
             "a draft needs a language model, and none is configured: give --model openai-chat:gpt-4o (with its key in "
-            f"the environment), set ARMWRIGHT_MODEL, or name one in {configuration_path()}; without any, "
-            "armwright init my-task.yaml writes a task to edit"
+            f"the environment), set ARMWRIGHT_MODEL, or name one in {configuration_path()}; {WITHOUT_A_MODEL}"
         )
     return configured
 
@@ -283,7 +282,7 @@ def _lines(content: Any) -> tuple[str, ...]:
     return tuple(one_line(str(line), MAX_LINE_LENGTH) for line in lines[:MAX_LINES] if str(line).strip())
 
 
-def _head(draft: Draft, description: str, command: str) -> str:
+def _head(draft: Draft, description: str) -> str:
     """Return the comment at the top of a file."""
     lines = [
         "A draft that nobody has checked: check the numbers before you run it.",
@@ -293,7 +292,7 @@ def _head(draft: Draft, description: str, command: str) -> str:
         *(f"Open question: {line}" for line in draft.questions),
     ]
     wrapped = [piece for line in lines for piece in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
-    wrapped.append(f"Run it with:  {one_line(command, MAX_COMMAND_LENGTH)}")
+    wrapped.append(f"Run it with:  {one_line(draft.command, MAX_COMMAND_LENGTH)}")
     return "".join(f"# {line}\n" for line in wrapped) + "\n"
 
 
@@ -301,12 +300,6 @@ def _input_tokens(description: str) -> int:
     return estimated_tokens(draft_prompt(description) + json.dumps(draft_schema()))
 
 
-def _places(out: Path | None, name: str, space: DesignSpace | None) -> tuple[Path, ...]:
+def _places(folder: Path, name: str, with_space: bool) -> tuple[Path, ...]:
     """Return the path of the task's file and, if there is one, of the space's."""
-    folder = out or Path()
-    return (folder / f"{name}.yaml", *([] if space is None else [folder / f"{name}-space.yaml"]))
-
-
-def _command(places: Sequence[Path]) -> str:
-    task, *spaces = map(str, places)
-    return shlex.join(["armwright", "optimize", task, *(part for space in spaces for part in ("--space", space))])
+    return (folder / f"{name}.yaml", *([folder / f"{name}-space.yaml"] * with_space))

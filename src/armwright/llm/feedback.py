@@ -102,7 +102,6 @@ class Feedback:
         joints = _joint_labels(self._history, number)
         return {
             **_parameters(self._history, number, at.length),
-            **_fine_lengths(self._history, number, at.length),
             "e_each": points(self._each[row, shown], at.shares) if at.shares else "",
             "p_ik": points(evaluation.reached[row, shown], at.length),
             "a_ik": _angles(evaluation, row, shown),
@@ -138,7 +137,6 @@ def design_lines(history: History, numbers: Sequence[int], name: str) -> list[Re
     return [
         {
             **_parameters(history, number, at.length),
-            **_fine_lengths(history, number, at.length),
             "source": own.get(history.trials[number].source, history.trials[number].source.replace("_", " ")),
             "e_all": _objectives(history.trials[number], at),
             "gained": None if gains is None else _number(float(gains[number]), max(at.objectives)),
@@ -179,20 +177,16 @@ def _decimals(scale: float) -> int:
 
 
 def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
-    design = history.trials[number].design
+    design, fine = history.trials[number].design, max(FINE, decimals)
     return {
         "number": number,
         "origin": vector(design.origin, decimals),
         "joints": "(" + ", ".join(design.joints) + ")",
         "links": vector(design.links, decimals),
+        "fine_origin": vector(design.origin, fine),
+        "fine_links": vector(design.links, fine),
         "extras": _extras(history.problem.space, design, decimals),
     }
-
-
-def _fine_lengths(history: History, number: int, decimals: int) -> dict[str, str]:
-    """Return the base and the links of a design with enough decimals to see on which side of a plane the base is."""
-    design, decimals = history.trials[number].design, max(FINE, decimals)
-    return {"fine_origin": vector(design.origin, decimals), "fine_links": vector(design.links, decimals)}
 
 
 def _violated(history: History, number: int) -> str:
@@ -208,24 +202,24 @@ def _violated(history: History, number: int) -> str:
 
 def _extras(space: DesignSpace, design: Design, decimals: int) -> list[tuple[str, str]]:
     """Return the choices of a whole design and its lists besides joints and links, as lines of an answer."""
-    names = {parameter.name for parameter in space.parameters}
-    extras = [(name.upper(), str(design.params[name])) for name in SINGLE if name in design.params]
-    for group, kind in module_lists(names).items():
+
+    def column(kind: str, digits: str) -> str:
         values = [design.params.get(f"{kind}_{j}", NOTHING) for j in range(1, len(design.joints) + 1)]
-        shown = [value if isinstance(value, str) else f"{value:.{decimals}f}" for value in values]
-        extras.append((group.upper(), f"({', '.join(shown)})"))
-    for name, entry in space.custom:
-        if entry.per is None:
-            extras.append((name.upper(), _custom_text(design.params[name])))
-        else:
-            of_joints = [design.params.get(f"{name}_{j}", NOTHING) for j in range(1, len(design.joints) + 1)]
-            extras.append((name.upper(), f"({', '.join(map(_custom_text, of_joints))})"))
-    return extras
+        return f"({', '.join(_text(value, digits) for value in values)})"
+
+    lists = module_lists({parameter.name for parameter in space.parameters})
+    return [
+        *((name.upper(), str(design.params[name])) for name in SINGLE if name in design.params),
+        *((group.upper(), column(kind, f".{decimals}f")) for group, kind in lists.items()),
+        *(
+            (name.upper(), _text(design.params[name], ".4g") if entry.per is None else column(name, ".4g"))
+            for name, entry in space.custom
+        ),
+    ]
 
 
-def _custom_text(value: ParameterValue) -> str:
-    """Return the value of a custom parameter with four digits."""
-    return value if isinstance(value, str) else f"{value:.4g}"
+def _text(value: ParameterValue, digits: str) -> str:
+    return value if isinstance(value, str) else f"{value:{digits}}"
 
 
 def _joint_labels(history: History, number: int) -> list[str]:

@@ -5,30 +5,14 @@ The same model validates `--model-options`, the user's config.yaml, the methods 
 
 import json
 from collections.abc import Iterable, Mapping
-from typing import Any, Self, cast
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, Field, PrivateAttr
 
-from armwright.exceptions import did_you_mean
-
-PROMPTS = ("plus", "minus", "full")
-MEMORIES = ("none", "chat")
 # Form of the answer in the prompt: free text and a second call, JSON only, or free text alone.
 ANSWERS = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
-OUTPUTS = ("auto", "tool", "native", "prompted")
-ORIGINS = ("model", "scripted")
-ON_FAILURE = ("stop", "continue")
 MODEL_SECONDS = 120.0  # default timeout
 DIRECT = ("model", "prompt", "memory", "max_cost")  # fields with a command-line option of their own
-
-_CHOICES: Mapping[str, tuple[str, ...]] = {
-    "prompt": PROMPTS,
-    "memory": MEMORIES,
-    "answer": tuple(ANSWERS),
-    "output": OUTPUTS,
-    "origin": ORIGINS,
-    "on_failure": ON_FAILURE,
-}
 
 
 class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -36,29 +20,11 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
 
     # "plus" (with instructions on how to analyse the parameters), "minus", or "full" (also with the whole front, the
     # gains of its own designs, joint angles and mechanics)
-    prompt: str = "plus"
-    memory: str = "none"  # "none" (every call is new), or "chat" (all proposals of a run are one conversation)
-    answer: str = "two-step"  # free reasoning, then a second call into the schema; "one-step"; "text" (manual answers)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _check_keys(cls, data: Any) -> Any:
-        keys = cast("dict[Any, Any]", data) if isinstance(data, dict) else {}
-        for key in keys:
-            if key not in cls.model_fields:
-                known = ", ".join(cls.model_fields)
-                raise ValueError(f'unknown key "{key}".{did_you_mean(str(key), cls.model_fields)} Allowed: {known}')
-        return cast("Any", data)
-
-    @field_validator(*_CHOICES, check_fields=False)
-    @classmethod
-    def _check_choice(cls, value: str, info: ValidationInfo) -> str:
-        allowed = _CHOICES[str(info.field_name)]
-        if value not in allowed:
-            raise ValueError(
-                f'unknown {info.field_name} "{value}".{did_you_mean(value, allowed)} One of: {", ".join(allowed)}'
-            )
-        return value
+    prompt: Literal["plus", "minus", "full"] = "plus"
+    # "none" (every call is new), or "chat" (all proposals of a run are one conversation)
+    memory: Literal["none", "chat"] = "none"
+    # free reasoning, then a second call into the schema; "one-step"; "text" (manual answers)
+    answer: Literal["two-step", "one-step", "text"] = "two-step"
 
     @property
     def form(self) -> str:
@@ -81,14 +47,13 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
     temperature: float | None = Field(default=None, ge=0.0)  # sent only if set
     seed: int | None = None  # sent only if set
     # How an answer is held to a schema: "tool", "native" or "prompted"; "auto" takes the first that the server accepts
-    output: str = "auto"
+    output: Literal["auto", "tool", "native", "prompted"] = "auto"
     timeout: float = Field(default=MODEL_SECONDS, gt=0.0)  # limit of one request, retries included [s]
     in_flight: int | None = Field(default=None, ge=1)  # calls while black-box trials run; None to wait for each answer
     max_calls: int | None = Field(default=None, ge=1)  # limit of requests in the whole run
     max_cost: float | None = Field(default=None, gt=0.0)  # limit of the cost of the whole run [USD]
-    on_failure: str = "stop"  # if the model fails before the first trial; or "continue" without it
-    origin: str = "model"  # recorded with every call; "scripted" if a stand-in answers instead of a model
-    replay_strict: bool = False  # with replay:RUN, treat a prompt that differs from the recorded one as an error
+    on_failure: Literal["stop", "continue"] = "stop"  # if the model fails before the first trial
+    origin: Literal["model", "scripted"] = "model"  # recorded with every call; "scripted" for a stand-in
     wait: bool = True  # with manual:DIR, wait for each answer; if false, exit at the first open question
     _named_in: str = PrivateAttr(default="")  # the file that names base_url, if it may be somebody else's
 

@@ -34,9 +34,4 @@ def estimated_cost(options: ModelOptions, requests: int, given: int, written: in
 def describe_cost(options: ModelOptions, requests: int, given: int, written: int) -> str:
     """Return the estimated cost in one phrase."""
     cost = estimated_cost(options, requests, given, written)
-    if cost is not None:
-        return f"about {cost:.2f} USD by public prices"
-    server = server_of(options)
-    if server is None:
-        return "price unknown"
-    return "on a local server" if server.is_local else f"at {server.address}, price unknown"
+    return "price unknown" if cost is None else f"about {cost:.2f} USD by public prices"

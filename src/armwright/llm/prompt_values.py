@@ -16,7 +16,6 @@ from armwright.problem.objectives import QUANTITIES, orientation_error, position
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History
-from armwright.spaces.custom_parameters import CustomParameter
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
 from armwright.spaces.tolerance import length_columns
@@ -92,26 +91,12 @@ def _space_values(space: DesignSpace) -> dict[str, Any]:
         "straight": space.mount == ("floor",) and space.link_directions == ("+z",),
         "extra_groups": [*((name.upper(), name) for name in single if name in names), *lists, *per_joint],
         "single": single,
-        "custom_parameters": [_custom_record(space, name, entry) for name, entry in space.custom],
+        "some_idle": not all(MODULES[letter].is_actuated for letter in space.joint_types),
         "bar_radius": _describe_radius(space),
         "n_copies": len(length_columns(space)) * 2,
         "joint_descriptions": JOINT_DESCRIPTIONS,
         "mount_descriptions": MOUNT_DESCRIPTIONS,
         "restricted": [p for p in space.parameters if p.name in dict(space.restrict)],
-    }
-
-
-def _custom_record(space: DesignSpace, name: str, entry: CustomParameter) -> dict[str, Any]:
-    """Return a custom parameter as the templates read it."""
-    return {
-        "name": name,
-        "per_joint": entry.per is not None,
-        "some": not all(MODULES[letter].is_actuated for letter in space.joint_types),
-        "unit": entry.unit,
-        "choices": entry.choices,
-        "range": entry.range,
-        "integer": entry.integer,
-        "log": entry.scale == "log",
     }
 
 

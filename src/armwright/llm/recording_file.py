@@ -1,23 +1,27 @@
-"""Recordings: runs with a language model, packed into one small file each, to be replayed without a network.
+"""Recorded runs with a language model, to be replayed without a network: run folders, or one small file each.
 
-A recording is xz-compressed text with one JSON document per line: a header (provenance, settings of the run), then the
-calls in their order. `xzcat NAME.jsonl.xz` shows it. The recordings in recordings/ ship with armwright and are replayed
-by name.
+Such a file is xz-compressed text with one JSON document per line: a header (provenance, settings of the run), then the
+calls in their order. `xzcat NAME.jsonl.xz` shows it. The files in recordings/ ship with armwright and are replayed by
+name.
 """
 
 import lzma
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel, ValidationError
 
-from armwright.exceptions import ReplayError
-from armwright.llm.transcript import Call
+from armwright.exceptions import ReplayError, did_you_mean
+from armwright.llm.transcript import CALL, TRANSCRIPTS, Call, Transcript
 from armwright.runs.config import RunConfig
+from armwright.runs.folder import read_config, read_run
+from armwright.runs.trial import FinishedTrial
+from armwright.runs.trials_file import TRIALS
 
 ENDING = ".jsonl.xz"
 MAX_RECORDING = 64 * 1024 * 1024  # [bytes] of text, far above the largest run
@@ -27,10 +31,11 @@ MAX_RECORDING = 64 * 1024 * 1024  # [bytes] of text, far above the largest run
 class Recording:
     """A recorded run."""
 
-    name: str  # of its file, without the ending
-    provenance: str  # what answered, how and when
+    file: str  # of the calls
     config: RunConfig
-    calls: tuple[Call, ...]  # with their whole prompts and answers
+    calls: Sequence[Call]  # with their whole prompts and answers
+    provenance: str = ""  # what answered, how and when; empty for a run folder
+    trials: Sequence[FinishedTrial] = ()  # of a run folder
 
     @property
     def options(self) -> str:
@@ -46,9 +51,6 @@ class _Header(BaseModel, frozen=True, extra="forbid"):
     config: RunConfig
 
 
-_CALL = TypeAdapter(Call)
-
-
 @cache
 def shipped_recordings() -> dict[str, Traversable]:
     """Return the files of the shipped recordings by name."""
@@ -57,32 +59,39 @@ def shipped_recordings() -> dict[str, Traversable]:
     return {file.name.removesuffix(ENDING): file for file in files}
 
 
-def find_recording(name_or_path: str) -> Recording | None:
-    """Return a recording by its file, or a shipped one by its name; None for anything else."""
-    if name_or_path.endswith(ENDING):
-        return read_recording(Path(name_or_path))
-    shipped = shipped_recordings().get(name_or_path)
-    return None if shipped is None or os.path.exists(name_or_path) else read_recording(shipped)
-
-
-def read_recording(file: Path | Traversable) -> Recording:
-    """Return a recording.
+def read_recording(source: str) -> Recording:
+    """Return a recorded run by its folder, its file, or the name of a shipped recording, which a folder precedes.
 
     Raises:
-        ReplayError: The file cannot be read, is damaged or lacks lines.
+        ReplayError: There is none, or its file cannot be read, is damaged or lacks lines.
     """
+    shipped = shipped_recordings()
+    if source.endswith(ENDING):
+        return _unpacked(Path(source))
+    if source in shipped and not os.path.exists(source):
+        return _unpacked(shipped[source])
+    folder, file = Path(source), Path(source, TRANSCRIPTS)
+    if not os.path.isfile(file):
+        missing = file if folder.is_dir() else folder
+        raise ReplayError(
+            f"there is no {missing} to replay.{did_you_mean(folder.name, shipped)} Give a run folder, or a recording: "
+            f"{', '.join(shipped)}"
+        )
+    calls = Transcript(file, read_only=True).calls
+    trials = read_run(folder)[1].trials if (folder / TRIALS).is_file() else ()
+    return Recording(str(file), read_config(folder), calls, trials=trials)
+
+
+def _unpacked(file: Path | Traversable) -> Recording:
     try:
         with file.open("rb") as packed, lzma.open(packed) as content:
             text = content.read(MAX_RECORDING)
     except (OSError, EOFError, lzma.LZMAError) as fault:
         raise ReplayError(f"cannot read the recording {file}: {fault}") from fault
     lines = text.split(b"\n")[:-1]
-    damaged = f"the recording {file} is damaged; restore the file"
     try:
         header = _Header.model_validate_json(lines[0] if lines else b"")
-        calls = tuple(_CALL.validate_json(line) for line in lines[1:])
+        calls = [CALL.validate_json(line) for line in lines[1 : 1 + header.calls]]
     except ValidationError as fault:
-        raise ReplayError(damaged) from fault
-    if len(calls) != header.calls:
-        raise ReplayError(f"the recording {file} has {len(calls)} of its {header.calls} calls; restore the file")
-    return Recording(file.name.removesuffix(ENDING), header.provenance, header.config, calls)
+        raise ReplayError(f"the recording {file} is damaged; restore the file") from fault
+    return Recording(str(file), header.config, calls, header.provenance)

@@ -2,14 +2,12 @@
 
 import os
 from dataclasses import dataclass
-from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from armwright.exceptions import SettingsError
 from armwright.llm.model_options import ModelOptions
 
 SERVER_KEY = "ARMWRIGHT_API_KEY"  # for base_url, if the server wants a key
-LOCAL_NAMES = (".local", ".lan", ".home", ".internal")  # endings of host names in a local network
 
 # Local servers with a vendor name: default address, and the environment variables of address and key.
 _LOCAL = {
@@ -26,26 +24,13 @@ class Server:
     model: str  # its name for the model
     key_variable: str  # environment variable of its key; empty if none is sent
 
-    @property
-    def is_local(self) -> bool:
-        """True for this machine and its network, whose costs are unknown."""
-        host = urlsplit(self.address).hostname or ""
-        try:
-            return ip_address(host).is_private
-        except ValueError:
-            return "." not in host or host.endswith(LOCAL_NAMES)
-
     def check_address(self) -> None:
         """Raise SettingsError if the address is not a plain HTTP URL; a key or a password does not belong there."""
         scheme, _, rest = self.address.partition("://")
-        if scheme not in ("http", "https"):
-            raise SettingsError(f"base_url {self.address}: expected an address that begins with http:// or https://")
         if "@" in rest.partition("/")[0] or "?" in rest or "#" in rest:
             raise SettingsError(f"base_url holds more than an address; put the server's key into {SERVER_KEY}")
-        if not _is_url(self.address):
-            raise SettingsError(
-                f"base_url {self.address} is not an address; expected one such as http://localhost:8080/v1"
-            )
+        if scheme not in ("http", "https") or not _is_url(self.address):
+            raise SettingsError(f"base_url {self.address}: expected an address such as http://localhost:8080/v1")
 
 
 def server_of(options: ModelOptions) -> Server | None:

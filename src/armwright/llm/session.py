@@ -3,13 +3,14 @@
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from armwright.exceptions import ModelError, ProposalError
 from armwright.llm.backend import (
     CHECK,
+    CHECK_FORMAT,
     MAX_REQUESTS,
     CallError,
     Interrupted,
@@ -20,7 +21,7 @@ from armwright.llm.backend import (
     Turn,
 )
 from armwright.llm.budget import CallBudget
-from armwright.llm.conversation import Conversation, conversation, new_part
+from armwright.llm.conversation import conversation, new_part
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, output_mode_of, total_cost
 from armwright.proof.summary_file import ProposerSummary
@@ -35,14 +36,18 @@ class LlmSession:
     Args:
         backend: Who answers.
         name: The `source` of its trials.
+        options: Memory and form of the answer. With memory `chat`, the proposals are one conversation, in which each
+            question is sent with the turns before it.
         budget: Limits of the whole transcript; None for no limits.
-        chat: Whether the proposals are one conversation, in which each question is sent with the turns before it.
     """
 
-    def __init__(self, backend: LlmBackend, name: str, budget: CallBudget | None = None, *, chat: bool = False) -> None:
+    def __init__(
+        self, backend: LlmBackend, name: str, options: PromptOptions, budget: CallBudget | None = None
+    ) -> None:
         self.name = name
         self.backend = backend
-        self.chat = chat
+        self.options = options
+        self.chat = options.memory == "chat"
         self._budget = budget or CallBudget()
         self._transcript = Transcript(None)
         self._over = threading.Event()  # set when no more answers are wanted in this session
@@ -53,9 +58,7 @@ class LlmSession:
 
     def summary(self) -> ProposerSummary:
         """Return calls, tokens and cost of the whole run, earlier sessions included."""
-        return self._summary(self._transcript.calls)
-
-    def _summary(self, calls: Sequence[Call]) -> ProposerSummary:
+        calls = self._calls()
         return ProposerSummary(
             name=self.name,
             model=self.backend.model,
@@ -72,15 +75,7 @@ class LlmSession:
     def cancel(self) -> None:
         """Cancel all calls and start no more in this session."""
         self._over.set()
-        self._budget.wake()
         self.backend.cancel()
-
-    def _begin(self, transcript: Path | None) -> None:
-        """Start a session; `transcript` holds the earlier ones."""
-        self._transcript = Transcript(transcript)
-        self._budget.begin(self._transcript.calls)
-        self._over = threading.Event()
-        self.backend.begin()
 
     def check(self) -> str:
         """Ask a test question, and return a message for the user or an empty text.
@@ -90,9 +85,8 @@ class LlmSession:
         Raises:
             ModelError: There is no answer, or its price is unknown under a cost limit.
         """
-        mode = output_mode_of(self._transcript.calls)
         try:
-            self._call(CHECK, partial(self.backend.check, mode), self._over)
+            self._call(CHECK, partial(self._send, CHECK, CHECK_FORMAT), self._over)
         except ProposalError as fault:
             if fault.kind == "budget":
                 return ""
@@ -100,12 +94,27 @@ class LlmSession:
                 f"{fault}. Check the model, its key and base_url; --proposer rules needs none",
                 final=fault.kind if fault.final else None,
             ) from fault
-        if self._budget.price_is_missing:
+        if self._budget.max_cost is not None and total_cost(self._calls()) is None:
             raise ModelError(
                 f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls",
                 final="budget",
             )
         return self.backend.note
+
+    def _begin(self, transcript: Path | None) -> None:
+        """Start a session; `transcript` holds the earlier ones."""
+        self._transcript = Transcript(transcript)
+        self._over = threading.Event()
+        self.backend.begin()
+
+    def _calls(self) -> Sequence[Call]:
+        """Return the calls that the budget and the summary count."""
+        return self._transcript.calls
+
+    def _question(self, number: int, prompt: str, known: int, hints: tuple[Hint, ...] = ()) -> Question:
+        """Return the question for trial `number`, to be followed by a second one if the answer is in two steps."""
+        step = "reasoning" if self.options.form == "then-schema" else "answer"
+        return Question(self.identity(number), step, prompt, known, hints)
 
     def _ask(self, question: Question, output: OutputFormat, extraction: Callable[[str], str] = str) -> str:
         """Return the answer in its output format.
@@ -127,21 +136,11 @@ class LlmSession:
     def _earlier(self, question: Question) -> Sequence[Turn] | None:
         """Return the turns that go with a question; None for the check and for second questions, which stand alone."""
         is_turn = self.chat and question.step in FIRST_STEPS
-        return self._conversation(question.trial).turns if is_turn else None
-
-    def _conversation(self, trial: int | None = None) -> Conversation:
-        return conversation(self._transcript.calls, trial)
+        return conversation(self._transcript.calls, question.trial) if is_turn else None
 
     def _part_to_ask(self, prompt: str, trial: int) -> str:
         """Return what a question for a trial says of a prompt: in a chat, what the turns before it do not."""
-        return new_part(prompt, self._conversation(trial).turns) if self.chat else prompt
-
-    def _first_question(
-        self, number: int, options: PromptOptions, prompt: str, known: int, hints: tuple[Hint, ...] = ()
-    ) -> Question:
-        """Return the question for trial `number`, to be followed by a second one if the answer is in two steps."""
-        step = "reasoning" if options.form == "then-schema" else "answer"
-        return Question(self.identity(number), step, prompt, known, hints)
+        return new_part(prompt, conversation(self._transcript.calls, trial)) if self.chat else prompt
 
     def _call(self, question: Question, ask: Callable[[int | None], Reply], over: threading.Event) -> str:
         """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call.
@@ -153,9 +152,8 @@ class LlmSession:
             ask: Asks it with at most this number of requests.
             over: Set once no answer is wanted any more.
         """
-        with self._budget.reserved(over.is_set) as most_requests:
-            left, reply = most_requests, None
-            while reply is None:
+        with self._budget.reserved(self._calls, over) as left:
+            while True:
                 earlier = self._earlier(question)
                 try:
                     reply = ask(left)
@@ -165,17 +163,13 @@ class LlmSession:
                     left = (MAX_REQUESTS if left is None else left) - max(1, fault.reply.requests)
                     if left < 1 or fault.kind != "context" or self._earlier(question) == earlier:
                         raise
-            self._keep(question, reply)
-        return reply.answer
+                else:
+                    self._keep(question, reply)
+                    return reply.answer
 
     def _keep(self, question: Question, reply: Reply, error: CallError | Interrupted | None = None) -> None:
-        call = Call(
-            **{field.name: getattr(question, field.name) for field in fields(Question)},
-            **{field.name: getattr(reply, field.name) for field in fields(Reply)},
-            origin=self.backend.origin,
-            model=self.backend.model,
-            fault=None if error is None else error.kind,
-            error=None if error is None else str(error),
+        fault, message = (None, None) if error is None else (error.kind, str(error))
+        origin, model = self.backend.origin, self.backend.model
+        self._transcript.add(
+            Call(**vars(question), **vars(reply), origin=origin, model=model, fault=fault, error=message)
         )
-        self._budget.spend(call)
-        self._transcript.add(call)

@@ -5,12 +5,12 @@ import json
 import os
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from io import FileIO
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Any
 
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, open_to_append, read_records
@@ -31,6 +31,9 @@ class Call(Reply, Question):
     model: str = field(kw_only=True)
     fault: str | None = None  # kind of fault, if there was one; then the answer may be empty
     error: str | None = None  # its message
+
+
+CALL = TypeAdapter(Call)  # reads a line
 
 
 class Transcript:
@@ -101,12 +104,6 @@ def last_call(calls: Sequence[Call], proposal: str, *steps: str) -> Call | None:
     return next((call for call in reversed(calls) if call.proposal == proposal and call.step in steps), None)
 
 
-def tries(calls: Sequence[Call], proposal: str, step: str) -> list[Call]:
-    """Return the calls for a step of a proposal that a replay repeats: refusals as too long, then the last call."""
-    found = [call for call in calls if call.proposal == proposal and call.step == step]
-    return [call for call in found[:-1] if call.fault == "context"] + found[-1:]
-
-
 def _append(file: FileIO, line: bytes) -> None:
     """Append a whole line or nothing: a partial line would corrupt the next one, perhaps of another thread."""
     before = os.fstat(file.fileno()).st_size
@@ -143,17 +140,6 @@ def _read(path: Path, mend: bool) -> Iterator[Call]:
 
 def _call(line: bytes, where: str) -> Call:
     try:
-        return _CALL.validate_json(line)
+        return CALL.validate_json(line)
     except ValidationError as fault:
         raise RunFolderError(f"{where} is damaged; restore the file or delete the line") from fault
-
-
-def _check_complete(content: Any) -> Any:
-    """Refuse a line that lacks a key, although the fields of questions and replies have defaults."""
-    if isinstance(content, dict) and (missing := _REQUIRED - content.keys()):
-        raise ValueError(f"missing: {', '.join(sorted(missing))}")
-    return cast("Any", content)
-
-
-_REQUIRED = {field.name for field in fields(Call)} - {"hints", "output_mode", "fault", "error"}
-_CALL = TypeAdapter(Annotated[Call, BeforeValidator(_check_complete)])

@@ -19,8 +19,8 @@ _USED: dict[str, Collection[str]] = {
     "none": (),
     "rules": (),
     "manual": ("prompt", "memory", "wait"),  # answers are text and cost nothing
-    "replay": ("in_flight", "replay_strict"),
-    "llm": [name for name in ModelOptions.model_fields if name not in ("wait", "replay_strict")],
+    "replay": ("in_flight",),
+    "llm": [name for name in ModelOptions.model_fields if name != "wait"],
 }
 
 
@@ -98,12 +98,12 @@ def _proposer(
     if kind == "replay":
         from armwright.proposers.replay import ReplayProposer
 
-        replayed = ReplayProposer(place, options.replay_strict)
-        calls, model = replayed.replayed.calls, replayed.replayed.model
-        settings = f", recorded with {replayed.recording.options}" if replayed.recording else ""
+        replayed = ReplayProposer(place)
+        recording, backend = replayed.recording, replayed.backend
+        settings = f", recorded with {recording.options}" if recording.provenance else ""
         return replayed, (
-            f"{replayed.name}, replayed from {place} ({len(calls)} recorded calls to {model}, origin "
-            f"{replayed.replayed.origin}{settings}; no network)"
+            f"{replayed.name}, replayed from {place} ({len(recording.calls)} recorded calls to {backend.model}, origin "
+            f"{backend.origin}{settings}; no network)"
         )
     if kind == "manual":
         from armwright.proposers.manual import ManualProposer

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from armwright.llm.budget import CallBudget
-from armwright.llm.conversation import RESULTS
+from armwright.llm.conversation import RESULTS, conversation
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MAX_TOKENS, estimated_tokens, parameters_prompt
 from armwright.problem.problem import Problem
@@ -27,8 +27,8 @@ class LlmProposer(PromptedProposer):
         from armwright.llm.client import ModelClient
 
         options = ModelOptions.of(options)
-        self.client = ModelClient(options)
-        super().__init__(self.client, options, options.source, CallBudget(options.max_calls, options.max_cost))
+        budget = CallBudget(options.max_calls, options.max_cost)
+        super().__init__(ModelClient(options), options.source, options, budget)
         self.options = options
 
     def settings(self) -> Mapping[str, Any]:
@@ -49,26 +49,20 @@ class LlmProposer(PromptedProposer):
         )
 
     def _expected_tokens(self, problem: Problem, n: int) -> tuple[int, int]:
-        """Return the tokens of the prompts and of the answers of `n` proposals, by the mean so far if there is one."""
-        calls = [call for call in self._transcript.calls if call.proposal and call.fault is None]
-        proposals = len({call.proposal for call in calls})
-        written = PARAMETER_TOKENS + ANALYSIS_TOKENS
-        if proposals:
-            written = sum(call.output_tokens for call in calls) // proposals
-        if proposals and not self.chat:
-            return n * sum(call.input_tokens for call in calls) // proposals, n * written
+        """Return the tokens of the prompts and of the answers of `n` proposals."""
+        written = ANALYSIS_TOKENS + PARAMETER_TOKENS
         prompt = self.prompt_for(History(problem, (), 0), 0, 0)
         whole = min(MAX_TOKENS, estimated_tokens(prompt) + self._feedback_tokens(problem))
         in_steps = self.options.form == "then-schema"
         second = estimated_tokens(parameters_prompt(problem, "")) + ANALYSIS_TOKENS if in_steps else 0
         if not self.chat:
             return n * (whole + second), n * written
-        turns = self._conversation().turns
+        turns = conversation(self._transcript.calls)
         past = sum(estimated_tokens(turn.question) + estimated_tokens(turn.answer) for turn in turns)
         part = whole - estimated_tokens(prompt.rpartition(RESULTS)[0])  # of a question after the first
         first = past + part if turns else whole
-        asked = [min(first + k * (part + written), self.client.context_window) for k in range(n)]
-        return sum(asked) + n * second, n * written
+        asked = n * first + n * (n - 1) // 2 * (part + written)
+        return asked + n * second, n * written
 
     def _feedback_tokens(self, problem: Problem) -> int:
         """Estimate the tokens of the feedback late in a run without evaluating designs, which may be slow."""

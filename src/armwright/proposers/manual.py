@@ -1,11 +1,122 @@
-"""Manual answers as a proposer: from a model's web page, or a designer's own ideas."""
+"""Manual answers in place of a model, as files: from a model's web page, or a designer's own ideas."""
 
+import os
+import threading
+import time
+from collections.abc import Sequence
 from pathlib import Path
 
-from armwright.exceptions import SettingsError
-from armwright.llm.manual import ManualBackend
+from armwright.exceptions import AnswerPendingError, FailureError, SettingsError, UsageError
+from armwright.files import naming_write_errors, read_text, replace_file
+from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply, Turn
 from armwright.llm.model_options import PromptOptions
 from armwright.proposers.prompted import PromptedProposer
+
+LOOK_EVERY = 0.5  # [s]
+ENDINGS = ("md", "json")  # of an answer's file
+MAX_FILE = 10_000_000  # [bytes]
+
+
+class ManualBackend(LlmBackend):
+    """Write DIR/NNN-prompt.md and read DIR/NNN-answer.md (or .json), where NNN is the trial's number.
+
+    Args:
+        folder: The folder DIR.
+        wait: Wait for a missing answer; if false, raise AnswerPendingError.
+    """
+
+    def __init__(self, folder: Path, wait: bool = True) -> None:
+        super().__init__("people", "manual")
+        self.folder = folder
+        self.wait = wait
+        self._cancelled = threading.Event()
+        self._seen: dict[Path, tuple[int, int]] = {}  # sizes and times of files at the last look
+
+    def begin(self) -> None:
+        """Start a session."""
+        self._cancelled.clear()
+
+    def cancel(self) -> None:
+        """Stop waiting."""
+        self._cancelled.set()
+
+    def files(self, number: int) -> tuple[Path, Path]:
+        """Return the paths of the question and the answer for trial `number`."""
+        return self.folder / f"{number:03d}-prompt.md", self.folder / f"{number:03d}-answer.md"
+
+    def is_answered(self, number: int) -> bool:
+        """Return whether there is an answer that has not been refused."""
+        return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
+
+    def ask(
+        self,
+        question: Question,
+        output: OutputFormat | None = None,
+        most_requests: int | None = None,
+        earlier: Sequence[Turn] | None = None,
+    ) -> Reply:
+        """Return the answer; one that is refused is moved aside with the reason."""
+        started = time.perf_counter()
+        number = question.trial
+        prompt_file, _ = self.files(number)
+        answers = self._answers(number)
+        self._ask(prompt_file, answers, question.prompt)
+        refused = ""
+        while True:
+            answer = next(filter(self._is_ready, answers), None)
+            if answer is not None:
+                text = read_text(answer, MAX_FILE, FailureError)
+                try:
+                    accepted = text if output is None else output.read(text)
+                    return Reply(accepted, requests=1, seconds=round(time.perf_counter() - started, 3))
+                except UsageError as refusal:
+                    refused = str(refusal)
+                    self._refuse(number, answer, refused)
+                    continue  # another file may hold a valid answer
+            if not self.wait:
+                raise AnswerPendingError(prompt_file, answers[0], refused)
+            if self._cancelled.wait(LOOK_EVERY):
+                raise CallError("cancelled", "waiting for the answer was cancelled", Reply())
+
+    def _answers(self, number: int) -> list[Path]:
+        return [self.folder / f"{number:03d}-answer.{ending}" for ending in ENDINGS]
+
+    def _ask(self, file: Path, answers: Sequence[Path], prompt: str) -> None:
+        if os.path.isfile(file):
+            if read_text(file, MAX_FILE, FailureError) == prompt:
+                return
+            raise FailureError(
+                f"{file} is a question of another run or version; use an empty folder, or move {file.name} and its "
+                "answer away"
+            )
+        early = next((answer for answer in answers if answer.exists()), None)
+        if early is not None:
+            raise FailureError(f"{early} exists before its question was asked; use an empty folder, or move it away")
+        self._write(file, prompt)
+
+    def _is_ready(self, answer: Path) -> bool:
+        """Return whether the answer is not empty and, if `wait`, did not change since the last look."""
+        if not os.path.isfile(answer):
+            return False
+        found = answer.stat()
+        now = found.st_size, found.st_mtime_ns
+        before, self._seen[answer] = self._seen.get(answer), now
+        return now[0] > 0 and (before == now or not self.wait)
+
+    def _refuse(self, number: int, answer: Path, reason: str) -> None:
+        before = len(list(self.folder.glob(f"{number:03d}-refused-*")))
+        kept = self.folder / f"{number:03d}-refused-{before + 1}{answer.suffix}"
+        with naming_write_errors(kept, error=FailureError):
+            os.replace(answer, kept)
+        self._write(
+            self.folder / f"{number:03d}-refused.md",
+            f"{kept.name} was refused:\n\n{reason}\n\nGive another {answer.name}.\n",
+        )
+
+    def _write(self, file: Path, text: str) -> None:
+        with naming_write_errors(file, error=FailureError):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            replace_file(file, text.encode())
 
 
 class ManualProposer(PromptedProposer):
@@ -24,7 +135,7 @@ class ManualProposer(PromptedProposer):
             raise SettingsError(f"{folder} is a file; manual needs a folder for its questions")
         self.manual = ManualBackend(Path(folder), wait)
         answers = (options or PromptOptions()).model_copy(update={"answer": "text"})
-        super().__init__(self.manual, answers, "manual")
+        super().__init__(self.manual, "manual", answers)
 
     def check(self) -> str:
         """Check nothing: nobody is asked before the first question."""

@@ -1,5 +1,6 @@
-"""The base class of proposers that ask a language model, a recording of one, or a person."""
+"""The base class of proposers that ask a language model or a person, or repeat what one of them answered."""
 
+import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -13,11 +14,10 @@ from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
-from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Transcript, hints_of
+from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Transcript, used_hints
 from armwright.problem.problem import Problem
-from armwright.proposers.hints import Hints
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.runs.control import Hint
+from armwright.runs.control import Hint, read_control
 from armwright.runs.history import History
 
 
@@ -26,19 +26,19 @@ class PromptedProposer(LlmSession, Proposer):
 
     Args:
         backend: Who answers.
-        options: How designs are asked for.
         name: The `source` of its trials.
+        options: How designs are asked for.
         budget: Limits of the whole run.
     """
 
     def __init__(
-        self, backend: LlmBackend, options: PromptOptions, name: str, budget: CallBudget | None = None
+        self, backend: LlmBackend, name: str, options: PromptOptions, budget: CallBudget | None = None
     ) -> None:
-        super().__init__(backend, name, budget, chat=options.memory == "chat")
+        super().__init__(backend, name, options, budget)
         self.overlaps = self.overlaps and not self.chat  # a turn follows the one before it
-        self.options = options
-        self._hints = Hints(None)
-        self._told_dropped = False  # in this session
+        self._folder: Path | None = None
+        self._hints_under_way: set[Hint] = set()  # in questions that are not answered yet
+        self._lock = threading.Lock()
 
     def settings(self) -> Mapping[str, Any]:
         """Return prompt, memory and form of the answer."""
@@ -47,17 +47,12 @@ class PromptedProposer(LlmSession, Proposer):
     def open(self, folder: Path | None) -> None:
         """Open the run's transcript and hints."""
         self._begin(None if folder is None else folder / TRANSCRIPTS)
-        self._hints = Hints(folder)
-        self._told_dropped = False
+        self._folder = folder
 
     def open_read_only(self, folder: Path) -> None:
         """Open the transcript and hints of a run without changing them."""
         self._transcript = Transcript(folder / TRANSCRIPTS, read_only=True)
-        self._hints = Hints(folder)
-
-    def requested_trials(self) -> Mapping[int, int]:
-        """Return the trials with a proposal, each with the number of finished trials known when it was requested."""
-        return {call.trial: call.known for call in self._transcript.calls if call.proposal}
+        self._folder = folder
 
     def unused(self, history: History) -> Sequence[Proposal]:
         """Return recorded designs of a killed run that no trial has used yet."""
@@ -66,7 +61,7 @@ class PromptedProposer(LlmSession, Proposer):
         for call in self._transcript.calls:
             if call.step in LAST_STEPS and call.fault is None:
                 with suppress(DesignError):  # a transcript edited by hand: asked again
-                    recorded[call.proposal] = _proposal(call, call.answer, history.problem)
+                    recorded[call.proposal] = proposal_of(call, call.answer, history.problem)
         return [proposal for proposal in recorded.values() if proposal.id not in used]
 
     def propose(self, history: History, seed: int, number: int) -> Proposal:
@@ -77,9 +72,10 @@ class PromptedProposer(LlmSession, Proposer):
         except ProposalError as fault:
             fault.known = question.known
             raise
-        finally:
-            self._hints.give_back(question.hints)
-        return _proposal(question, text, problem, self._note_dropped(number))
+        finally:  # the transcript shows which hints were used
+            with self._lock:
+                self._hints_under_way.difference_update(question.hints)
+        return proposal_of(question, text, problem)
 
     def question(self, history: History, seed: int, number: int) -> Question:
         """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
@@ -89,34 +85,25 @@ class PromptedProposer(LlmSession, Proposer):
             return Question(self.identity(number), "parameters", prompt, thoughts.known)
         hints = self.next_hints(number)
         prompt = self.prompt_for(history, seed, number, hints)
-        return self._first_question(number, self.options, prompt, len(history), hints)
+        return self._question(number, prompt, len(history), hints)
 
     def next_hints(self, number: int) -> tuple[Hint, ...]:
-        """Return the hints for a question about trial `number` that is asked now.
+        """Return the unused hints, which go with a question about trial `number` that is asked now, and no other one.
 
         Manual answers get none: their question has to stay the same until it is answered.
         """
-        return () if self.options.form == "text" else self._hints.take(self._transcript)
-
-    def past_hints(self, number: int) -> tuple[Hint, ...]:
-        """Return the hints that the question for trial `number` contained."""
-        return hints_of(self._transcript.calls, self.identity(number))
+        if self.options.form == "text":
+            return ()
+        with self._lock:
+            used = self._hints_under_way | used_hints(self._transcript.calls).keys()
+            hints = tuple(hint for hint in read_control(self._folder).hints if hint not in used)
+            self._hints_under_way.update(hints)
+        return hints
 
     def prompt_for(self, history: History, seed: int, number: int, hints: Sequence[Hint] = ()) -> str:
         """Return the prompt for trial `number`; in a chat, the part of it that is new."""
         prompt = design_prompt(history, seed, self.options, name=self.name, hints=[hint.text for hint in hints])
         return self._part_to_ask(prompt, number)
-
-    def _note_dropped(self, number: int) -> str:
-        """Return a message about the turns that were dropped from the chat, once in a session."""
-        n_dropped = self._conversation(number).n_dropped if self.chat and not self._told_dropped else 0
-        self._told_dropped = self._told_dropped or n_dropped > 0
-        if not n_dropped:
-            return ""
-        return (
-            f"the chat exceeds the context of {self.backend.model}; turns dropped so far, from the oldest after the "
-            f"first: {n_dropped}"
-        )
 
     def output_format(self, problem: Problem) -> OutputFormat:
         """Return the form of the answer that holds the design; it is recorded as JSON that `read_text` reads."""
@@ -129,6 +116,7 @@ class PromptedProposer(LlmSession, Proposer):
         return OutputFormat(answer_schema(problem, self.options), read)
 
 
-def _proposal(question: Question, text: str, problem: Problem, note: str = "") -> Proposal:
+def proposal_of(question: Question, text: str, problem: Problem, note: str = "") -> Proposal:
+    """Return the proposal that a recorded answer holds; raises DesignError if there is none."""
     answer = read_text(text, problem)
     return Proposal(answer.design, question.proposal, answer.reason, question.trial, question.known, note)

@@ -28,7 +28,6 @@ class Proposer(Protocol):
     """Proposes one design for every n_step trials; subclass it and implement `propose`."""
 
     name: str  # the `source` of its trials
-    per_call: int = 1  # number of designs per call of `propose`, at most
     overlaps: bool = True  # true if other threads may call it while black-box trials run (`in_flight`)
 
     def settings(self) -> Mapping[str, Any]:
@@ -71,8 +70,8 @@ class Proposer(Protocol):
     def cancel(self) -> None:
         """Cancel calls in other threads, because the study ends or was interrupted."""
 
-    def propose(self, history: History, seed: int, number: int) -> Proposal | Sequence[Proposal]:
-        """Propose the next design, or several to evaluate one after the other.
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
+        """Propose the next design.
 
         The result must depend on the arguments alone, so that a killed run resumes identically. With `in_flight`, other
         threads call this.

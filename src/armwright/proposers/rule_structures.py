@@ -1,37 +1,51 @@
 """Arm structures that a designer would try, sized and placed by the targets."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.problem.problem import Problem
-from armwright.proposers.rule_geometry import needed_length, shoulders
 from armwright.robot.arm import Vector
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
 
+INNER_PULL = 0.05  # weight of targets within reach, relative to those beyond
+ROUNDS = 60
 SIZES = 24
 LONGEST, SLACK = 1.25, 0.05  # largest length: share of the needed length, and beyond it [m]
 FLAT = 0.1  # largest spread of targets in a plane, relative to the needed length
 SWAPPED_AXES = str.maketrans("RP", "PR")
 
 
-def any_targets(points: Array) -> bool:
-    """Return True: most structures suit all targets."""
-    return True
+def shoulders(points: Array, reach: Array) -> Array:
+    """Return the points (N, 3) [m] from which the targets are least out of reach in total.
+
+    Minimises Σ max(0, ‖p_i - c‖ - reach) by Weiszfeld's iteration. The sum is flat where all targets are in reach, so
+    these have a small weight. A point lies on every symmetry plane of the targets.
+
+    Args:
+        points: (T, 3) targets [m].
+        reach: (N,) of the arms [m].
+    """
+    centre = np.repeat(points.mean(axis=0)[None], len(reach), axis=0)  # (N, 3)
+    for _ in range(ROUNDS):
+        distance = np.maximum(np.linalg.norm(points - centre[:, None], axis=-1), 1e-3)  # (N, T)
+        weight = np.where(distance > reach[:, None], 1.0, INNER_PULL) / distance
+        centre = weight @ points / weight.sum(axis=1)[:, None]
+    return centre
 
 
-def at_one_height(points: Array) -> bool:
-    """Return whether the targets (T, 3) lie in a level plane."""
-    return bool(points[:, 2].std() < FLAT * needed_length(points))
+def median(points: Array) -> Array:
+    """Return the geometric median (3,) [m] of the targets, from which their distances are least in total."""
+    return shoulders(points, np.zeros(1))[0]
 
 
-def before_a_wall(points: Array) -> bool:
-    """Return whether the targets (T, 3) lie in a vertical plane across x."""
-    return bool(points[:, 0].std() < FLAT * needed_length(points))
+def needed_length(points: Array) -> float:
+    """Return the distance [m] from the geometric median to the farthest of `points` (T, 3)."""
+    return float(np.linalg.norm(points - median(points), axis=1).max())
 
 
 @dataclass(frozen=True)
@@ -48,7 +62,7 @@ class Structure:
     # base relative to that [m]. A few centimetres or millimetres to the side decide towards which side the first joint
     # turns, and keep targets off the line of the straight arm, along which they cannot be approached
     shift: Vector = (0.0, 0.0, 0.0)
-    suits: Callable[[Array], bool] = any_targets  # whether it is worth trying for targets (T, 3)
+    flat_along: int | None = None  # axis across which the targets must lie in a plane; None if it suits all targets
 
     @property
     def mirrored(self) -> "Structure":
@@ -91,20 +105,20 @@ STRUCTURES = (
     Structure(
         "lying", "PRRR", (0.0, 0.38, 0.16, 0.46),
         "base at the targets' height; one P lays the arm down and the axes after it stand vertical",
-        shift=(0.03, 0.015, 0.0), suits=at_one_height,
+        shift=(0.03, 0.015, 0.0), flat_along=2,
     ),
     # Two short P reach beyond the limits of one, so the arm also turns upside down. R stands vertical for targets at
     # the base's height, where P has no lever.
     Structure(
         "turnover", "PPRY", (0.0, 0.0, 0.5, 0.5),
         "two short P turn the arm all the way round; R stands vertical at the height of the base",
-        shift=(-0.022, 0.0, -0.028), suits=before_a_wall,
+        shift=(-0.022, 0.0, -0.028), flat_along=0,
     ),
     # A link that stands or hangs has no lever; only the arm behind it, which R holds out, has one.
     Structure(
         "pole", "PPRY", (0.0, 0.5, 0.25, 0.25),
         "P turns a pole up or down, where it has no lever, and R holds an arm out at its end",
-        shift=(-0.003, 0.0, -0.04), suits=before_a_wall,
+        shift=(-0.003, 0.0, -0.04), flat_along=0,
     ),
 )  # fmt: skip
 
@@ -140,7 +154,8 @@ def fitted_structures(problem: Problem) -> Iterator[tuple[Structure, Design]]:
     points, lengths = problem.task.target_positions, sizes(problem)
     for structure in STRUCTURES:
         for oriented, seen in ((structure, points), (structure.mirrored, points[:, (1, 0, 2)])):
-            if structure.suits(seen):
+            flat = structure.flat_along
+            if flat is None or seen[:, flat].std() < FLAT * needed_length(seen):
                 for design in fitted(oriented, problem, lengths):
                     yield structure, design
 

@@ -12,8 +12,8 @@ from armwright.pareto import hypervolume
 from armwright.problem.objectives import PAPER_OBJECTIVES
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.proposers.rule_candidates import Candidates, candidates
 from armwright.proposers.rule_feedback import RULES, describe, members_inside
+from armwright.proposers.rule_forecast import Candidates, candidates
 from armwright.proposers.rule_helpers import change_until_new, proposal_id, rule_of
 from armwright.runs.history import History
 from armwright.spaces.parameters import Design

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import deque
-from itertools import count, groupby
+from itertools import count
 
 from armwright.runs.history import History
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
@@ -18,7 +18,7 @@ class OverlappingSchedule(Schedule):
 
     A request is made when its block starts, `max_in_flight` - 1 blocks ahead. The black box may run ahead of the
     answers by the trials in the blocks of the requests in flight, then it waits. An answer enters as the next trial
-    after its arrival. If it has several designs, all but the first wait for their blocks.
+    after its arrival.
 
     Args:
         requests: requests to the proposer.
@@ -31,19 +31,12 @@ class OverlappingSchedule(Schedule):
         self._max_in_flight = max_in_flight
         past = requests.past_slots()
         self._entered = len(past)
-        self._asked = {slot.asked for slot in past}
-        self._arrived: deque[list[ProposalSlot]] = deque()  # answers with all their designs
-        self._surplus: deque[ProposalSlot] = deque()  # designs of answers whose first design has entered
+        self._arrived = deque(requests.unused())
+        self._asked = {slot.asked for slot in (*past, *self._arrived)}
         self._failure: BaseException | None = None  # of a request; raised in the thread of the study
         self._threads: list[threading.Thread] = []
         self.n_in_flight = 0
         self._change = threading.Condition()
-        for asked, slots in groupby(requests.unused(), lambda slot: slot.asked):
-            if asked in self._asked:
-                self._surplus.extend(slots)
-            else:
-                self._arrived.append(list(slots))
-                self._asked.add(asked)
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return the slot of the earliest answer, or None while the black box may go on without one."""
@@ -55,10 +48,9 @@ class OverlappingSchedule(Schedule):
                 if self._failure is not None:
                     raise self._failure
                 self._start_requests(counted)
-                slot = self._take(counted)
-                if slot is not None:
+                if self._arrived and self._entered < self._method.n_proposals:
                     self._entered += 1
-                    return slot
+                    return self._arrived.popleft()
                 if self._black_box_may_run(counted - self._entered):
                     return None
                 self._change.wait(POLL_SECONDS)
@@ -73,31 +65,21 @@ class OverlappingSchedule(Schedule):
 
     def upcoming(self, number: int) -> int:
         """Return the trial of the next request: the first of a block without one."""
-        numbers = count(self._method.n_init, self._method.n_step * self._requests.per_call)
+        numbers = count(self._method.n_init, self._method.n_step)
         return next(number for number in numbers if number not in self._asked)
-
-    def _take(self, counted: int) -> ProposalSlot | None:
-        """Return the next slot, if one is due."""
-        if self._entered >= self._method.n_proposals:
-            return None
-        if self._surplus and counted >= self._entered * self._method.n_step:
-            return self._surplus.popleft()
-        if self._arrived:
-            first, *others = self._arrived.popleft()
-            self._surplus.extend(others)
-            return first
-        return None
 
     def _black_box_may_run(self, n_drawn: int) -> bool:
         """Return whether the black box may draw another trial after `n_drawn` counted ones."""
         method = self._method
-        ahead = (method.n_step - 1) * (self._entered + self._max_in_flight * self._requests.per_call)
+        ahead = (method.n_step - 1) * (self._entered + self._max_in_flight)
         return n_drawn < min(ahead, method.n_total - method.n_proposals)
 
     def _start_requests(self, counted: int) -> None:
         """Start the requests that are due after so many counted trials."""
-        while self.n_in_flight < self._max_in_flight and self._n_supplied() < self._method.n_proposals:
-            if counted < self._next_request_after():
+        while self.n_in_flight < self._max_in_flight:
+            supplied = self._entered + len(self._arrived) + self.n_in_flight
+            due = (supplied - self._max_in_flight + 1) * self._method.n_step
+            if counted < due or supplied >= self._method.n_proposals:
                 return
             number = self.upcoming(counted + self._method.n_init)
             self._asked.add(number)
@@ -111,27 +93,17 @@ class OverlappingSchedule(Schedule):
             self._threads = [other for other in self._threads if other.is_alive()] + [thread]
             thread.start()
 
-    def _n_supplied(self) -> int:
-        """Return the number of designs that have arrived or are requested."""
-        arrived = self._entered + sum(map(len, self._arrived)) + len(self._surplus)
-        return arrived + self.n_in_flight * self._requests.per_call
-
-    def _next_request_after(self) -> int:
-        """Return the number of counted trials after which the next request is made."""
-        return (self._n_supplied() - (self._max_in_flight - 1) * self._requests.per_call) * self._method.n_step
-
     def _request(self, history: History, number: int) -> None:
-        answer: list[ProposalSlot] = []
-        failure: BaseException | None = None
+        slot, failure = None, None
         try:
-            answer = self._requests.request(history, number)
+            slot = self._requests.request(history, number)
         except BaseException as fault:  # noqa: BLE001 (raised in the thread of the study)
             failure = fault
         with self._change:
             self.n_in_flight -= 1
             self._failure = self._failure or failure
-            if answer:
-                self._arrived.append(answer)
+            if slot is not None:
+                self._arrived.append(slot)
             self._change.notify_all()
 
 

@@ -1,20 +1,16 @@
 """Preview of the prompt that a run would send to a language model."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import SettingsError
+from armwright.llm.backend import LlmBackend
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import estimated_tokens
-from armwright.llm.replay_backend import ReplayBackend
 from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
 from armwright.proposers.replay import recorded_options
-from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_run
-from armwright.runs.history import History
 from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.proposal_requests import ProposalRequests, proposal_seed
 from armwright.study.study import optimize
@@ -37,30 +33,25 @@ def preview(
     history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
     assert history.method is not None
     history = replace(history, method=history.method.model_copy(update={"n_total": n_total}))
-    proposer = PromptedProposer(ReplayBackend((), Path()), options, "llm")
+    proposer = PromptedProposer(LlmBackend(), "llm", options)
     text = proposer.prompt_for(history, proposal_seed(seed, n_init), n_init)
     return _preview(proposer, problem, n_init, text)
 
 
-def preview_after(run: Path, options: PromptOptions | None = None, *, number: int | None = None) -> Preview:
+def preview_after(run: Path, options: PromptOptions | None = None) -> Preview:
     """Return the prompt for the next proposal of a run, requested as the run would.
 
     Args:
         run: run folder.
         options: options that replace those of the run, if set.
-        number: trial whose past prompt is returned; None for the next one.
     """
     config, history = read_run(run)
     stated = {} if options is None else options.given
     given = {name: value for name, value in stated.items() if name in PromptOptions.model_fields}
     asked = recorded_options(config).model_copy(update=given)
     settings = config.study.proposer or {}
-    proposer = PromptedProposer(ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm")
+    proposer = PromptedProposer(LlmBackend(), settings["name"] if "prompt" in settings else "llm", asked)
     proposer.open_read_only(run)
-    if number is not None:
-        past = _history_at(run, config, history, proposer.requested_trials(), number)
-        text = proposer.prompt_for(past, proposal_seed(config.seed, number), number, proposer.past_hints(number))
-        return _preview(proposer, history.problem, number, text)
     requests = ProposalRequests(proposer, config.seed, config.study, lambda: history)
     number = request_schedule(requests).upcoming(len(history))
     # With other options the new prompt is shown, even if the run waits for the second call of an answer.
@@ -73,15 +64,3 @@ def preview_after(run: Path, options: PromptOptions | None = None, *, number: in
 
 def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: str) -> Preview:
     return Preview(number, text, estimated_tokens(text), dict(proposer.output_format(problem).schema))
-
-
-def _history_at(run: Path, config: RunConfig, history: History, requests: Mapping[int, int], number: int) -> History:
-    """Return the trials that were known when a past proposal was requested.
-
-    A run without a model has no `requests`: they are those that a model would have had.
-    """
-    known = requests or {n: n for n in range(len(history) + 1) if config.study.is_first_trial(n)}
-    if number not in known:
-        numbers = ", ".join(map(str, sorted(known)))
-        raise SettingsError(f"trial {number}: the proposals of {run} were requested for trials {numbers}")
-    return history.before(known[number])

@@ -70,7 +70,6 @@ class ProposalRequests:
         history: Callable[[], History],
         notify: Callable[[int], None] | None = None,
     ) -> None:
-        self.per_call = proposer.per_call
         self.method = method
         self.history = history
         self._proposer = proposer
@@ -89,22 +88,24 @@ class ProposalRequests:
             ProposalSlot(*trial.request, fault=trial.fault) for trial in self.history() if trial.request is not None
         ]
 
-    def request(self, history: History, number: int) -> list[ProposalSlot]:
-        """Request proposals for trial `number` after `history`: one slot per design, or one with a fault."""
+    def request(self, history: History, number: int) -> ProposalSlot:
+        """Request a proposal for trial `number` after `history`; the slot holds it, or a fault."""
         known = len(history)
         if self._final_fault is not None:
-            return [ProposalSlot(number, known, fault=self._final_fault)]
+            return ProposalSlot(number, known, fault=self._final_fault)
         if self._notify is not None:
             self._notify(number)
         try:
-            answer = self._proposer.propose(history, proposal_seed(self._seed, number), number)
+            proposal = self._proposer.propose(history, proposal_seed(self._seed, number), number)
         except ProposalError as fault:
             known = known if fault.known is None else fault.known
-            return [ProposalSlot(number, known, fault=fault.kind, note=self._note(fault))]
-        proposals = [answer] if isinstance(answer, Proposal) else list(answer)
-        if not proposals:
-            return [ProposalSlot(number, known, fault="answer", note="the proposer gave no design")]
-        return [_check_design(history, number, proposal) for proposal in proposals]
+            return ProposalSlot(number, known, fault=fault.kind, note=self._note(fault))
+        known = known if proposal.known is None else proposal.known
+        try:
+            history.problem.space.design(proposal.design.params)
+        except DesignError as fault:
+            return ProposalSlot(number, known, fault="answer", note=str(fault))
+        return ProposalSlot(number, known, proposal, note=proposal.note)
 
     def stop(self, kind: str) -> bool:
         """Make no more requests in this session, and return True if none had stopped them before."""
@@ -126,12 +127,3 @@ class ProposalRequests:
 def proposal_seed(seed: int, number: int) -> int:
     """Return the seed of the request for trial `number` of a run with this seed."""
     return derived_seed(seed, PROPOSING, number)
-
-
-def _check_design(history: History, number: int, proposal: Proposal) -> ProposalSlot:
-    known = len(history) if proposal.known is None else proposal.known
-    try:
-        history.problem.space.design(proposal.design.params)
-    except DesignError as fault:
-        return ProposalSlot(number, known, fault="answer", note=str(fault))
-    return ProposalSlot(number, known, proposal, note=proposal.note)

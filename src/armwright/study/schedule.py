@@ -6,7 +6,7 @@ ReplaySchedule        a recorded run is repeated: each proposal enters at its re
 """
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import count
 
 from armwright.runs.trial import FinishedTrial
@@ -34,12 +34,10 @@ class AlternatingSchedule(Schedule):
         self._ready = deque(requests.unused())
 
     def next(self, number: int) -> ProposalSlot | None:
-        """Return the slot if the trial is the first of a block; request proposals if none is left."""
+        """Return the slot if the trial is the first of a block; request a proposal if none is left."""
         if not self._requests.method.is_first_trial(number):
             return None
-        if not self._ready:
-            self._ready.extend(self._requests.request(self._requests.history(), number))
-        return self._ready.popleft()
+        return self._ready.popleft() if self._ready else self._requests.request(self._requests.history(), number)
 
     def upcoming(self, number: int) -> int:
         """Return the trial of the next request, once `number` trials are finished."""
@@ -59,26 +57,21 @@ class ReplaySchedule(Schedule):
         past = requests.past_slots()
         self._asked = {slot.asked for slot in past}
         self._end_is_reported = any(slot.fault == "missing" for slot in past)
-        self._ready: dict[tuple[int, str | None], ProposalSlot] = {}  # by trial and proposal; None for a fault
-        self._add(requests.unused())
+        self._ready = {slot.asked: slot for slot in requests.unused()}
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return what was recorded for this trial."""
         if number >= len(self._record):
             return self._next_after_end(number)
-        recorded = self._record[number]
-        if recorded.request is None:
+        request = self._record[number].request
+        if request is None:
             return None
-        asked, feedback = recorded.request
-        if (asked, recorded.answer) not in self._ready and asked not in self._asked:
-            self._add(self._requests.request(self._requests.history().before(feedback), asked))
+        asked, feedback = request
+        if asked not in self._ready and asked not in self._asked:
+            self._ready[asked] = self._requests.request(self._requests.history().before(feedback), asked)
         self._asked.add(asked)
         missing = ProposalSlot(asked, feedback, fault="missing", note=f"no design is left of call {asked}")
-        return self._ready.pop((asked, recorded.answer), self._ready.pop((asked, None), missing))
-
-    def _add(self, slots: Iterable[ProposalSlot]) -> None:
-        for slot in slots:
-            self._ready[slot.asked, None if slot.proposal is None else slot.proposal.id] = slot
+        return self._ready.pop(asked, missing)
 
     def _next_after_end(self, number: int) -> ProposalSlot | None:
         if len(self._requests.past_slots()) >= self._requests.method.n_started(number):

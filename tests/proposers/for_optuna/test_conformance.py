@@ -192,33 +192,6 @@ def test_maximising_the_negated_objective_gives_the_same_study() -> None:
     assert proposals("minimize", 1.0) == proposals("maximize", -1.0) != proposals("maximize", -1.0, seed=1)
 
 
-def test_stopped_study_resumes_with_pending_proposals() -> None:
-    study = optuna.create_study(sampler=RandomSampler(seed=0))
-    callback = rules()
-
-    def stopping(study: optuna.Study, trial: FrozenTrial) -> None:
-        if trial.number == 4:
-            study.stop()
-
-    study.optimize(mixed, n_trials=30, callbacks=[stopping, callback])
-    assert [trial.state for trial in study.trials] == [TrialState.COMPLETE] * 5 + [TrialState.WAITING]
-    assert callback.proposed == 2
-    study.optimize(mixed, n_trials=1, callbacks=[callback])
-    assert study.trials[5].user_attrs["source"] == "rules"
-    assert len(study.trials) == 6
-
-
-def test_trials_enqueued_by_the_user_run_first() -> None:
-    study = optuna.create_study(sampler=RandomSampler(seed=0))
-    for k in range(5):
-        study.enqueue_trial({"whole": 2 * k}, user_attrs={"mine": k})
-    study.optimize(mixed, n_trials=12, callbacks=[rules()])
-    assert [trial.user_attrs.get("mine") for trial in study.trials[:5]] == list(range(5))
-    assert [trial.params["whole"] for trial in study.trials[:5]] == [0, 2, 4, 6, 8]
-    assert len(of_rules(study)) == 4  # those that were asked for meanwhile wait behind them
-    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
-
-
 def test_infeasible_trials_are_not_parents() -> None:
     def objective(trial: optuna.Trial) -> float:
         x, y = trial.suggest_float("x", 0.0, 1.0), trial.suggest_categorical("y", ["allowed", "forbidden"])

@@ -121,14 +121,6 @@ def test_prompt_names_objectives_and_constraints(chat_server: ChatServer) -> Non
     assert study.trials[9].params == {"x": 0.25}
 
 
-def test_one_step_answer_needs_one_call(chat_server: ChatServer) -> None:
-    chat_server.answer = answering(reasoning="let me see")
-    study = study_of(10, ProposalCallback(proposer(chat_server, answer="one-step"), every=10))
-    assert len(chat_server.requests) == 1
-    assert "reasoning" in chat_server.requests[0]["response_format"]["json_schema"]["schema"]["properties"]
-    assert study.trials[9].user_attrs["source"] == "scripted"
-
-
 def test_refused_answer_is_returned_with_the_reason(chat_server: ChatServer) -> None:
     right, refused = answering(), answering({**GOOD, "degree": 3})
     chat_server.answer = lambda request: (refused if len(request["messages"]) == 1 else right)(request)
@@ -228,13 +220,6 @@ def test_nearest_trials_are_best_without_a_feasible_one() -> None:
     study.add_trials([completed([0.0], float(10 - i)) for i in range(8)])
     study.add_trial(completed([0.0], float("nan")))
     assert [trial.number for trial in best_trials(study.trials, study.directions)] == [7, 6, 5, 4, 3]
-
-
-def test_prompt_states_the_latest_range() -> None:
-    study = optuna.create_study()
-    for high in (9, 5):
-        study.add_trial(create_trial(params={"n": 2}, distributions={"n": IntDistribution(1, high)}, value=0.0))
-    assert observed_space(study) == {"n": IntDistribution(1, 5)}
 
 
 def test_prompt_lists_pending_proposals() -> None:

@@ -1,10 +1,9 @@
 """A callback for `study.optimize` that asks a proposer once per block of trials and enqueues the proposal."""
 
-import operator
 import threading
 from collections import Counter
 from collections.abc import Mapping
-from pathlib import Path
+from numbers import Integral
 from typing import Any
 
 import optuna
@@ -13,10 +12,8 @@ from optuna.storages import InMemoryStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from armwright.exceptions import DesignError, ModelError, ProposalError, SettingsError
-from armwright.problem.problem import Problem
 from armwright.proposers.for_optuna.parameters import checked_params, observed_space
-from armwright.proposers.for_optuna.proposer import ArmProposer, StudyProposer
-from armwright.proposers.proposer import Proposer
+from armwright.proposers.for_optuna.proposer import StudyProposer
 from armwright.search.samplers import quiet_study
 from armwright.seeding import PROPOSING, derived_seed
 
@@ -34,12 +31,9 @@ class ProposalCallback:
     decide, so that there is one proposal per block with n_jobs and with several processes on one storage.
 
     Args:
-        proposer: a StudyProposer such as StudyLlmProposer; with `problem`, a proposer of arms such as RulesProposer.
+        proposer: a StudyProposer such as StudyLlmProposer.
         every: trials per block.
         first: trials before the first proposal; by default every - 1, so that each block ends with a proposal.
-        problem: the armwright problem whose design space the study searches.
-        folder: with `problem`, parent of the records of all calls; each process needs its own. StudyLlmProposer has
-            `transcript` instead.
         seed: of the proposer's random draws.
         on_model_failure: "continue" goes on without proposals; "stop" raises ModelError from `study.optimize` if a
             proposal fails before the first has succeeded.
@@ -51,18 +45,18 @@ class ProposalCallback:
 
     def __init__(
         self,
-        proposer: StudyProposer | Proposer,
+        proposer: StudyProposer,
         every: int = 10,
         *,
         first: int | None = None,
-        problem: Problem | None = None,
-        folder: str | Path | None = None,
         seed: int = 0,
         on_model_failure: str = "continue",
     ) -> None:
         if on_model_failure not in ON_MODEL_FAILURE:
             raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
-        self.proposer = _study_proposer(proposer, problem, folder)
+        if StudyProposer not in type(proposer).__mro__:
+            raise SettingsError(f"expected an instance of StudyProposer, got {proposer!r}")
+        self.proposer = proposer
         self.every = _whole("every", every)
         self.first = max(1, self.every - 1) if first is None else _whole("first", first)
         self.seed = seed
@@ -101,7 +95,8 @@ class ProposalCallback:
             reported = self._given_up is not None  # by another thread in the meantime
             if error.final:
                 self._given_up = error.kind
-        if self.on_model_failure == "stop" and not _has_proposals(study):
+        has_proposals = any("proposal" in trial.user_attrs for trial in study.get_trials(deepcopy=False))
+        if self.on_model_failure == "stop" and not has_proposals:
             raise ModelError(str(error)) from error
         if not reported:
             outcome = "no more proposals are requested" if error.final else "the study continues without this proposal"
@@ -140,35 +135,7 @@ def enqueue(study: optuna.Study, params: Mapping[str, Any], attributes: Mapping[
     study.add_trial(copy.get_trials()[-1])
 
 
-def _has_proposals(study: optuna.Study) -> bool:
-    """Return whether this or another process has enqueued a proposal."""
-    return any("proposal" in trial.user_attrs for trial in study.get_trials(deepcopy=False))
-
-
-def _study_proposer(
-    proposer: StudyProposer | Proposer, problem: Problem | None, folder: str | Path | None
-) -> StudyProposer:
-    if isinstance(proposer, type):
-        raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
-    proposes_arms = Proposer in type(proposer).__mro__
-    if problem is None:
-        if proposes_arms:
-            raise SettingsError(
-                f"proposer {proposer.name} proposes arms: give the problem too, ProposalCallback(…, problem=…)"
-            )
-        if folder is not None:
-            raise SettingsError(f"folder {folder} goes with problem; StudyLlmProposer(transcript=…) keeps its calls")
-        return proposer  # pyright: ignore[reportReturnType]
-    if StudyProposer in type(proposer).__mro__:
-        raise SettingsError(f"proposer {proposer.name} is for any study: leave out problem")
-    return ArmProposer(proposer, problem, folder)  # pyright: ignore[reportArgumentType]
-
-
 def _whole(name: str, value: Any) -> int:
-    try:
-        number = operator.index(value)  # numpy integers too
-    except TypeError:
-        number = 0
-    if isinstance(value, bool) or number < 1:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:  # numpy integers too
         raise SettingsError(f"{name} = {value!r}: expected a whole number of at least 1")
-    return number
+    return int(value)

@@ -42,9 +42,8 @@ class StudyLlmProposer(LlmSession, StudyProposer):
 
         options = ModelOptions.of(options)
         budget = CallBudget(options.max_calls, options.max_cost)
-        super().__init__(ModelClient(options), options.source, budget, chat=options.memory == "chat")
+        super().__init__(ModelClient(options), options.source, options, budget)
         self.description = description
-        self.options = options
         self.given_space = dict(space or {})
         path = None if transcript is None else Path(transcript)
         if path is not None and not path.parent.is_dir():
@@ -60,7 +59,7 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         prompt = study_prompt(study, trials, parameters, self.description, seed, self.options)
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
         text = self._ask(
-            self._first_question(number, self.options, self._part_to_ask(prompt, number), known),
+            self._question(number, self._part_to_ask(prompt, number), known),
             self._output_format(parameters),
             partial(parameters_prompt, parameters),
         )

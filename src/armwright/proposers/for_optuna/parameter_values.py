@@ -21,8 +21,7 @@ def describe(distribution: BaseDistribution) -> str:
     """Describe the kind and range of a distribution."""
     if isinstance(distribution, CategoricalDistribution):
         return f"one of {', '.join(choice_texts(distribution))}"
-    if not isinstance(distribution, (IntDistribution, FloatDistribution)):
-        return str(distribution)
+    assert isinstance(distribution, (IntDistribution, FloatDistribution))
     kind = "whole number" if isinstance(distribution, IntDistribution) else "number"
     scale = ", on a log scale" if distribution.log else ""
     return f"{kind}, {_number(distribution.low)} to {_number(distribution.high)}{_steps(distribution)}{scale}"
@@ -56,17 +55,15 @@ def checked_value(name: str, value: Any, distribution: BaseDistribution) -> Any:
     Raises:
         DesignError: The distribution does not contain the value.
     """
-    if isinstance(distribution, CategoricalDistribution):
-        same = [choice for choice in distribution.choices if _same(choice, value)]
-        same += [c for c in distribution.choices if c == value and isinstance(c, bool) == isinstance(value, bool)]
-        if not same:
-            texts = choice_texts(distribution)
-            hint = did_you_mean(value, texts) if isinstance(value, str) else ""
-            raise DesignError(f"{name} = {_shown(value)} is not one of {', '.join(texts)}.{hint}".rstrip("."))
-        return same[0]
-    if isinstance(distribution, (IntDistribution, FloatDistribution)):
+    if not isinstance(distribution, CategoricalDistribution):
         return _checked_number(name, value, distribution)
-    return value
+    same = [choice for choice in distribution.choices if _same(choice, value)]
+    same += [c for c in distribution.choices if c == value and isinstance(c, bool) == isinstance(value, bool)]
+    if not same:
+        texts = choice_texts(distribution)
+        hint = did_you_mean(value, texts) if isinstance(value, str) else ""
+        raise DesignError(f"{name} = {_shown(value)} is not one of {', '.join(texts)}.{hint}".rstrip("."))
+    return same[0]
 
 
 def read_value(name: str, value: Any, distribution: BaseDistribution) -> Any:
@@ -80,7 +77,7 @@ def read_value(name: str, value: Any, distribution: BaseDistribution) -> Any:
 
 def is_number(distribution: BaseDistribution) -> bool:
     """Return whether a distribution is a range of at least two numbers."""
-    return isinstance(distribution, (FloatDistribution, IntDistribution)) and not distribution.single()
+    return not isinstance(distribution, CategoricalDistribution) and not distribution.single()
 
 
 def to_unit(value: Any, distribution: BaseDistribution) -> float:
@@ -107,7 +104,8 @@ def from_unit(share: float, distribution: BaseDistribution) -> int | float:
     return int(value) if isinstance(distribution, IntDistribution) else float(value)
 
 
-def _checked_number(name: str, value: Any, distribution: IntDistribution | FloatDistribution) -> int | float:
+def _checked_number(name: str, value: Any, distribution: BaseDistribution) -> int | float:
+    assert isinstance(distribution, (FloatDistribution, IntDistribution))
     low, high, step = distribution.low, distribution.high, distribution.step
     allowed = f"{_number(low)} <= {name} <= {_number(high)}{_steps(distribution)}"
     whole = isinstance(distribution, IntDistribution)
