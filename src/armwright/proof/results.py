@@ -7,7 +7,7 @@ designs/NNNN/             each design of the front (design_record.py)
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from armwright.proof.design_record import DESIGNS, design_name, objective_record
 from armwright.proof.front_gap import front_gap
 from armwright.proof.infeasibility import ViolationTally, feasibility_record
 from armwright.proof.proposer_bias import proposer_bias
-from armwright.proof.recommendation import HasTime, recommend, unlimited
+from armwright.proof.recommendation import recommend, unlimited
 from armwright.proof.summary_file import ProposerSummary, parse_summary
 from armwright.proof.verification import Verification, verify_front
 from armwright.runs.config import FrontMethod, RunConfig
@@ -152,7 +152,7 @@ def summarize_front(
     search: Mapping[str, Any],
     verification: Verification | None,
     tally: ViolationTally | None = None,
-    has_time: HasTime = unlimited,
+    left: Callable[[], float] = unlimited,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a direct search.
 
@@ -163,11 +163,11 @@ def summarize_front(
         search: Evaluations, seconds, why it ended, and the hypervolume over the evaluations.
         verification: Verification of the front; None if it was not verified.
         tally: All evaluated designs by the constraints that they satisfy.
-        has_time: Returns whether there is time for simulations and survival of recommended designs.
+        left: Returns the time that is left for simulations and survival of recommended designs [s].
     """
     volume = {"final": hypervolume(found, history.reference_point or ())}
     return {
-        **_common_record(history, config, found, volume, verification, tally, has_time),
+        **_common_record(history, config, found, volume, verification, tally, left),
         "search": dict(search),
         "versions": dict(config.versions),
     }
@@ -188,7 +188,7 @@ def _common_record(
     volume: Mapping[str, Any],
     verification: Verification | None,
     tally: ViolationTally | None = None,
-    has_time: HasTime = unlimited,
+    left: Callable[[], float] = unlimited,
 ) -> dict[str, Any]:
     """Return what the summaries of studies and direct searches have in common; found: (N, M) values of the front."""
     reference = history.reference_point
@@ -204,7 +204,7 @@ def _common_record(
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         **_assumed_record(history),
-        **_recommended_record(history, has_time),
+        **_recommended_record(history, left),
     }
 
 
@@ -214,11 +214,11 @@ def _assumed_record(history: History) -> dict[str, Any]:
     return {"assumed": assumed} if assumed else {}
 
 
-def _recommended_record(history: History, has_time: HasTime) -> dict[str, Any]:
+def _recommended_record(history: History, left: Callable[[], float]) -> dict[str, Any]:
     """Return the recommended designs; empty without constraints, which a cycle implies."""
     if not history.problem.constraints:
         return {}
-    return {"recommended": to_jsonable_python(recommend(history, has_time=has_time))}
+    return {"recommended": to_jsonable_python(recommend(history, left=left))}
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
