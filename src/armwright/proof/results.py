@@ -39,7 +39,7 @@ REPORT = "report.html"  # made by page/page.py
 TABLES = ("trials.csv", "front.csv")
 MAX_FALLBACK_SHARE = 0.1  # of a proposer's trials; runs with more are flagged, and tables leave them out
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
-CASES = ("exact", "moved", "started")  # in which the objectives of a design are verified
+CASES = ("exact", "moved")  # in which the objectives of a design are verified
 
 
 def write_results(
@@ -71,7 +71,7 @@ def rewrite_results(
     if isinstance(config.method, FrontMethod):
         new = {**summary, "verification": _verification_record(history, verification)}
     else:
-        known = {key: summary[key] for key in ("proposer", "proposer_bias", "surrogate") if key in summary}
+        known = {key: summary[key] for key in ("proposer", "proposer_bias") if key in summary}
         new = summarize(history, config, None, verification) | known
     write_results(folder, history, new, verification)
     return new
@@ -119,7 +119,6 @@ def summarize(
     config: RunConfig,
     proposer: ProposerSummary | None,
     verification: Verification | None = None,
-    surrogate: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a study."""
     curve = history.hypervolume
@@ -135,7 +134,6 @@ def summarize(
         **_common_record(history, config, history.masked_objectives, volume, verification),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **_failure_record(history, config),
-        **({} if surrogate is None else {"surrogate": surrogate}),
         **_screening_record(history, config),
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
@@ -232,7 +230,6 @@ def _verification_record(history: History, verification: Verification | None) ->
         "sensitive": len(history.front) - len(robust),
         "robust_numbers": robust,
         "hypervolume_of_robust": hypervolume(history.values[robust], reference),
-        "robust_from_any_start": int(verification.from_any_start.sum()),
         "hypervolume_worst_case": hypervolume(verification.worst_case, reference),
     }
 
@@ -244,7 +241,6 @@ def _verdicts(history: History, verification: Verification | None) -> dict[int, 
     return {
         member.number: {
             "robust": bool(verification.robust[i]),
-            "from_any_start": bool(verification.from_any_start[i]),
             **{case: objective_record(history, getattr(verification, case)[i].tolist()) for case in CASES},
         }
         for i, member in enumerate(history.front)
@@ -257,7 +253,6 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
         return {}
     return {
         "verdict": "robust" if verdict["robust"] else "sensitive",
-        "from_any_start": "yes" if verdict["from_any_start"] else "no",
         **{f"{name}_{case}": value for case in CASES for name, value in verdict[case].items()},
     }
 
