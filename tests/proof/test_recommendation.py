@@ -1,6 +1,7 @@
 """Recommended designs, verified in the simulator, in summaries and by the command."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -116,6 +117,9 @@ def test_designs_that_an_evaluator_measured_are_neither_simulated_nor_perturbed(
 class Verdicts:
     """A simulator in which some designs fail."""
 
+    members: Mapping[int, Any] = {}
+    seconds = 0.0
+
     def __init__(self, failing: set[int]) -> None:
         self.failing = failing
 
@@ -145,8 +149,8 @@ def test_failing_designs_are_demoted_with_their_reason(history: History) -> None
 
 
 def test_recommended_designs_are_not_simulated_without_time(history: History) -> None:
-    simulator = SimpleNamespace(members={})
-    chosen = recommend(history, cast("Simulator", simulator), has_time=lambda *_: False)
+    simulator = SimpleNamespace(members={}, seconds=2.0)
+    chosen = recommend(history, cast("Simulator", simulator), left=lambda: 1.0)
     assert [one.design for one in chosen] == [numbers[0] for numbers in candidates(history).values()]
     assert {one.status for one in chosen} == {"not simulated: the time is up"}
     assert {one.survival for one in chosen} == {None}

@@ -7,7 +7,7 @@ import pytest
 
 from armwright.problem.problem import Problem
 from armwright.proof.results import read_summary, verify_run
-from armwright.proof.verification import START_SPREAD, STARTS, Verification, verify, verify_front
+from armwright.proof.verification import Verification, verify, verify_front
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
@@ -21,10 +21,10 @@ PROBLEM = Problem(load_task("target-1"))
 BOX = (5.0, 5.0)
 
 
-def values_of(problem: Problem, designs: list[Design], start: np.ndarray | None = None) -> np.ndarray:
+def values_of(problem: Problem, designs: list[Design]) -> np.ndarray:
     """(N, 2) by the reference, in float64."""
     chains = reference.chains([problem.arm(design) for design in designs])
-    solution = reference.solve(chains, problem.task.target_positions, start=start)
+    solution = reference.solve(chains, problem.task.target_positions)
     return np.column_stack(
         [
             np.linalg.norm(solution.reached - problem.task.target_positions, axis=-1).sum(axis=1),
@@ -66,21 +66,12 @@ def test_perturbed_values_are_the_worst_over_copies(designs: list[Design], found
     agree(found.moved, worst)
 
 
-@pytest.mark.slow
-def test_restarted_values_are_the_worst_of_twenty(designs: list[Design], found: Verification) -> None:
-    shape = STARTS, len(PROBLEM.task.targets), PROBLEM.space.joints
-    starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
-    worst = np.max([values_of(PROBLEM, designs, start) for start in starts], axis=0)
-    agree(found.started, worst)
-
-
 def test_robustness_follows_from_the_worst_cases(designs: list[Design], found: Verification) -> None:
     values = PROBLEM.evaluate(designs).values
     allowed = values + np.maximum(0.05 * values, 0.005 * np.array(BOX))
     for i in range(len(designs)):
         robust = np.all(found.exact[i] <= allowed[i]) and np.all(found.moved[i] <= allowed[i])
         assert found.robust[i] == robust
-        assert found.from_any_start[i] == (robust and np.all(found.started[i] <= allowed[i]))
     assert 0 < found.robust.sum() < len(designs)
 
 

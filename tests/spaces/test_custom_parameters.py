@@ -156,7 +156,7 @@ def test_search_encodes_logarithmic_columns() -> None:
     assert units.min() >= 0.0
     assert units.max() <= 1.0
     assert encoding.from_units(units)[:, :-1] == pytest.approx(matrix[:, encoding.real][:, :-1])
-    several = units.reshape(4, 50, -1)  # as CMA-ES from several starts holds them
+    several = units.reshape(4, 50, -1)
     assert encoding.from_units(several).reshape(200, -1) == pytest.approx(encoding.from_units(units))
     kp = [p.name for p in space.parameters if isinstance(p, FloatParameter)].index("kp")
     assert units[:, kp] == pytest.approx(np.log(matrix[:, encoding.real[kp]]) / np.log(200.0))

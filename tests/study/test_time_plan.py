@@ -17,7 +17,7 @@ from armwright.proof.results import read_summary
 from armwright.spaces.design_space import default_space
 from armwright.study.front import direct_search
 from armwright.study.front.search_budget import SearchBudget, SearchProgress, read_seconds
-from armwright.study.front.time_plan import ChunkSize, ResultCosts, TimePlan
+from armwright.study.front.time_plan import ChunkSize, TimePlan
 from tests.support.controlled_runs import interrupt_at
 
 PROBLEM = Problem(load_task("target-1"))
@@ -85,7 +85,7 @@ def test_invalid_budgets_are_refused(budget: str | float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "of_a_design"), [(5.0, 1e-3), (30.0, 0.01), (60.0, 0.02), (60.0, 0.05), (60.0, 0.2), (20.0, 0.1)]
+    ("seconds", "of_a_design"), [(5.0, 1e-3), (30.0, 0.01), (60.0, 0.02), (60.0, 0.2), (20.0, 0.05)]
 )
 def test_run_ends_on_time(clock: Clock, tmp_path: Path, seconds: float, of_a_design: float) -> None:
     clock.of_a_design = of_a_design
@@ -158,33 +158,17 @@ def test_compilation_is_announced_once() -> None:
     assert compilation.seconds >= 0.0
 
 
-def test_expensive_results_leave_fewer_designs_and_less_search(clock: Clock) -> None:
+def test_results_get_a_share_of_the_time_and_of_expensive_ones_fewer_are_kept(clock: Clock) -> None:
     plan = plan_of(clock, drawing=True, seconds=60.0)
     plan.begin_search()
-    left, kept = list[float](), list[int]()
-    for design in (1e-4, 0.01, 0.1, 1.0):
-        plan.costs = ResultCosts(design)
-        left.append(plan.search_left)
-        clock.wait(left[-1])
-        kept.append(plan.n_designs)
-        clock.wait(-left[-1])
-    assert left == sorted(left, reverse=True)
-    assert kept == [300, 300, 180, 18]
-    plan.costs = ResultCosts(0.01, simulation=0.5)
-    assert plan.search_left == pytest.approx(left[1] - 15 * 0.5)
-    plan.costs = ResultCosts(0.01, simulation=0.5, survival=0.25)
-    assert plan.search_left == pytest.approx(left[1] - 15 * 0.5 - 5 * 0.25)
-
-
-def test_simulations_and_perturbations_need_time(clock: Clock) -> None:
-    plan = plan_of(clock, drawing=True, seconds=60.0)
-    plan.costs = ResultCosts(0.01, simulation=2.0, survival=1.0)
-    assert plan.has_time_for(9, 3, after=10.0)
-    clock.wait(45.0)
-    assert plan.has_time_for(1, 3, after=0.0)
-    assert not plan.has_time_for(1, 20, after=0.0)
-    assert not plan.has_time_for(0, 3, after=10.0)
-    assert plan_of(clock, evaluations=5).has_time_for(10**9, 10**9, after=1e9)
+    assert plan.search_left == pytest.approx(60.0 - 3.0 - 15.0)
+    clock.wait(plan.search_left)
+    assert [plan.n_designs(seconds) for seconds in (1e-4, 0.01, 0.1, 1.0, 60.0)] == [300, 300, 75, 7, 1]
+    clock.wait(20.0)
+    assert plan.n_designs(0.1) == 10  # late
+    assert plan_of(clock, seconds=3600.0).search_left == pytest.approx(3540.0)
+    assert plan_of(clock, drawing=True, seconds=4.0).search_left == pytest.approx(1.2)  # at least
+    assert plan_of(clock, evaluations=5).n_designs(1e9) == 300
 
 
 @pytest.mark.parametrize("seconds", [1e-6, 1e-3, 0.02])
@@ -212,16 +196,3 @@ def test_rate_counts_what_the_budget_allows(progress: SearchProgress, line: str)
     with search_progress(Console(file=output, width=200)) as watch:
         watch(progress)
     assert line in output.getvalue()
-
-
-def test_cost_of_simulations_is_measured_once_a_design_is_feasible(clock: Clock) -> None:
-    plan = plan_of(clock, seconds=100.0)
-    assert not plan.should_measure(is_feasible=True)
-    clock.wait(20.0)
-    assert plan.should_measure(is_feasible=False)
-    plan.costs = ResultCosts(0.01)
-    assert not plan.should_measure(is_feasible=False)
-    assert plan.should_measure(is_feasible=True)
-    plan.costs = ResultCosts(0.01, 0.0)
-    assert not plan.should_measure(is_feasible=True)
-    assert not plan_of(clock, evaluations=5).should_measure(is_feasible=True)

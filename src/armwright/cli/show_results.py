@@ -1,7 +1,7 @@
 """Print the results of runs: fronts, attribution, costs and the paths of the files."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,6 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
             f"{summary['duplicates']} trial{'s' * (summary['duplicates'] > 1)} repeated the design of an earlier one, "
             "without another evaluation"
         )
-    _show_surrogate(console, summary.get("surrogate"))
     if summary["proposer"] is not None:
         _show_proposer(console, summary["proposer"])
     is_scaled = torque in problem.objectives
@@ -60,17 +59,6 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
     _show_files(console, run.folder, figures)
 
 
-def _show_surrogate(console: Console, surrogate: Mapping[str, Any] | None) -> None:
-    """Print how well the surrogate predicts each objective."""
-    if surrogate is None:
-        return
-    errors: dict[str, float | None] = surrogate["errors"]
-    console.print(
-        f"leave-one-out error of the surrogate over {surrogate['designs']} designs, in standard deviations: "
-        + ", ".join(f"{name} {'constant' if error is None else f'{error:.2g}'}" for name, error in errors.items())
-    )
-
-
 def show_front(console: Console, history: History, summary: dict[str, Any]) -> None:
     """Print the front as a table and how much of it is robust; nothing if the front is empty."""
     if not history.front:
@@ -80,9 +68,9 @@ def show_front(console: Console, history: History, summary: dict[str, Any]) -> N
     if verified is not None:
         console.print(
             f"recomputed in float64 and with the base or a link 1 mm off: {verified['robust']} robust, "
-            f"{verified['sensitive']} sensitive ({verified['robust_from_any_start']} also robust from other initial "
-            f"postures); hypervolume of the robust designs {verified['hypervolume_of_robust']:.3f}, of all in their "
-            f"worst case {verified['hypervolume_worst_case']:.3f}"
+            f"{verified['sensitive']} sensitive; hypervolume of the robust designs "
+            f"{verified['hypervolume_of_robust']:.3f}, of all in their worst case "
+            f"{verified['hypervolume_worst_case']:.3f}"
         )
 
 

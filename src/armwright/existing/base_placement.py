@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
+from scipy.optimize import differential_evolution  # pyright: ignore[reportUnknownVariableType]
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
@@ -16,17 +17,14 @@ from armwright.problem.problem import POSTURES_AT_ONCE, Problem
 from armwright.robot.arm import Arm, Joint
 from armwright.robot.mounting import Mounting, mounted, needs_turning
 from armwright.robot.urdf_reader import UrdfArm
-from armwright.search.cma_es import minimize
 from armwright.search.encoding import DesignEncoding
 from armwright.seeding import derived_seed
 from armwright.spaces.parameters import FloatParameter
 from armwright.spaces.tool_mount import with_tool
 
-RANDOM_PLACES = 300
-IMPROVED_PLACES = 4  # the best of the random ones
-EVALUATIONS = 300  # to improve one place
+PLACES, GENERATIONS = 30, 50  # of a differential evolution
 HARDLY = 0.01  # more torque that is accepted for a base that is not turned
-N_PLACES = RANDOM_PLACES + IMPROVED_PLACES * EVALUATIONS
+N_PLACES = PLACES * GENERATIONS
 
 
 def with_travel(arm: Arm, travel: float) -> Arm:
@@ -102,14 +100,19 @@ def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
             losses[part] = _losses(problem, problem.physics(stack_arms(arms)))
         return losses
 
-    rows = DesignEncoding(parameters).random(RANDOM_PLACES, np.random.default_rng(derived_seed(seed, 0)))
-    losses = evaluate(rows)
-    best = np.argsort(losses, kind="stable")[:IMPROVED_PLACES]
-    places, least = minimize(parameters, evaluate, rows[best], losses[best], EVALUATIONS, derived_seed(seed, 1))
-    chosen = places[least.argmin()]
+    encoding, rng = DesignEncoding(parameters), np.random.default_rng(derived_seed(seed, 0))
+    first: Any = rng.random((PLACES, len(parameters)))
+    settings: Any = {"tol": 0.0, "polish": False, "updating": "deferred", "vectorized": True}
+
+    def losses_of(units: Array) -> Array:
+        return evaluate(encoding.from_units(units.T))
+
+    ranges = [(0.0, 1.0)] * len(parameters)
+    found: Any = differential_evolution(losses_of, ranges, init=first, maxiter=GENERATIONS - 1, rng=rng, **settings)
+    chosen = encoding.from_units(found.x)
     if len(chosen) > 3:
         unturned = np.array([[*chosen[:3], 0.0]])
-        if _needs_hardly_more(float(evaluate(unturned)[0]), float(least.min())):
+        if _needs_hardly_more(float(evaluate(unturned)[0]), float(found.fun)):
             chosen = unturned[0]
     return Mounting.of(chosen.tolist())
 

@@ -288,7 +288,6 @@ class Problem:
         arms: ArmArrays,
         near: Sequence[Array | None] = (),
         scenes: Sequence[Scene] = (),
-        start: Array | None = None,
     ) -> Iterator[Evaluation]:
         """Yield the physics of N arms, such as changed designs, in each case of the task.
 
@@ -297,11 +296,10 @@ class Problem:
             near: (N, B, D) postures of each case that the arms keep as far as they can, such as those of the unchanged
                 designs; empty to choose postures.
             scenes: changed surroundings of each case; empty for the task's.
-            start: initial joint values as in `evaluate_arrays`.
         """
         scenes = scenes or self.scenes
         for scene, postures in zip(scenes, near or [None] * len(scenes), strict=True):
-            yield evaluate_arrays(arms, scene, self.device, initial_q=start, near=postures)
+            yield evaluate_arrays(arms, scene, self.device, near=postures)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.

@@ -3,9 +3,9 @@
 For each it is stated which perturbations it survives.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -26,15 +26,9 @@ BY_EVALUATOR = f"{NOT_SIMULATED}: a custom evaluator measured it"
 OUT_OF_TIME = f"{NOT_SIMULATED}: the time is up"
 
 
-class HasTime(Protocol):
-    """Return whether there is time for a number of simulations, and to evaluate the survival of some designs."""
-
-    def __call__(self, simulations: int, survivals: int, /) -> bool: ...
-
-
-def unlimited(simulations: int, survivals: int) -> bool:
-    """Return True: there is time for everything."""
-    return True
+def unlimited() -> float:
+    """Return the time that is left if there is no limit [s]."""
+    return math.inf
 
 
 @dataclass(frozen=True)
@@ -95,7 +89,7 @@ def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str,
 
 
 def recommend(
-    history: History, simulator: Simulator | None = None, has_time: HasTime = unlimited
+    history: History, simulator: Simulator | None = None, left: Callable[[], float] = unlimited
 ) -> list[Recommendation]:
     """Return the recommended designs: simulated, unless a cycle or its durations are missing.
 
@@ -104,32 +98,32 @@ def recommend(
     Args:
         history: The trials.
         simulator: Keeps what it simulates; None for a new one.
-        has_time: Returns whether there is time.
+        left: Returns the time that is left [s].
     """
     roles = candidates(history)
     if history.problem.evaluator is not None:
         return [Recommendation(role, numbers[0], BY_EVALUATOR) for role, numbers in roles.items()]
+    seconds = 0.0  # of a simulation
     try:
         simulator = simulator or Simulator(history)
-        chosen = [_verified(role, numbers, simulator, has_time, len(roles)) for role, numbers in roles.items()]
+        chosen = [_verified(role, numbers, simulator, left) for role, numbers in roles.items()]
+        seconds = simulator.seconds
     except SettingsError:
         chosen = [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in roles.items()]
-    verified = {one.design: one.status == VERIFIED for one in chosen}
-    if not has_time(0, len(verified)):
+    if left() < 0.0:
         return chosen
-    if not has_time(len(FACTORS) * sum(verified.values()), len(verified)):
+    verified = {one.design: one.status == VERIFIED for one in chosen}
+    if left() < len(FACTORS) * sum(verified.values()) * seconds:
         verified = dict.fromkeys(verified, False)
     survival = evaluate_survival(history, verified)
     return [replace(one, survival=survival.get(one.design)) for one in chosen]
 
 
-def _verified(
-    role: str, numbers: Sequence[int], simulator: Simulator, has_time: HasTime, survivals: int
-) -> Recommendation:
-    """Return the first design that passes in the simulator; survivals: designs whose survival needs time as well."""
+def _verified(role: str, numbers: Sequence[int], simulator: Simulator, left: Callable[[], float]) -> Recommendation:
+    """Return the first design that passes in the simulator."""
     demoted: list[Demoted] = []
     for number in numbers[:MAX_TRIED]:
-        if not has_time(1, survivals) and number not in simulator.members:
+        if number not in simulator.members and left() < simulator.seconds:
             return Recommendation(role, number, OUT_OF_TIME, tuple(demoted))
         result = simulator(number).result
         if result.verdict == PASS:

@@ -7,7 +7,7 @@ designs/NNNN/             each design of the front (design_record.py)
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from armwright.proof.design_record import DESIGNS, design_name, objective_record
 from armwright.proof.front_gap import front_gap
 from armwright.proof.infeasibility import ViolationTally, feasibility_record
 from armwright.proof.proposer_bias import proposer_bias
-from armwright.proof.recommendation import HasTime, recommend, unlimited
+from armwright.proof.recommendation import recommend, unlimited
 from armwright.proof.summary_file import ProposerSummary, parse_summary
 from armwright.proof.verification import Verification, verify_front
 from armwright.runs.config import FrontMethod, RunConfig
@@ -39,7 +39,7 @@ REPORT = "report.html"  # made by page/page.py
 TABLES = ("trials.csv", "front.csv")
 MAX_FALLBACK_SHARE = 0.1  # of a proposer's trials; runs with more are flagged, and tables leave them out
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
-CASES = ("exact", "moved", "started")  # in which the objectives of a design are verified
+CASES = ("exact", "moved")  # in which the objectives of a design are verified
 
 
 def write_results(
@@ -71,7 +71,7 @@ def rewrite_results(
     if isinstance(config.method, FrontMethod):
         new = {**summary, "verification": _verification_record(history, verification)}
     else:
-        known = {key: summary[key] for key in ("proposer", "proposer_bias", "surrogate") if key in summary}
+        known = {key: summary[key] for key in ("proposer", "proposer_bias") if key in summary}
         new = summarize(history, config, None, verification) | known
     write_results(folder, history, new, verification)
     return new
@@ -119,7 +119,6 @@ def summarize(
     config: RunConfig,
     proposer: ProposerSummary | None,
     verification: Verification | None = None,
-    surrogate: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a study."""
     curve = history.hypervolume
@@ -135,7 +134,6 @@ def summarize(
         **_common_record(history, config, history.masked_objectives, volume, verification),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **_failure_record(history, config),
-        **({} if surrogate is None else {"surrogate": surrogate}),
         **_screening_record(history, config),
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
@@ -152,7 +150,7 @@ def summarize_front(
     search: Mapping[str, Any],
     verification: Verification | None,
     tally: ViolationTally | None = None,
-    has_time: HasTime = unlimited,
+    left: Callable[[], float] = unlimited,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a direct search.
 
@@ -163,11 +161,11 @@ def summarize_front(
         search: Evaluations, seconds, why it ended, and the hypervolume over the evaluations.
         verification: Verification of the front; None if it was not verified.
         tally: All evaluated designs by the constraints that they satisfy.
-        has_time: Returns whether there is time for simulations and survival of recommended designs.
+        left: Returns the time that is left for simulations and survival of recommended designs [s].
     """
     volume = {"final": hypervolume(found, history.reference_point or ())}
     return {
-        **_common_record(history, config, found, volume, verification, tally, has_time),
+        **_common_record(history, config, found, volume, verification, tally, left),
         "search": dict(search),
         "versions": dict(config.versions),
     }
@@ -188,7 +186,7 @@ def _common_record(
     volume: Mapping[str, Any],
     verification: Verification | None,
     tally: ViolationTally | None = None,
-    has_time: HasTime = unlimited,
+    left: Callable[[], float] = unlimited,
 ) -> dict[str, Any]:
     """Return what the summaries of studies and direct searches have in common; found: (N, M) values of the front."""
     reference = history.reference_point
@@ -204,7 +202,7 @@ def _common_record(
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         **_assumed_record(history),
-        **_recommended_record(history, has_time),
+        **_recommended_record(history, left),
     }
 
 
@@ -214,11 +212,11 @@ def _assumed_record(history: History) -> dict[str, Any]:
     return {"assumed": assumed} if assumed else {}
 
 
-def _recommended_record(history: History, has_time: HasTime) -> dict[str, Any]:
+def _recommended_record(history: History, left: Callable[[], float]) -> dict[str, Any]:
     """Return the recommended designs; empty without constraints, which a cycle implies."""
     if not history.problem.constraints:
         return {}
-    return {"recommended": to_jsonable_python(recommend(history, has_time=has_time))}
+    return {"recommended": to_jsonable_python(recommend(history, left=left))}
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
@@ -232,7 +230,6 @@ def _verification_record(history: History, verification: Verification | None) ->
         "sensitive": len(history.front) - len(robust),
         "robust_numbers": robust,
         "hypervolume_of_robust": hypervolume(history.values[robust], reference),
-        "robust_from_any_start": int(verification.from_any_start.sum()),
         "hypervolume_worst_case": hypervolume(verification.worst_case, reference),
     }
 
@@ -244,7 +241,6 @@ def _verdicts(history: History, verification: Verification | None) -> dict[int, 
     return {
         member.number: {
             "robust": bool(verification.robust[i]),
-            "from_any_start": bool(verification.from_any_start[i]),
             **{case: objective_record(history, getattr(verification, case)[i].tolist()) for case in CASES},
         }
         for i, member in enumerate(history.front)
@@ -257,7 +253,6 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
         return {}
     return {
         "verdict": "robust" if verdict["robust"] else "sensitive",
-        "from_any_start": "yes" if verdict["from_any_start"] else "no",
         **{f"{name}_{case}": value for case in CASES for name, value in verdict[case].items()},
     }
 

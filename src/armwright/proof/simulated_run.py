@@ -1,5 +1,6 @@
 """Simulation of designs of a run."""
 
+import time
 from dataclasses import dataclass
 
 from armwright.exceptions import SettingsError
@@ -35,12 +36,15 @@ class Simulator:
             raise SettingsError(f"task {history.problem.task.name} has no cycle to simulate; try cycle: in_order")
         self.history = history
         self.members: dict[int, SimulatedMember] = {}
+        self.seconds = 0.0  # that the latest simulation took [s]
 
     def __call__(self, number: int) -> SimulatedMember:
         """Return a simulated design; SettingsError if a duration of its steps is not known."""
         if number not in self.members:
+            started = time.perf_counter()
             arm, evaluation = self.history.member(number).arm, self.history.evaluation([number])
             self.members[number] = simulate_arm(self.history.problem, arm, evaluation, 0, number)
+            self.seconds = time.perf_counter() - started
         return self.members[number]
 
 

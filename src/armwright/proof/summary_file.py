@@ -34,7 +34,6 @@ class _Verification(_Record):
     sensitive: Count
     robust_numbers: list[int]
     hypervolume_of_robust: float
-    robust_from_any_start: Count
     hypervolume_worst_case: float
 
 
@@ -64,11 +63,6 @@ class _Proposer(_Record):
     call_seconds: float
     differing_prompts: int = 0
     overlap: _Overlap | None
-
-
-class _Surrogate(_Record):
-    designs: Count
-    errors: dict[str, float | None]
 
 
 class _Seconds(_Record):
@@ -139,7 +133,6 @@ class StudySummary(_Summary):
     hypervolume: _Curve
     duplicates: Count
     failures: dict[str, Count] = {}
-    surrogate: _Surrogate | None = None
     screened_out: dict[str, Count] = {}
     attribution: dict[str, Attribution]
     proposer: _Proposer | None

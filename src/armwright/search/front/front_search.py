@@ -174,12 +174,6 @@ class FrontSearch:
         earlier = [(n, volume) for n, volume in history if n < self._evaluations]
         self._history = [*earlier, (self._evaluations, self.hypervolume)]
 
-    def best(self, n: int) -> Indices:
-        """Return the sorted indices in `matrix` of at most `n` designs that keep most of the hypervolume."""
-        if self.hypervolume == 0.0:
-            return np.sort(nearest(self._front_values, self._reference_point, n))
-        return np.sort(thinned(self._front_values, self._reference_point, n))
-
     def state(self) -> dict[str, Any]:
         """Return the arrays and numbers that `restore` needs; later steps do not change them."""
         return {"history": self.history, **{name: getattr(self, f"_{name}") for name in (*_COUNTERS, *_ARRAYS)}}

@@ -4,20 +4,17 @@ import io
 import math
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from armwright.arrays import Array, open_arrays
-from armwright.exceptions import RunFolderError, SettingsError
+from armwright.exceptions import RunFolderError
 from armwright.kinematics.ik.ik import MANY_ARMS
 from armwright.pareto import PENALTY
 from armwright.problem.problem import Problem
 from armwright.proof.infeasibility import ViolationTally
-from armwright.proof.perturbations import evaluate_survival
 from armwright.proof.results import complete_summary, discard_results, read_summary, summarize_front, write_results
-from armwright.proof.simulated_run import Simulator
 from armwright.proof.verification import Verification, verify, verify_front
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import SEARCH, RunFolder, read_run
@@ -27,16 +24,15 @@ from armwright.search.front.front_search import FrontSearch
 from armwright.search.front.screening import Screen, pays
 from armwright.search.front.variation import offspring
 from armwright.study.front.reference_survey import ReferenceSurvey
-from armwright.study.front.reported_front import ReportedFront, reported_front
+from armwright.study.front.reported_front import reported_front
 from armwright.study.front.search_budget import SearchProgress
-from armwright.study.front.time_plan import ChunkSize, ResultCosts, TimePlan, files_seconds
+from armwright.study.front.time_plan import MAX_DESIGNS, ChunkSize, TimePlan, files_seconds
 from armwright.study.progress import RunResult
 
 SAVE_SECONDS = 5.0
 SHORT = 1_200  # evaluations on tasks with a cycle: searches of fewer find more after a smaller first generation
 SHORT_FIRST_BATCH = 200  # random designs in that first generation
-N_MEASURED = (1, 4, 16, 64)  # designs that the cost of results is measured on: more, while that is quick
-NOTABLE_SHARE, LONG_SHARE = 0.02, 0.1  # of the time of a session
+N_MEASURED, LONG_SHARE = (1, 8), 0.02  # designs that verification is timed on: more if one takes a smaller share
 
 
 class FrontRun(RunResult):
@@ -78,9 +74,9 @@ class DirectSearch:
 
     def run(self, stop_at_stall: bool) -> FrontRun:
         """Search until the budget is spent or the search stalls, then write the results."""
-        self._load_kernels()
-        self.plan.begin_search()
         ended = self._end_reason(stop_at_stall)
+        self._load_kernels(not ended)
+        self.plan.begin_search()
         if not ended and self.folder is not None:
             discard_results(self.folder.path)
             self.config = self.folder.note_versions(self.config)
@@ -95,9 +91,6 @@ class DirectSearch:
                 self.search.tell(matrix[: len(values)], values)
                 if self.survey.close():
                     self._move_reference_point(self.survey.point)
-                self.plan.n_found = len(self.search.matrix)
-                if self.plan.should_measure(self._n_feasible > 0):
-                    self.plan.costs = self._measure_costs()
                 state = self._state()
                 if time.monotonic() - saved >= SAVE_SECONDS:
                     self._save(state)
@@ -118,11 +111,21 @@ class DirectSearch:
         """Search time of all sessions [s]."""
         return self.seconds + self.plan.search_seconds
 
-    def _load_kernels(self) -> None:
+    def _load_kernels(self, for_results: bool) -> None:
         """Load the kernels. Those of a cycle are loaded by one design: evaluating many of them takes seconds."""
         few = self.problem.space.matrix(self.problem.space.sample(1, 0))
         is_fast = self.problem.task.cycle is None and self.problem.tolerance == 0.0
-        self.problem.evaluate(np.repeat(few, MANY_ARMS if is_fast else 1, axis=0))
+        outcomes = self.problem.evaluate(np.repeat(few, MANY_ARMS if is_fast else 1, axis=0))
+        if for_results and self._is_result_timed:
+            self._verify(few, outcomes.values[:1])
+
+    @property
+    def _is_result_timed(self) -> bool:
+        """True if designs are verified, and there is a limit of time."""
+        return self.folder is not None and self.plan.budget.seconds is not None
+
+    def _verify(self, matrix: Array, values: Array) -> None:
+        verify(self.problem, self.problem.space.designs(matrix), values, self.survey.best_point())
 
     def _end_reason(self, stop_at_stall: bool) -> str:
         """Return why the search ends; empty if it goes on."""
@@ -259,7 +262,7 @@ class DirectSearch:
                 statistics,
                 verification,
                 self.tally,
-                lambda simulations, survivals: self.plan.has_time_for(simulations, survivals, after),
+                lambda: self.plan.left - after,
             )
 
         if self.folder is None:
@@ -295,53 +298,26 @@ class DirectSearch:
                 return list(history), {key: stored["search"][key] for key in ("found", "reduced")}
         point, n = self.survey.best_point(), self._affordable_designs()
         front = reported_front(self.problem, self.search.matrix, self.search.values, point, n)
-        reduction = {"evaluations": front.evaluations, "designs": front.reduced}
-        return self._front_trials(front), {"found": front.found, "reduced": reduction}
-
-    def _affordable_designs(self) -> int:
-        """Return how many designs of the front there is time to verify and write."""
-        if self.plan.costs is None and self.plan.budget.seconds is not None:
-            self.plan.costs = self._measure_costs()
-        return self.plan.n_designs
-
-    def _measure_costs(self) -> ResultCosts:
-        """Measure what results cost, on some of the best designs.
-
-        Infeasible designs are verified as well, but never simulated: their cycle may take days.
-        """
-        reference_point = self.survey.best_point()
-
-        def verify_best(n: int) -> tuple[History, float]:
-            started, best = self.plan.elapsed, self.search.best(n)
-            matrix, values = self.search.matrix[best], self.search.values[best]
-            front = reported_front(self.problem, matrix, values, reference_point, n)
-            history = History(self.problem, self._front_trials(front), 0, reference_point)
-            if self.folder is not None:  # otherwise nothing is verified
-                verify(self.problem, [trial.design for trial in history], history.values, reference_point)
-            return history, self.plan.elapsed - started
-
-        history, seconds = verify_best(1)
-        if seconds <= LONG_SHARE * self.plan.session:  # most of it may be the loading of kernels in float64
-            for n in N_MEASURED:
-                history, seconds = verify_best(n)
-                if seconds > NOTABLE_SHARE * self.plan.session:
-                    break
-        design = seconds / len(history) + files_seconds(self.problem.task)
-        if not history.front:
-            return ResultCosts(design)
-        started, number = self.plan.elapsed, history.front[0].number
-        with suppress(SettingsError):  # such designs are not simulated later, either
-            Simulator(history)(number)
-        simulated = self.plan.elapsed
-        evaluate_survival(history, {number: False})
-        return ResultCosts(design, simulated - started, self.plan.elapsed - simulated)
-
-    def _front_trials(self, front: ReportedFront) -> list[FinishedTrial]:
-        """Return the designs of a front as trials."""
         outcomes = self.problem.evaluate(front.matrix)
         values = outcomes.values if self.problem.constraints else front.values  # penalised with constraints
         designs = self.problem.space.designs(front.matrix)
-        return [
+        trials = [
             FinishedTrial(n, FRONT_SEARCH, design, tuple(row), violations=outcome.violations, q=outcome.q)
             for n, (design, row, outcome) in enumerate(zip(designs, values.tolist(), outcomes, strict=True))
         ]
+        reduction = {"evaluations": front.evaluations, "designs": front.reduced}
+        return trials, {"found": front.found, "reduced": reduction}
+
+    def _affordable_designs(self) -> int:
+        """Return how many designs of the front there is time to verify and write, by the time that some take."""
+        if not self._is_result_timed:
+            return MAX_DESIGNS
+        seconds = 0.0
+        for n in N_MEASURED:
+            started, matrix = self.plan.elapsed, self.search.matrix[:n]
+            self._verify(matrix, self.search.values[:n])
+            spent = self.plan.elapsed - started
+            seconds = spent / len(matrix)
+            if spent > LONG_SHARE * self.plan.session:
+                break
+        return self.plan.n_designs(seconds + files_seconds(self.problem.task))

@@ -12,10 +12,9 @@ import signal
 import subprocess
 import traceback
 from collections import Counter
-from collections.abc import Callable, Generator, Hashable, Iterable
+from collections.abc import Callable, Generator, Hashable, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
 from tempfile import TemporaryDirectory
 from typing import Any, cast
 from uuid import uuid4
@@ -95,12 +94,12 @@ class Cluster:
         self._notify = notify
         self._tasks: dict[str, _Task] = {}  # by the future's key
         self._losses: Counter[str] = Counter()
-        # Futures that ended, and the keys that a lost worker had; filled by Dask's threads.
+        # Futures that ended, the keys that a lost worker had, and None for a new worker; filled by Dask's threads.
         self._events: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._versions = _versions_of(PACKAGES)
         with ExitStack() as stack:
             self._client = stack.enter_context(_client_of(workers))
             self._client.subscribe_topic("all", self._receive_event)
+            self._check_versions()
             waiting = "" if self._n_threads() else ", which has no worker yet"
             notify(f"evaluating on {workers.description}{waiting}")
             self.close = stack.pop_all().close
@@ -124,11 +123,8 @@ class Cluster:
             function: a function of this package.
             arguments: anything that can be pickled.
         """
-        import cloudpickle
-
         task_name = f"armwright-{uuid4().hex}"
-        call = cloudpickle.dumps(partial(_run, function, *arguments))
-        future = self._client.submit(_run_pickled, self._versions, call, key=task_name, pure=False)
+        future = self._client.submit(_run, function, *arguments, key=task_name, pure=False)
         self._tasks[task_name] = _Task(key, name, future)
         future.add_done_callback(self._events.put)
 
@@ -144,6 +140,9 @@ class Cluster:
             if self._client.status != "running":
                 raise self._connection_error() from None
             return None
+        if event is None:
+            self._check_versions()
+            return None
         return self._count_losses(cast("frozenset[str]", event)) if isinstance(event, frozenset) else self._end(event)
 
     def _n_threads(self) -> int:
@@ -155,6 +154,8 @@ class Cluster:
     def _receive_event(self, event: tuple[float, Any]) -> None:
         """Take an event of the scheduler; called by Dask's thread."""
         content = cast("dict[str, Any]", event[1]) if isinstance(event[1], dict) else {}
+        if content.get("action") == "add-worker":
+            self._events.put(None)
         if content.get("action") == "remove-worker" and not content.get("expected"):
             self._events.put(frozenset(content["processing-tasks"]))
 
@@ -177,54 +178,35 @@ class Cluster:
         if future.key not in self._tasks:  # given up
             return None
         try:
-            value, versions = future.result()
+            value = future.result()
         except KilledWorker:  # the scheduler's own limit is lower than ours
             return self._give_up(future.key)
         except (CancelledError, OSError, TimeoutError) as fault:
             raise self._connection_error() from fault
-        if versions:
-            raise self._version_error(versions)
         key = self._tasks.pop(future.key).key
         return Finished(key, error=value) if isinstance(value, ArmwrightError) else Finished(key, value)
 
-    def _version_error(self, versions: dict[str, str]) -> ClusterError:
-        differences = [
-            f"{name} {versions[name]} instead of {own}" for name, own in self._versions.items() if versions[name] != own
-        ]
-        return ClusterError(f"a worker has {', '.join(differences)}; install the same versions for every worker")
+    def _check_versions(self) -> None:
+        """Raise ClusterError if a worker has other versions than this process."""
+        try:
+            found = self._client.get_versions(packages=PACKAGES)
+        except (OSError, TimeoutError) as fault:
+            raise self._connection_error() from fault
+        own, *others = (_relevant(one["packages"]) for one in (found["client"], *found["workers"].values()))
+        for other in others:
+            names = [name for name in own if other[name] != own[name]]
+            differences = ", ".join(f"{name} {other[name] or 'missing'} instead of {own[name]}" for name in names)
+            if differences:
+                raise ClusterError(f"a worker has {differences}; install the same versions for every worker")
 
     def _connection_error(self) -> ClusterError:
         return ClusterError(f"lost the connection to {self._workers.description}; rerun the same command to resume")
 
 
-def _sent_by_value() -> tuple[Callable[..., dict[str, str]], Callable[..., Any]]:
-    """Return functions for workers on which armwright may have another version or be missing.
-
-    Functions within a function are pickled with their code. So they must not use anything of this module.
-    """
-
-    def versions_of(packages: Iterable[str]) -> dict[str, str]:
-        import platform
-        from importlib import metadata
-
-        found = {"Python": ".".join(platform.python_version_tuple()[:2])}
-        for name in packages:
-            try:
-                found[name] = metadata.version(name)
-            except metadata.PackageNotFoundError:
-                found[name] = "missing"
-        return found
-
-    def run_pickled(versions: dict[str, str], call: bytes) -> tuple[Any, dict[str, str]]:
-        import pickle
-
-        own = versions_of(versions.keys() - {"Python"})
-        return (None, own) if own != versions else (pickle.loads(call)(), {})
-
-    return versions_of, run_pickled
-
-
-_versions_of, _run_pickled = _sent_by_value()
+def _relevant(packages: Mapping[str, str | None]) -> dict[str, str | None]:
+    """Return the versions that have to be equal; those of packages that are missing are None."""
+    python = ".".join(str(packages["python"]).split(".")[:2])
+    return {"Python": python, **{name: packages[name] for name in PACKAGES}}
 
 
 def _run(function: Callable[..., Any], *arguments: Any) -> Any:
