@@ -77,6 +77,7 @@ def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEdit
     draw_task(tab.page)
     assert tab.ask("armwright.opened.assessed.errors") == []
     expect(tab.page.get_by_label("Budget")).to_have_value("60")
+    tab.page.get_by_label("Budget").fill("25")
     tab.page.get_by_role("button", name="Save and design arms").click()
     expect(tab.page.locator("#job-state")).to_contain_text("Designing arms into runs/shelf-1")
     expect(tab.page.locator("#job-state")).to_have_text("Finished: runs/shelf-1")
@@ -96,10 +97,10 @@ def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEdit
 
     card = f"[data-design='{designs[0]}']"
     results.locator(card).get_by_role("button", name="Show", exact=True).click()
-    before = results.evaluate("armwright.drawnJoints()")
+    before = results.evaluate("armwright.drawn('joint')")
     results.locator("#play").click()
     results.wait_for_function(
-        "(before) => JSON.stringify(armwright.drawnJoints()) !== JSON.stringify(before)", arg=before
+        "(before) => JSON.stringify(armwright.drawn('joint')) !== JSON.stringify(before)", arg=before
     )
 
     urdf, mjcf, sheet = (saved(results, card, name, tmp_path) for name in ("URDF", "MJCF", "Data sheet"))

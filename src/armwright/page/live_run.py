@@ -59,7 +59,7 @@ class LiveRun:
     def packed(self, designs: int, calls: int) -> bytes | None:
         """Return what is new for a page; None while there is no run."""
         with self._lock:
-            return None if self._content is None else self._content.packed(designs, calls, with_files=False)
+            return None if self._content is None else self._content.packed(designs, calls)
 
     def file(self, number: int, kind: str) -> str | None:
         """Return a design as text; None if it does not exist. kind: urdf, mjcf or datasheet."""

@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -79,44 +80,50 @@ def draw_top(axes: Any, sheet: DataSheet) -> None:
 
 def draw_payload(axes: Any, sheet: DataSheet) -> None:
     """Draw the payload over the reach, and that of the task."""
-    lines = [line for line in sheet.over_reach if line.payload is not None and line.payload < MAX_MASS]
-    axes.set_title("Payload held over the reach")
-    if not lines:
-        _state_missing(axes, "payload held: " + (sheet.facts["payload_at_full_reach"].reason or "no motor feels it"))
-        return
-    axes.plot([MM * line.distance for line in lines], [line.payload for line in lines], "o-", color=FRONT, markersize=4)
-    if sheet.payload is not None:
-        axes.axhline(sheet.payload, color=LINK, linewidth=0.9, linestyle=(0, (4, 2)), label="payload of the task")
-        axes.legend(loc="upper right")
-    axes.set(
-        xlabel="distance from the base axis [mm]",
-        ylabel="payload [kg]",
-        xlim=(0.0, 1.05e3 * sheet.reach),
-    )
-    axes.set_ylim(0.0, 1.25 * max([line.payload or 0.0 for line in lines] + [sheet.payload or 0.0]) or 1.0)
+    held = [(line.distance, line.payload) for line in sheet.over_reach if (line.payload or 0.0) < MAX_MASS]
+    reason = sheet.facts["payload_at_full_reach"].reason or "no motor feels it"
+    curves = {"payload held": held}
+    if sheet.payload is not None and any(payload is not None for _, payload in held):
+        curves["payload of the task"] = [(distance, sheet.payload) for distance in (0.0, sheet.reach)]
+    _draw_over_reach(axes, sheet, "Payload held over the reach", "payload [kg]", curves, f"payload held: {reason}")
 
 
 def draw_errors(axes: Any, sheet: DataSheet) -> None:
     """Draw deflection and backlash error over the reach."""
-    axes.set_title("Deflection and backlash over the reach")
-    styles = {"deflection": ("o-", FRONT), "backlash_error": ("s--", LINK)}
+    curves = {
+        "deflection": [(line.distance, line.deflection) for line in sheet.over_reach],
+        "backlash error": [(line.distance, line.backlash_error) for line in sheet.over_reach],
+    }
+    in_mm = {name: [(x, None if y is None else MM * y) for x, y in points] for name, points in curves.items()}
+    reason = f"deflection and backlash: {sheet.facts['deflection'].reason or 'not known'}"
+    _draw_over_reach(axes, sheet, "Deflection and backlash over the reach", "tip moves by [mm]", in_mm, reason)
+
+
+def _draw_over_reach(
+    axes: Any,
+    sheet: DataSheet,
+    title: str,
+    label: str,
+    curves: Mapping[str, Sequence[tuple[float, float | None]]],
+    reason: str,
+) -> None:
+    """Draw curves by their names over the distance from the base [m]; reason: why the first has no points."""
+    axes.set_title(title)
+    known = {name: [(x, y) for x, y in points if y is not None] for name, points in curves.items()}
     most = 0.0
-    for key, (style, colour) in styles.items():
-        points = [(MM * line.distance, value) for line in sheet.over_reach if (value := getattr(line, key)) is not None]
+    for (name, points), (style, colour) in zip(known.items(), (("o-", FRONT), ("s--", LINK)), strict=False):
         if points:
             x, y = np.array(points).T
-            most = max(most, MM * float(y.max()))
-            axes.plot(x, MM * y, style, color=colour, markersize=4, label=key.replace("_", " "))
+            most = max(most, float(y.max()))
+            axes.plot(MM * x, y, style, color=colour, markersize=4, label=name)
     if not axes.lines:
-        _state_missing(axes, "deflection and backlash: " + (sheet.facts["deflection"].reason or "not known"))
+        shown = "\n".join(textwrap.wrap(f"({reason})", LETTERS))
+        axes.text(0.5, 0.5, f"not stated\n{shown}", ha="center", va="center", transform=axes.transAxes, fontsize=7)
+        axes.set(xticks=[], yticks=[])
         return
-    axes.set(
-        xlabel="distance from the base axis [mm]",
-        ylabel="tip moves by [mm]",
-        xlim=(0.0, 1.05e3 * sheet.reach),
-    )
+    axes.set(xlabel="distance from the base axis [mm]", ylabel=label, xlim=(0.0, 1.05e3 * sheet.reach))
     axes.set_ylim(0.0, 1.4 * most or 1.0)
-    axes.legend(loc="upper left")
+    axes.legend()
 
 
 def _points(outline: Outline) -> Array:
@@ -161,10 +168,3 @@ def _label(axes: Any, labels: list[tuple[float, float, str]], x: float, height: 
     for (at, z, text), place in zip(ordered, places, strict=True):
         axes.plot([MM * at, MM * x], [MM * z, MM * place], color=LINK, linewidth=0.6, zorder=2)
         axes.text(MM * x, MM * place, f" {text}", fontsize=7, va="center", zorder=5)
-
-
-def _state_missing(axes: Any, text: str) -> None:
-    """Write why there is no curve."""
-    shown = "\n".join(textwrap.wrap(f"({text})", LETTERS))
-    axes.text(0.5, 0.5, f"not stated\n{shown}", ha="center", va="center", transform=axes.transAxes, fontsize=7)
-    axes.set(xticks=[], yticks=[])

@@ -325,7 +325,7 @@ class Study:
             proposer = None if self._proposer is None else self._proposer.summary()
             summary = summarize(history, config, proposer, verification, self._surrogate_errors(history))
             if folder is not None:
-                write_results(folder, history, summary, verification)
+                write_results(folder, history, config, summary, verification)
         return StudyResult(history, config, summary, None if folder is None else folder.path, resumed)
 
     def _surrogate_errors(self, history: History) -> dict[str, Any] | None:
