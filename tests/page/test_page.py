@@ -69,7 +69,7 @@ def test_page_opens_offline_without_requests(run: Path, tab: Tab) -> None:
     assert not tab.page.locator("#repeat").is_visible()  # it was made by Python
     tab.page.set_viewport_size({"width": 390, "height": 800})
     tab.page.emulate_media(color_scheme="dark")
-    assert tab.ask("document.documentElement.scrollWidth") <= 390
+    tab.page.wait_for_function("document.documentElement.scrollWidth <= 390")  # after plots have shrunk
     background = tab.ask("getComputedStyle(document.body).backgroundColor")
     assert sum(map(int, re.findall(r"\d+", background)[:3])) < 200
     (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', (run / "report.html").read_text("utf-8"))

@@ -12,6 +12,7 @@ from armwright.kinematics.arms.forward import motor_solids
 from armwright.page.page import write_report
 from armwright.pictures.arm_figures import draw_arm
 from armwright.problem.problem import Problem
+from armwright.proof.design_record import compute_records
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
@@ -79,7 +80,7 @@ def test_page_and_figures_draw_motors_and_columns(tmp_path: Path, tab: Tab) -> N
         assert tab.centres("motor") == pytest.approx(np.array(motors), abs=1e-5)
         x, y, z = arm.base
         column, foot = np.array(tab.ask("armwright.drawn('column')")), [x - 0.03, y - 0.03, 0.0]
-        axes = draw_arm(history, "arm", history.member(number)).axes[0]
+        axes = draw_arm(history, "arm", history.member(number), compute_records(history, [number])).axes[0]
         corners = [np.concatenate(one._faces) for one in axes.collections if isinstance(one, Poly3DCollection)]
         feet = [low for low in (one.min(axis=0) for one in corners) if np.allclose(low, foot, atol=1e-6)]
         assert (len(column) == 1) == (arm.column is not None) == bool(feet)

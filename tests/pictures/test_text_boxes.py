@@ -19,6 +19,7 @@ from armwright.pictures import drawing
 from armwright.pictures.arm_figures import draw_arm
 from armwright.pictures.drawing import write_drawn
 from armwright.pictures.figures import chosen_members, draw_samples, write_figures
+from armwright.proof.design_record import read_records
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import read_run
 from tests.support.browser import Tab
@@ -106,7 +107,7 @@ def figures_of_experiments(run: Path) -> Iterator[tuple[str, Figure]]:
     if not isinstance(config.method, FrontMethod):
         yield "samples", draw_samples(history)
     for title, member in chosen_members(history):
-        yield f"arm-{member.number}", draw_arm(history, title, member)
+        yield f"arm-{member.number}", draw_arm(history, title, member, read_records(run, history, [member.number]))
 
 
 @pytest.mark.slow

@@ -276,6 +276,7 @@ def _begin(console: "Console", problem: "Problem", task: str, space: Path | None
 
 def _draw(folder: Path, drawing: bool) -> list[Path]:
     """Return the figures of a finished run; make the page, and if `drawing` the figures, if they are missing."""
+    from armwright.llm.redaction import redacted
     from armwright.page.page import write_report
     from armwright.proof.results import COMMAND, FIGURES, REPORT
     from armwright.runs.folder import RunFolder
@@ -284,7 +285,7 @@ def _draw(folder: Path, drawing: bool) -> list[Path]:
         existing = sorted((folder / FIGURES).glob("*.png"))
         if not (folder / REPORT).is_file():
             words = [Path(word).name if Path(word).is_absolute() else word for word in sys.argv[1:]]  # pages are shared
-            run.write_text(COMMAND, shlex.join(["armwright", *words]) + "\n")
+            run.write_text(COMMAND, redacted(shlex.join(["armwright", *words])) + "\n")
             write_report(folder)
         if existing or not drawing:
             return existing

@@ -97,14 +97,15 @@ class RunContent:
         maps = self._reach_maps.read(len(self.history), self._params)
         return _packed(self.folder, shown, maps, {}, self.calls, calls_from)
 
+    def file(self, number: int, kind: str) -> str | None:
+        """Return a design as text for simulators, urdf or mjcf; None for other kinds."""
+        if self.summary is not None and number in {member.number for member in self.history.front}:
+            return _files(self.folder, number).get(kind)
+        name, arm = f"{self.history.problem.task.name}-{number}", self.history.member(number).arm
+        return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}.get(kind)
+
     def _params(self, number: int) -> Array:
         return self.history.problem.space.matrix([self.history.trials[number].design])[0]
-
-
-def design_files(history: History, number: int) -> dict[str, str]:
-    """Return a design as text for simulators, by format."""
-    name, arm = f"{history.problem.task.name}-{number}", history.member(number).arm
-    return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}
 
 
 def _calls(folder: Path) -> tuple[Call, ...]:

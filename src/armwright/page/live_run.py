@@ -10,7 +10,7 @@ from armwright.exceptions import ArmwrightError
 from armwright.existing.compare_arms import EXISTING_ARMS
 from armwright.extras import naming_extras
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
-from armwright.page.content import RunContent, design_files
+from armwright.page.content import RunContent
 from armwright.proof.results import REPORT, SUMMARY
 from armwright.runs.control import (
     CONTROL,
@@ -71,7 +71,7 @@ class LiveRun:
                     from armwright.sheet.design_sheet import design_sheet
                     from armwright.sheet.html import to_html
                 return to_html(design_sheet(self.folder, number))
-            return design_files(self._content.history, number).get(kind)
+            return self._content.file(number, kind)
 
     def _read(self) -> None:
         if not (self.folder / CONFIG).is_file():

@@ -26,6 +26,7 @@ from armwright.pictures.drawing import (
     write_drawn,
 )
 from armwright.pictures.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
+from armwright.proof.design_record import read_records
 from armwright.proof.front_gap import front_gap
 from armwright.proof.results import FIGURES, read_summary
 from armwright.runs.config import FrontMethod
@@ -45,15 +46,16 @@ def write_figures(folder: str | Path) -> list[Path]:
     config, history = read_run(folder)
     search = (read_summary(folder) or {}).get("search") if isinstance(config.method, FrontMethod) else None
     existing = read_existing_arms(folder, len(config.objectives))
-    return write_drawn(folder / FIGURES, _figures(history, search, existing))
+    return write_drawn(folder / FIGURES, _figures(folder, history, search, existing))
 
 
 def _figures(
-    history: History, search: Mapping[str, Any] | None, existing: Sequence[ComparedArm]
+    folder: Path, history: History, search: Mapping[str, Any] | None, existing: Sequence[ComparedArm]
 ) -> Iterator[tuple[str, Figure]]:
     """Yield figures by name.
 
     Args:
+        folder: The run folder.
         history: The trials.
         search: The record of a direct search, whose trials are its front.
         existing: Arms to compare with.
@@ -63,7 +65,8 @@ def _figures(
     yield "hypervolume", draw_hypervolume(history) if search is None else draw_search(history, search)
     if len(history.problem.objectives) > 1:
         yield "front", draw_front(history, existing)
-    yield "arms", draw_arms(history, chosen_members(history))
+    chosen = chosen_members(history)
+    yield "arms", draw_arms(history, chosen, read_records(folder, history, [member.number for _, member in chosen]))
 
 
 def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
@@ -187,10 +190,11 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
 
 
 def _named(axes: Any, place: Any, number: int, mark: str, label: str) -> Line2D:
-    """Write a mark beside a place, on another side of it for each of four numbers, and return its legend entry."""
+    """Ring a place, write a mark on one of four sides of it, and return the legend entry."""
     x, y = (1, -1)[number % 2], (1, -1)[number // 2 % 2]
-    axes.annotate(mark, place, (5 * x, 4 * y), textcoords="offset points", fontsize=8, weight="bold", zorder=7,
-                  ha="left" if x > 0 else "right", va="bottom" if y > 0 else "top")  # fmt: skip
+    axes.plot(*place, marker="o", markersize=10, color=FRONT, markerfacecolor="none", clip_on=False, zorder=7)
+    sides = {"ha": "left" if x > 0 else "right", "va": "bottom" if y > 0 else "top"}
+    axes.annotate(mark, place, (5 * x, 4 * y), textcoords="offset points", **sides, weight="bold", zorder=7)
     return legend_mark(f"{mark}: {label}", "", FRONT)
 
 

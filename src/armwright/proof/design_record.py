@@ -78,6 +78,7 @@ class Loads(BaseModel, allow_inf_nan=False):
 class TargetRecord(BaseModel, extra="allow", allow_inf_nan=False):
     """What a design does at a target, as far as others read it."""
 
+    q: list[float]  # joint values [rad] or [m]
     unreached_reason: str | None
     joint_torques: list[float]  # [N m] or [N]
 
@@ -181,8 +182,8 @@ def _is_of(record: DesignRecord, history: History, number: int) -> bool:
 def _fits(record: DesignRecord, history: History, number: int) -> bool:
     """Return whether targets and motion of a record are those of the task, and of the joints of the design."""
     plan, joints = history.problem.scenes[0].plan, len(history.member(number).arm.joints)
-    motion, torques = record.motion, [target.joint_torques for target in record.targets]
-    if [len(each) for each in torques] != [joints] * len(history.problem.task.target_positions):
+    motion, sizes = record.motion, {len(values) for one in record.targets for values in (one.q, one.joint_torques)}
+    if len(record.targets) != len(history.problem.task.target_positions) or sizes != {joints}:
         return False
     if plan is None or motion is None:
         return plan is None and motion is None
