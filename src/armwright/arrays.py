@@ -1,6 +1,7 @@
 """The array type of the whole package, and files of arrays."""
 
 import math
+import struct
 import tokenize
 import zlib
 from collections.abc import Generator, Mapping
@@ -19,7 +20,7 @@ MAX_ARRAYS = 1024 * 1024 * 1024  # [bytes] of a file's arrays, which may be pack
 
 UNREADABLE = (
     ArithmeticError, OSError, EOFError, KeyError, MemoryError, RuntimeError, SyntaxError, TypeError, ValueError,
-    BadZipFile, tokenize.TokenError, zlib.error,
+    BadZipFile, struct.error, tokenize.TokenError, zlib.error,
 )  # fmt: skip
 
 

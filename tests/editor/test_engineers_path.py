@@ -87,6 +87,7 @@ def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEdit
         tab.page.get_by_role("link", name="Open the results").click()
     results = opened.value
     results.locator("#loading").wait_for(state="hidden")
+    expect(results.locator("#repeat code")).to_contain_text("armwright design --space shelf-space.yaml --budget 25s")
     summary = read_summary(tmp_path / "runs/shelf-1")
     assert summary is not None
     designs = list(dict.fromkeys(one["design"] for one in summary["recommended"]))

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.page.reach_maps import IN_ALL, IN_NO_DIRECTION, ReachMapFiles, _levels
+from armwright.page.reach_maps import IN_ALL, IN_NO_DIRECTION, _levels, read_reach_maps
 from armwright.problem.problem import Problem
 from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace
@@ -92,11 +92,10 @@ def test_slices_show_the_shares_of_the_map(folder: Path, tab: Tab) -> None:
 def test_maps_of_other_arms_and_damaged_files_are_left_out(folder: Path, tmp_path: Path) -> None:
     history, maps = read_run(folder)[1], tmp_path / "reach-maps"
     shutil.copytree(folder / "reach-maps", maps)
-    files = ReachMapFiles(tmp_path)
+    params = history.problem.space.matrix([trial.design for trial in history])
 
     def shown() -> list[int]:
-        params = history.problem.space.matrix([trial.design for trial in history])
-        return sorted(files.read(len(params), params.__getitem__))
+        return sorted(read_reach_maps(tmp_path, len(params), params.__getitem__))
 
     assert shown() == [3, 5]
     whole, arrays = (maps / "0003.npz").read_bytes(), stored(folder, 3)

@@ -15,7 +15,7 @@ from armwright.arrays import Array
 from armwright.existing.compare_arms import read_existing_arms
 from armwright.files import MAX_DERIVED, check_no_links, read_text
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
-from armwright.page.reach_maps import PageReachMap, ReachMapFiles
+from armwright.page.reach_maps import PageReachMap, read_reach_maps
 from armwright.pictures.style import EXISTING, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.proof.design_record import DESIGNS, DesignRecord, design_name, read_records
 from armwright.proof.results import COMMAND, SUMMARY, read_summary
@@ -38,7 +38,8 @@ def finished_content(folder: Path) -> bytes | None:
     shown = read_shown_run(folder) if (folder / SUMMARY).is_file() else None
     if shown is None:
         return None
-    maps = ReachMapFiles(folder).read(len(shown.arrays["params"]), shown.arrays["params"].__getitem__)
+    params = shown.arrays["params"]
+    maps = read_reach_maps(folder, len(params), params.__getitem__)
     return _packed(
         folder, shown, maps, {number: _files(folder, number) for number in shown.head["front"]}, _calls(folder)
     )
@@ -51,7 +52,6 @@ class RunContent:
         self.folder = folder
         self.config: RunConfig = read_config(folder)
         self._reader = TrialsReader(folder, self.config)
-        self._reach_maps = ReachMapFiles(folder)
         self._is_finished = False
         self._records: dict[int, DesignRecord] = {}  # of designs that are or were on the front
         self.history = self._nothing()
@@ -94,7 +94,7 @@ class RunContent:
         first = designs_from if designs_from <= len(self.history) else 0
         records = {member.number: self._records[member.number] for member in self.history.front}
         shown = show_run(self.config, self.history, self.summary, records, first)
-        maps = self._reach_maps.read(len(self.history), self._params)
+        maps = read_reach_maps(self.folder, len(self.history), self._params)
         return _packed(self.folder, shown, maps, {}, self.calls, calls_from)
 
     def file(self, number: int, kind: str) -> str | None:

@@ -1,6 +1,5 @@
 """A run folder as the live server shows it: its content, and the status of the study."""
 
-import secrets
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -35,7 +34,6 @@ class LiveRun:
         self.fault = ""  # the reason why the folder cannot be read
         self._content: RunContent | None = None
         self._seen: list[tuple[int, ...] | None] = []
-        self._server = secrets.token_hex(8)  # tells a page that another server took over its address
         self._run = 0  # number of runs seen in this folder since the server started
         self._lock = threading.Lock()
         self.status = self._status()
@@ -101,7 +99,7 @@ class LiveRun:
         used = used_hints(calls)  # proposals, named PROPOSER-NUMBER, by hint
         return {
             "name": self.folder.resolve().name,
-            "run": f"{self._server}-{self._run}",
+            "run": self._run,
             "doing": doing,
             "since": 0.0 if status is None else status.since,
             "designs": len(trials),

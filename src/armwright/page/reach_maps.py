@@ -25,39 +25,21 @@ class PageReachMap:
     levels: NDArray[np.uint8]  # (2, N) levels: within the joint limits, and also under the conditions
 
 
-class ReachMapFiles:
-    """The reach maps in a run folder; `read` opens only files that changed."""
+def read_reach_maps(run: Path, n: int, params: Callable[[int], Array]) -> dict[int, PageReachMap]:
+    """Return the maps in a run folder by design, without unreadable ones and those of other designs.
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder / REACH_MAPS
-        self._known: dict[Path, tuple[tuple[int, int], PageReachMap | None]] = {}
-
-    def read(self, n: int, params: Callable[[int], Array]) -> dict[int, PageReachMap]:
-        """Return the maps by number of the design, without unreadable ones and those of other designs.
-
-        Args:
-            n: Number of designs of the run.
-            params: Returns the (P,) parameters of a design.
-        """
-        found: dict[int, PageReachMap] = {}
-        for file in sorted(self._folder.glob("*.npz")):
-            number = int(file.stem) if file.stem.isdecimal() else n
-            shown = self._latest(file) if number < n else None
-            if shown is not None and shown.design == design_text(params(number)):
-                found[number] = shown
-        return found
-
-    def _latest(self, file: Path) -> PageReachMap | None:
-        try:
-            status = file.stat()
-        except OSError:
-            return None
-        version = (status.st_mtime_ns, status.st_size)
-        known, shown = self._known.get(file, (None, None))
-        if version != known:
-            shown = _read(file)
-            self._known[file] = (version, shown)
-        return shown
+    Args:
+        run: The run folder.
+        n: Number of designs of the run.
+        params: Returns the (P,) parameters of a design.
+    """
+    found: dict[int, PageReachMap] = {}
+    for file in sorted((run / REACH_MAPS).glob("*.npz")):
+        number = int(file.stem) if file.stem.isdecimal() else n
+        shown = _read(file) if number < n else None
+        if shown is not None and shown.design == design_text(params(number)):
+            found[number] = shown
+    return found
 
 
 def design_text(params: Array) -> str:

@@ -13,7 +13,6 @@ from pydantic import BaseModel
 from pydantic_core import to_json
 
 from armwright.arrays import UNREADABLE, open_arrays
-from armwright.kinematics.arms.motor_bodies import NO_BODY
 from armwright.pareto import hypervolume
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.facts import ASKED, Facts, describe_supply
@@ -27,7 +26,6 @@ from armwright.runs.history import History
 from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
 from armwright.spaces.parameters import FloatParameter
 from armwright.tasks.drawn_task import drawn_task
-from armwright.tasks.obstacles import SHAPES
 from armwright.tasks.task import Task
 
 SHOWN = "shown.npz"
@@ -218,8 +216,7 @@ def _designs(history: History, numbers: range) -> Arrays:
     q[:, :, : angles.shape[2]] = angles
     sources = list(dict.fromkeys(trial.source for trial in history))
     up = [mounted_vector(DIRECTIONS["+z"], space.mount_of(trial.design)) for trial in trials]
-    bodies = arms.motor_bodies
-    return {
+    arrays: dict[str, NDArray[Any]] = {
         "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
         "values": history.values[numbers.start : numbers.stop],
         "params": params,
@@ -236,17 +233,13 @@ def _designs(history: History, numbers: range) -> Arrays:
         "tip": arms.tool.tip.astype(np.float32),
         "tool_axis": arms.tool_axis,
         "tool_side": arms.tool_side,
-        **(
-            {}
-            if bodies is None
-            else {
-                "body_shape": np.where(bodies.shape == NO_BODY, len(SHAPES), bodies.shape).astype(np.uint8),
-                "body_half": bodies.half,
-                "body_centre": bodies.centre,
-            }
-        ),
-        **({} if arms.columns is None else {"column_half": arms.columns.half}),
     }
+    if (bodies := arms.motor_bodies) is not None:
+        shape = bodies.shape.astype(np.uint8)  # 255 without a body
+        arrays |= {"body_shape": shape, "body_half": bodies.half, "body_centre": bodies.centre}
+    if arms.columns is not None:
+        arrays["column_half"] = arms.columns.half
+    return arrays
 
 
 def _result(history: History, summary: Summary) -> dict[str, Any]:

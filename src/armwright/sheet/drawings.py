@@ -14,8 +14,6 @@ from armwright.sheet.record import DataSheet
 from armwright.tasks.moments import MAX_MASS
 
 REACHED = "#EDEDED"
-SPACING = 0.075  # of labels, as a share of the height of a view
-ROOM = 0.36  # for labels at the right, as a share of the width of a view
 LETTERS = 40  # of a line in a panel
 SHORT = 1e-6  # [m]; links without length are not drawn
 MARGIN = 0.06  # around a view, as a share of its size
@@ -24,28 +22,23 @@ MM = 1e3
 
 
 def draw_side(axes: Any, sheet: DataSheet) -> None:
-    """Draw the arm from the side, with its joints at 0 or the nearest limit, its dimensions, and what it reaches."""
-    drawing = sheet.drawing
-    outline = _points(drawing.side)
+    """Draw the arm from the side, with its joints at 0 or the nearest limit, and what it reaches."""
+    drawing, outline = sheet.drawing, _points(sheet.drawing.side)
     axes.fill(*(MM * outline.T), facecolor=REACHED, edgecolor=LINK, linewidth=0.8, zorder=1)
-    low, high = _limits(outline, _ends(sheet))
-    labels: list[tuple[float, float, str]] = []
     x, _, z = drawing.base
     if drawing.column is not None:
         axes.plot([MM * x] * 2, [MM * (z - drawing.column), MM * z], color=LINK, linewidth=5.0, alpha=0.5, zorder=2)
-        labels.append((x, z - drawing.column / 2.0, f"column {MM * drawing.column:.1f}"))
     for number, start, end in drawing.links:
-        length = math.dist(start, end)
-        if length < SHORT:
-            continue
-        ends = MM * np.array([start, end])[:, [0, 2]]
-        axes.plot(*ends.T, color=FRONT, linewidth=2.4 if number else 1.2, solid_capstyle="butt", zorder=3)
-        axes.plot(*ends[0], marker="o", markersize=3.5, color=FRONT, markerfacecolor="white", zorder=4)
-        name = f"link {number}" if number else "tool"
-        labels.append(((start[0] + end[0]) / 2.0, (start[2] + end[2]) / 2.0, f"{name} {MM * length:.1f}"))
+        if math.dist(start, end) >= SHORT:
+            ends = MM * np.array([start, end])[:, [0, 2]]
+            axes.plot(*ends.T, color=FRONT, linewidth=2.4 if number else 1.2, solid_capstyle="butt", zorder=3)
+            axes.plot(*ends[0], marker="o", markersize=3.5, color=FRONT, markerfacecolor="white", zorder=4)
+            name = f"link {number}" if number else "tool"
+            axes.annotate(
+                name, ends.mean(axis=0), (6, 0), textcoords="offset points", fontsize=7, va="center", zorder=5
+            )
     axes.plot(MM * x, MM * z, marker="s", markersize=5, color=FRONT, zorder=4)
-    _label(axes, labels, high[0], (high - low)[1])
-    _frame(axes, low, high + ROOM * np.array([(high - low)[0], 0.0]), "x [mm]", "z [mm]")
+    _frame(axes, *_limits(outline, _ends(sheet)), "x [mm]", "z [mm]")
     top, bottom = MM * outline[:, 1].max(), MM * outline[:, 1].min()
     posture = "joints at 0; " if drawing.is_at_zero else "joints at 0 or the limit next to it\n"
     axes.set_title(f"Side view, {posture}tip from z = {bottom:.0f} to {top:.0f} mm")
@@ -151,20 +144,3 @@ def _frame(axes: Any, low: Array, high: Array, x: str, y: str) -> None:
     axes.set(xlabel=x, ylabel=y, xlim=MM * np.array([low[0], high[0]]), ylim=MM * np.array([low[1], high[1]]))
     axes.set_aspect("equal")
     axes.locator_params(nbins=5)
-
-
-def _label(axes: Any, labels: list[tuple[float, float, str]], x: float, height: float) -> None:
-    """Write labels at x [m] beside their points, far enough from each other, each with a line to its point."""
-    step = SPACING * height
-    ordered = sorted(labels, key=lambda label: (round(label[1], 6), -label[0]))
-    places = np.array([z for _, z, _ in ordered])
-    for _ in range(100):  # push neighbours apart until all have room
-        gaps = np.diff(places)
-        short = np.maximum(step - gaps, 0.0)
-        if not short.max(initial=0.0) > 1e-3 * step:
-            break
-        places[:-1] -= short / 2.0
-        places[1:] += short / 2.0
-    for (at, z, text), place in zip(ordered, places, strict=True):
-        axes.plot([MM * at, MM * x], [MM * z, MM * place], color=LINK, linewidth=0.6, zorder=2)
-        axes.text(MM * x, MM * place, f" {text}", fontsize=7, va="center", zorder=5)
