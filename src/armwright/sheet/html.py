@@ -92,10 +92,8 @@ def _table(table: Table) -> str:
 
 
 def _row(table: Table, cells: tuple[str, ...], tag: str) -> str:
-    shown: list[str] = []
-    for column, cell in enumerate(cells):
-        aligned = ' class="left"' if column in table.left else ""
-        shown.append(f"<{tag}{aligned}>{html.escape(cell)}</{tag}>")
+    aligned = [' class="left"' * (column in table.left) for column in range(len(cells))]
+    shown = (f"<{tag}{side}>{html.escape(cell)}</{tag}>" for side, cell in zip(aligned, cells, strict=True))
     return f"<tr>{''.join(shown)}</tr>"
 
 
