@@ -1,11 +1,14 @@
 """The array type of the whole package, and files of arrays."""
 
 import math
+import struct
+import tokenize
+import zlib
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from zipfile import ZipFile
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +18,17 @@ Array = NDArray[np.float64]
 LARGEST_OBJECTIVE = 1e60  # in magnitude; the hypervolume of five objectives stays finite
 MAX_ARRAYS = 1024 * 1024 * 1024  # [bytes] of a file's arrays, which may be packed a thousandfold
 
+UNREADABLE = (
+    ArithmeticError, OSError, EOFError, KeyError, MemoryError, RuntimeError, SyntaxError, TypeError, ValueError,
+    BadZipFile, struct.error, tokenize.TokenError, zlib.error,
+)  # fmt: skip
+
 
 @contextmanager
 def open_arrays(path: Path) -> Generator[Mapping[str, NDArray[Any]]]:
     """Open an npz file that may be a stranger's; ValueError if its arrays are too large.
 
-    A damaged file raises exceptions of many kinds (numpy, zipfile, zlib, tokenize).
+    Files that are damaged, or hold other arrays, raise UNREADABLE.
     """
     with path.open("rb") as file:
         with ZipFile(file) as packed:  # which reads no more of an entry than the size that it states

@@ -86,6 +86,7 @@ def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEdit
         tab.page.get_by_role("link", name="Open the results").click()
     results = opened.value
     results.locator("#loading").wait_for(state="hidden")
+    expect(results.locator("#repeat code")).to_contain_text("armwright design --space shelf-space.yaml --budget 60s")
     summary = read_summary(tmp_path / "runs/shelf-1")
     assert summary is not None
     designs = list(dict.fromkeys(one["design"] for one in summary["recommended"]))
@@ -96,10 +97,10 @@ def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEdit
 
     card = f"[data-design='{designs[0]}']"
     results.locator(card).get_by_role("button", name="Show", exact=True).click()
-    before = results.evaluate("armwright.drawnJoints()")
+    before = results.evaluate("armwright.drawn('joint')")
     results.locator("#play").click()
     results.wait_for_function(
-        "(before) => JSON.stringify(armwright.drawnJoints()) !== JSON.stringify(before)", arg=before
+        "(before) => JSON.stringify(armwright.drawn('joint')) !== JSON.stringify(before)", arg=before
     )
 
     urdf, mjcf, sheet = (saved(results, card, name, tmp_path) for name in ("URDF", "MJCF", "Data sheet"))

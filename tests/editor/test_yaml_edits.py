@@ -115,45 +115,6 @@ def test_any_value_is_read_back(value: Any, path: tuple[str | int, ...]) -> None
     assert {k: v for k, v in after.items() if k != path[0]} == {k: v for k, v in before.items() if k != path[0]}
 
 
-@st.composite
-def written_values(draw: st.DrawFn) -> tuple[str, str, str, tuple[str | int, ...]]:
-    """Draw a text as anybody may write it: what is before a value, the value, what is after it, and its path."""
-    gap = st.sampled_from((" ", "  ", "     "))
-    note = st.sampled_from(("", "  # a note", " # é: [1, {"))
-    dash, tab = " " * draw(st.integers(0, 4)) + "-", " " * draw(st.integers(1, 4))
-    olds = ("0.20", "4e-1", "1", "on", "'a b'", '"x # y"', "plain words", "[1,  2]", "{a: 1,b: [ 2 ]}")
-    old = draw(st.sampled_from(olds))
-    bracketed = old.replace("plain words", "word")
-    values, pad = draw(st.integers(0, 3)), draw(st.sampled_from(("", " ", "   ")))
-    before_in, after_in = f"{pad}0.10,{pad} " * values, f"{pad}, -1.0{pad}" * (3 - values)
-    places = {
-        ("payload",): (f"payload:{draw(gap)}", old, f"{draw(note)}\n"),
-        ("tool", "mass"): (f"tool:{draw(note)}\n{tab}mass:{draw(gap)}", old, f"{draw(note)}\n{tab}tip: [0,0,1]\n"),
-        ("targets", 1): (f"targets:{draw(note)}\n{dash} [0,1,2]\n{dash}{draw(gap)}", old, f"{draw(note)}\n"),
-        ("box", values): (f"box:{draw(gap)}[{before_in}", bracketed, f"{after_in}]{draw(note)}\n"),
-        ("rec", "at", values): (f"rec: {{n: 1,at:{draw(gap)}[{before_in}", bracketed, f"{after_in}],  m: 2}}\n"),
-    }
-    path = draw(st.sampled_from(sorted(places, key=str)))
-    others = ("# Above.\n", "name:   one # é\n", "\n", "steps:\n- {to: 1}\n-   {to:  2}\n", "text: >\n   a\n   b\n")
-    order = draw(st.permutations(others))
-    cut = draw(st.integers(0, len(order)))
-    before, value, after = places[path]
-    return "".join(order[:cut]) + before, value, after + "".join(order[cut:]), path
-
-
-@given(written_values(), scalars | st.lists(scalars, max_size=3))
-def test_an_edit_of_a_value_changes_only_its_place(
-    place: tuple[str, str, str, tuple[str | int, ...]], value: Any
-) -> None:
-    before, old, after, path = place
-    done = edited(Edit(path=path, value=value), text=before + old + after)
-    assert done.startswith(before)
-    assert done.endswith(after)
-    inserted = done[len(before) : len(done) - len(after)]
-    assert "\n" not in inserted
-    assert yaml.safe_load(f"[{inserted}]") == [value]
-
-
 @pytest.mark.parametrize(("offset", "indent"), [(0, 1), (1, 2), (2, 4), (4, 3)])
 def test_new_and_removed_items_leave_the_other_lines(offset: int, indent: int) -> None:
     dash, key = offset * " " + "- ", indent * " "

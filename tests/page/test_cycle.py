@@ -53,7 +53,7 @@ def posture(history: History, number: int, motion: int, share: float) -> np.ndar
 def check_posture(tab: Tab, history: History, member: FrontMember) -> None:
     """Assert that the arm is drawn in its posture at the current target."""
     q = history.evaluation([member.number]).q[0, tab.ask("armwright.state.target")]
-    assert np.array(tab.ask("armwright.drawnJoints()")) == pytest.approx(joint_positions(member.arm, q), abs=1e-4)
+    assert tab.centres("joint") == pytest.approx(joint_positions(member.arm, q), abs=1e-4)
 
 
 def test_motion_in_time_follows_the_joint_path(run: Path, tab: Tab, history: History) -> None:
@@ -78,8 +78,10 @@ def test_play_drives_the_arm_through_its_cycle(run: Path, tab: Tab, history: His
     tab.open(run / "report.html", f"#design={member.number}&target=1")
     tab.ask("""(() => {
         window.seen = [];
+        const middle = (part) => [0, 1, 2].map((k) => { const v = part.map((p) => p[k]);
+            return (Math.min(...v) + Math.max(...v)) / 2; });
         requestAnimationFrame(function look() {
-            seen.push([armwright.state.target, armwright.drawnJoints()]);
+            seen.push([armwright.state.target, middle(armwright.drawn("joint").at(-1))]);
             if (seen.length < 1000) requestAnimationFrame(look);
         });
     })()""")
@@ -89,8 +91,8 @@ def test_play_drives_the_arm_through_its_cycle(run: Path, tab: Tab, history: His
     tab.page.locator("#play").click()
     assert tab.text("#target-note").startswith("Target ")  # it shows the posture there
     assert tab.faults == []
-    seen = [(target, np.array(joints)) for target, joints in tab.ask("seen")]
-    tips = np.array([joints[-1] for _, joints in seen])
+    seen = tab.ask("seen")
+    tips = np.array([tip for _, tip in seen])
     # On the line from the first target to the second, the tip neither rises nor leaves the plane x = 0.3.
     on_line = np.array([target == 1 for target, _ in seen])
     assert on_line.any()

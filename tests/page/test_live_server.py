@@ -19,7 +19,7 @@ from armwright.cli.app import app
 from armwright.llm.transcript import Transcript
 from armwright.page.live_run import LiveRun
 from armwright.proof.results import discard_results
-from armwright.runs.control import read_control
+from armwright.runs.control import Channel, read_control
 from armwright.runs.folder import RunFolder, read_run
 from tests.support.browser import Tab
 from tests.support.chat_server import Answer, ChatServer, Request, designer, wants_design
@@ -171,17 +171,6 @@ def test_study_survives_a_killed_server(tmp_path: Path, tab: Tab, live: ExitStac
     assert [t.values for t in read_run(study.folder)[1]] == [t.values for t in plain.trials]
 
 
-def test_killed_study_is_shown_as_not_running(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
-    study = live.enter_context(
-        LiveStudy(tmp_path / "run", "--proposer", "none", "--n-total", "20000", "--sampler", "random")
-    )
-    tab.open(study.address)
-    study.process.kill()
-    study.process.wait()
-    expect(tab.page.locator("#doing")).to_have_text(re.compile(r"^not running, at \d+ of 20010"))
-    study.end()
-
-
 def test_open_page_shows_a_new_reach_map(served: tuple[Path, int, str], tab: Tab) -> None:
     folder, port, key = served
     tab.open(f"http://127.0.0.1:{port}/#key={key}")
@@ -208,6 +197,9 @@ def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Pat
         assert run.status["doing"] == "searching"
     run.look()
     assert run.status["doing"] == "unknown"
+    Channel(folder).report("evaluating", 0)  # by a process that has been killed
+    run.look()
+    assert run.status["doing"] == "gone"
 
 
 @pytest.mark.parametrize(

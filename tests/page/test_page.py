@@ -66,37 +66,28 @@ def test_page_opens_offline_without_requests(run: Path, tab: Tab) -> None:
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     assert f"{summary['hypervolume']['final']:.4g}" in facts
     assert f"{100 * summary['front_gap']['share']:.1f} % of the best known" in facts
-    assert tab.text("#repeat code") == "armwright optimize target-2 --proposer rules --n-total 40 --seed 1"
+    assert not tab.page.locator("#repeat").is_visible()  # it was made by Python
     tab.page.set_viewport_size({"width": 390, "height": 800})
     tab.page.emulate_media(color_scheme="dark")
-    assert tab.ask("document.documentElement.scrollWidth") <= 390
+    tab.page.wait_for_function("document.documentElement.scrollWidth <= 390")  # after plots have shrunk
     background = tab.ask("getComputedStyle(document.body).backgroundColor")
     assert sum(map(int, re.findall(r"\d+", background)[:3])) < 200
-
-
-@pytest.mark.parametrize(("reference", "is_far"), [((0.01, 0.01), False), ((900.0, 9000.0), True)])
-def test_axes_fit_the_designs(tmp_path: Path, tab: Tab, reference: tuple[float, float], is_far: bool) -> None:
-    task = aw.load_task("target-1").model_copy(update={"name": "far", "reference_point": reference})
-    history = aw.optimize(aw.Problem(task=task), proposer="none", n_init=4, n_total=6, out=tmp_path / "run").history
-    tab.open(write_report(tmp_path / "run"))
-    high = np.array(tab.ask("[pareto.layout.xaxis.range[1], pareto.layout.yaxis.range[1]]"))
-    assert all((member.values < high).all() for member in history.front)
-    if is_far:
-        assert high == pytest.approx(1.1 * history.values.max(axis=0), rel=1e-3)
-
-
-def test_content_security_policy_allows_own_scripts_only(run: Path, tab: Tab) -> None:
-    tab.open(run / "report.html")
-    text = (run / "report.html").read_text(encoding="utf-8")
-    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
-    assert "default-src 'none'" in policy
-    assert "connect-src 'none'" in policy
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', (run / "report.html").read_text("utf-8"))
+    assert {"default-src 'none'", " connect-src 'none'"} <= set(policy.split(";"))
     scripts = next(part for part in policy.split(";") if "script-src" in part).split()[1:]
-    assert len(scripts) == 3
     assert all(re.fullmatch(r"'sha256-[A-Za-z0-9+/]{43}='", one) for one in scripts)
     tab.ask("(() => { const s = document.createElement('script'); s.textContent = 'window.hacked = 1'; "
             "document.body.append(s); })()")  # fmt: skip
     assert tab.ask("window.hacked") is None
+
+
+def test_axes_fit_the_designs(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-1").model_copy(update={"name": "far", "reference_point": (900.0, 9000.0)})
+    history = aw.optimize(aw.Problem(task=task), proposer="none", n_init=4, n_total=6, out=tmp_path / "run").history
+    tab.open(write_report(tmp_path / "run"))
+    high = np.array(tab.ask("[pareto.layout.xaxis.range[1], pareto.layout.yaxis.range[1]]"))
+    assert all((member.values < high).all() for member in history.front)
+    assert high == pytest.approx(1.1 * history.values.max(axis=0), rel=1e-3)
 
 
 def test_clicking_a_point_shows_its_arm(run: Path, tab: Tab, history: History) -> None:
@@ -108,7 +99,7 @@ def test_clicking_a_point_shows_its_arm(run: Path, tab: Tab, history: History) -
     arm, evaluation = history.member(number).arm, history.evaluation([number])
     for target in (0, 4):
         tab.ask(f"armwright.set({{ target: {target} }}); armwright.drawArm()")
-        drawn = np.array(tab.ask("armwright.drawnJoints()"))
+        drawn = tab.centres("joint")
         assert drawn == pytest.approx(joint_positions(arm, evaluation.q[0, target]), abs=1e-5)
     assert f"#design={number}&target=5" in tab.page.url
     front = {member.number for member in history.front}
@@ -118,17 +109,19 @@ def test_clicking_a_point_shows_its_arm(run: Path, tab: Tab, history: History) -
 
 
 def check_postures(tab: Tab, history: History, number: int) -> list[dict[str, Any]]:
-    """Compare what the page computes of a design at its targets with the kernels."""
+    """Compare what the page says of a design at its targets with the kernels."""
     told, evaluation = tab.ask(f"armwright.postures({number})"), history.evaluation([number])
     assert [one["error"] for one in told] == pytest.approx(evaluation.position_error[0], abs=1e-5)
-    torques = np.array([one["torques"] for one in told])
-    assert torques == pytest.approx(evaluation.joint_torques[0], abs=1e-5 * np.abs(torques).max())
+    if number in {member.number for member in history.front}:
+        torques = np.array([one["torques"] for one in told])
+        assert torques == pytest.approx(evaluation.joint_torques[0], abs=1e-4 * np.abs(torques).max())
+        assert [bool(one["reason"]) for one in told] == evaluation.unreached[0].tolist()
     return list(told)
 
 
 def test_page_kinematics_match_the_kernels(run: Path, tab: Tab, history: History) -> None:
     tab.open(run / "report.html")
-    for number in (0, 17, 40):
+    for number in (0, 17, 40, history.front[0].number):
         check_postures(tab, history, number)
 
 
@@ -146,24 +139,27 @@ def test_page_kinematics_count_tool_and_payload(tmp_path: Path, tab: Tab) -> Non
         assert angle == pytest.approx(history.evaluation([number]).angle_error[0, 1], abs=1e-4)
 
 
-def test_stepper_visits_all_targets(run: Path, tab: Tab) -> None:
+def test_address_stepper_and_comparison_agree(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html", "#design=12&target=9")
-    assert tab.text("#target-note").startswith("Target 9 of 9")
+    assert tab.ask("[armwright.state.design, armwright.state.target]") == [12, 8]
     tab.page.locator("#next").click()
     assert tab.text("#target-note").startswith("Target 1 of 9")
-    tab.page.keyboard.press("ArrowRight")
-    tab.page.keyboard.press("ArrowRight")
-    tab.page.keyboard.press("ArrowLeft")
+    for key in ("ArrowRight", "ArrowRight", "ArrowLeft"):
+        tab.page.keyboard.press(key)
     assert tab.text("#target-note").startswith("Target 2 of 9")
     assert tab.page.locator("#postures tr.chosen td").first.inner_text() == "2"
-
-
-def test_valid_and_invalid_deep_links(run: Path, tab: Tab) -> None:
-    tab.open(run / "report.html", "#design=23&target=4")
-    assert tab.ask("[armwright.state.design, armwright.state.target]") == [23, 3]
-    tab.page.evaluate("location.hash = '#design=7&target=2'")
-    tab.page.get_by_text("Target 2 of 9").wait_for()
-    assert tab.ask("armwright.state.design") == 7
+    tab.page.get_by_role("button", name="Compare").click()
+    tab.page.evaluate("location.hash = '#design=20&target=3'")
+    tab.page.get_by_text("Target 3 of 9").wait_for()
+    assert tab.text("#compare") == "Beside #12 ✕"
+    assert tab.page.locator("#ring-compared").get_attribute("style").count("translate") == 1
+    tab.page.locator("#compare").click()
+    assert tab.ask("armwright.state.compared") is None
+    # A live page forgets the failures of a run that began anew, all of whose designs it receives again.
+    tab.ask("armwright.content.failures[3] = 'exception: no licence'")
+    packed = b64encode(RunContent(run).packed()).decode()
+    tab.ask(f"armwright.content.add(Uint8Array.from(atob('{packed}'), (c) => c.charCodeAt(0)).buffer)")
+    assert tab.ask("armwright.content.hasFailed(3)") is False
     tab.page.goto("about:blank")
     tab.open(run / "report.html", "#design=99999&target=<script>")
     assert tab.ask("armwright.content.head.front.includes(armwright.state.design)")
@@ -302,16 +298,6 @@ def test_page_pick_explains_empty_results(run: Path, tab: Tab, history: History)
     assert tab.faults == []
 
 
-def test_comparing_two_designs(run: Path, tab: Tab) -> None:
-    tab.open(run / "report.html", "#design=12")
-    tab.page.get_by_role("button", name="Compare").click()
-    tab.ask("armwright.set({ design: 20 })")
-    assert tab.text("#compare") == "Beside #12 ✕"
-    assert tab.page.locator("#ring-compared").get_attribute("style").count("translate") == 1
-    tab.page.locator("#compare").click()
-    assert tab.ask("armwright.state.compared") is None
-
-
 def test_page_works_without_webgl(run: Path, tab: Tab, history: History) -> None:
     tab.context.add_init_script(
         "HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, "
@@ -335,19 +321,11 @@ def test_transcript_states_what_was_predicted_of_a_screened_proposal(tmp_path: P
     screened |= {"source": "bbo", "proposal": None}
     del screened["reason"]
     (folder / "trials.jsonl").write_text("".join(json.dumps(trial) + "\n" for trial in trials), encoding="utf-8")
+    (folder / "shown.npz").unlink()  # so that the trials are read
     tab.open(write_report(folder), f"#design={number}")
     assert f"{id_} was not evaluated: predicted position error 0.5 m, torque 12 N m" in tab.text("#transcript")
     assert tab.page.locator("#transcript .call").count() >= 1
     assert tab.faults == []
-
-
-def test_failures_of_a_replaced_run_are_forgotten(run: Path, tab: Tab) -> None:
-    """A run that begins anew discards its trials, and a live page receives all designs again."""
-    tab.open(run / "report.html")
-    packed = b64encode(RunContent(run).packed()).decode()
-    tab.ask("armwright.content.failures[3] = 'exception: no licence'")
-    tab.ask(f"armwright.content.add(Uint8Array.from(atob('{packed}'), (c) => c.charCodeAt(0)).buffer)")
-    assert tab.ask("armwright.content.hasFailed(3)") is False
 
 
 def test_any_two_of_three_objectives_are_shown(tmp_path: Path, tab: Tab) -> None:
@@ -373,31 +351,31 @@ def test_any_two_of_three_objectives_are_shown(tmp_path: Path, tab: Tab) -> None
 
 
 @pytest.mark.slow
-def test_page_with_ten_thousand_designs(tmp_path: Path, tab: Tab) -> None:
-    rng = np.random.default_rng(1)
-    points = np.round(rng.uniform([-0.6, -0.6, 0.0], [0.6, 0.6, 0.8], (20, 3)), 3)
-    task = aw.Task(name="twenty", targets=tuple(map(tuple, points.tolist())), reference_point=(12.5, 12.5))
-    run = aw.optimize(
-        aw.Problem(task=task), proposer="none", sampler="random", n_total=9_990, out=tmp_path / "run", verify=False
-    )
-    path = write_report(tmp_path / "run")
-    assert path.stat().st_size < 10e6
-    tab.open(path, "#design=9999&target=20")
-    assert tab.ask("armwright.content.n") == 10_000
-    evaluation = run.history.evaluation([9999])
-    drawn = np.array(tab.ask("armwright.drawnJoints()"))
-    assert drawn == pytest.approx(joint_positions(run.history.member(9999).arm, evaluation.q[0, 19]), abs=1e-5)
-    assert tab.page.locator("#table tbody tr").count() == len(run.front)
-    assert tab.faults == []
-
-
-@pytest.mark.slow
 def test_report_without_trials_is_refused(run: Path, tmp_path: Path) -> None:
     (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text(encoding="utf-8"), encoding="utf-8")
     with pytest.raises(RunFolderError, match="nothing to report"):
         write_report(tmp_path)
     with pytest.raises(RunFolderError, match="not a run folder"):
         write_report(tmp_path / "nowhere")
+
+
+def test_page_is_that_of_the_trials_if_what_the_run_stored_is_damaged(run: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(run, tmp_path / "run"))
+    page = write_report(folder).read_bytes()
+    stored = (folder / "shown.npz").read_bytes()
+    with np.load(folder / "shown.npz") as arrays:
+        whole = dict(arrays)
+    heads = [np.frombuffer(head, dtype=np.uint8) for head in (b"{", b"[]", b'{"n": 1}', b"\xff")]
+    for change in [
+        stored[:1000],
+        *({**whole, "head": head} for head in heads),
+        {**whole, "params": whole["params"][1:]},
+    ]:
+        if isinstance(change, bytes):
+            (folder / "shown.npz").write_bytes(change)
+        else:
+            np.savez(folder / "shown.npz", **change)
+        assert abs(len(write_report(folder).read_bytes()) - len(page)) < 40_000  # without the files of the front
 
 
 def test_unfinished_run_is_shown(run: Path, tmp_path: Path, tab: Tab) -> None:

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.page.reach_maps import IN_ALL, IN_NO_DIRECTION, ReachMapFiles, _levels
+from armwright.page.reach_maps import IN_ALL, IN_NO_DIRECTION, _levels, read_reach_maps
 from armwright.problem.problem import Problem
 from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace
@@ -89,50 +89,36 @@ def test_slices_show_the_shares_of_the_map(folder: Path, tab: Tab) -> None:
 
 
 @pytest.mark.slow
-def test_3d_view_shows_the_points_up_to_the_slice(folder: Path, tab: Tab) -> None:
-    tab.ask("armwright.set({ design: 3 })")
-    tab.page.locator("#reach-axis").select_option("2")
-    assert tab.ask("armwright.drawnPoints()") == 0
-    tab.page.locator("#reach-space").check()
-    arrays = stored(folder, 3)
-    for index in (0, 2, int(arrays["shape"][2]) - 1):
-        tab.page.locator("#reach-at").fill(str(index))
-        assert tab.ask("armwright.drawnPoints()") == grid(arrays, "covered")[:, :, : index + 1].sum()
-    picture = tab.ask("armwright.snapshot(2)")
-    tab.page.locator("#reach-space").uncheck()
-    assert tab.ask("armwright.snapshot(2)") == picture  # the points are not on pictures of designs
-    tab.page.locator("#reach-space").check()
-    tab.ask("armwright.set({ design: 2 })")  # without a map
-    assert tab.ask("armwright.drawnPoints()") == 0
-
-
-@pytest.mark.slow
 def test_maps_of_other_arms_and_damaged_files_are_left_out(folder: Path, tmp_path: Path) -> None:
     history, maps = read_run(folder)[1], tmp_path / "reach-maps"
     shutil.copytree(folder / "reach-maps", maps)
-    files = ReachMapFiles(tmp_path)
-    assert sorted(files.read(history)) == [3, 5]
+    params = history.problem.space.matrix([trial.design for trial in history])
+
+    def shown() -> list[int]:
+        return sorted(read_reach_maps(tmp_path, len(params), params.__getitem__))
+
+    assert shown() == [3, 5]
     whole, arrays = (maps / "0003.npz").read_bytes(), stored(folder, 3)
     (maps / "0004.npz").write_bytes(whole)  # the map of design 3: the numbers of designs changed since
     (maps / "0999.npz").write_bytes(whole)
     (maps / "mine.npz").write_bytes(whole)
-    assert sorted(files.read(history)) == [3, 5]
+    assert shown() == [3, 5]
     for content in (b"", b"nothing", whole[: len(whole) // 2]):
         (maps / "0003.npz").write_bytes(content)
-        assert sorted(files.read(history)) == [5]
+        assert shown() == [5]
     wrong = {
         "shape": np.array([1, 1, 1]),
         "spacing": np.array(np.nan),
         "share": arrays["share"][1:],
-        "arm": np.array(""),
+        "design": np.array(""),
     }
     for name, value in wrong.items():
         np.savez_compressed(maps / "0003.npz", **{**arrays, name: value})
-        assert sorted(files.read(history)) == [5]
+        assert shown() == [5]
         np.savez_compressed(maps / "0003.npz", **{key: kept for key, kept in arrays.items() if key != name})
-        assert sorted(files.read(history)) == [5]
+        assert shown() == [5]
     (maps / "0003.npz").write_bytes(whole)
-    assert sorted(files.read(history)) == [3, 5]
+    assert shown() == [3, 5]
 
 
 def test_only_full_coverage_is_shown_as_full() -> None:

@@ -12,6 +12,7 @@ from armwright.kinematics.arms.forward import motor_solids
 from armwright.page.page import write_report
 from armwright.pictures.arm_figures import draw_arm
 from armwright.problem.problem import Problem
+from armwright.proof.design_record import compute_records
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
@@ -76,16 +77,17 @@ def test_page_and_figures_draw_motors_and_columns(tmp_path: Path, tab: Tab) -> N
         arm, evaluation = history.member(number).arm, history.evaluation([number])
         tab.ask(f"armwright.set({{ design: {number}, target: 1 }}); armwright.drawArm()")
         motors = [solid.centre for _, solid in motor_solids(arm, evaluation.q[0, 1, : len(arm.joints)])]
-        assert np.array(tab.ask("armwright.drawnMotors()")) == pytest.approx(np.array(motors), abs=1e-5)
+        assert tab.centres("motor") == pytest.approx(np.array(motors), abs=1e-5)
         x, y, z = arm.base
-        column, foot = tab.ask("armwright.drawnColumn()"), [x - 0.03, y - 0.03, 0.0]
-        axes = draw_arm(history, "arm", history.member(number)).axes[0]
+        column, foot = np.array(tab.ask("armwright.drawn('column')")), [x - 0.03, y - 0.03, 0.0]
+        axes = draw_arm(history, "arm", history.member(number), compute_records(history, [number])).axes[0]
         corners = [np.concatenate(one._faces) for one in axes.collections if isinstance(one, Poly3DCollection)]
         feet = [low for low in (one.min(axis=0) for one in corners) if np.allclose(low, foot, atol=1e-6)]
-        assert (column is not None) == (arm.column is not None) == bool(feet)
-        if column is not None:
-            assert [*column["centre"], column["half"]] == pytest.approx([x, y, z / 2, z / 2], abs=1e-6)
+        assert (len(column) == 1) == (arm.column is not None) == bool(feet)
+        if len(column):
+            assert column[0].min(axis=0) == pytest.approx(foot, abs=1e-6)
+            assert column[0].max(axis=0) == pytest.approx([x + 0.03, y + 0.03, z], abs=1e-6)
             assert axes.get_zlim()[0] <= 0.0
-        has_column.add(column is not None)
+        has_column.add(len(column) > 0)
     assert has_column == {True, False}
     assert not tab.faults

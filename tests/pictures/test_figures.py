@@ -10,6 +10,7 @@ from armwright.pictures.arm_figures import draw_arm, draw_arms
 from armwright.pictures.figures import chosen_members, draw_hypervolume, draw_samples, write_figures
 from armwright.pictures.style import line
 from armwright.problem.problem import Problem
+from armwright.proof.design_record import compute_records
 from armwright.spaces.design_space import paper_space
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
@@ -34,7 +35,7 @@ def test_unusual_tasks_are_drawn(tmp_path: Path, task: Task) -> None:
     assert write_figures(tmp_path)
     assert draw_samples(history).axes
     for title, member in chosen_members(history):
-        assert draw_arm(history, title, member).axes
+        assert draw_arm(history, title, member, compute_records(history, [member.number])).axes
 
 
 @pytest.mark.slow
@@ -47,7 +48,9 @@ def test_arms_along_a_cycle_are_drawn_within_the_axes(tmp_path: Path) -> None:
         }
     )
     history = short(tmp_path, Problem(task), n_total=30).history
-    for axes in draw_arms(history, chosen_members(history)).axes:
+    chosen = chosen_members(history)
+    records = compute_records(history, [member.number for _, member in chosen])
+    for axes in draw_arms(history, chosen, records).axes:
         low, high = np.transpose([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])  # type: ignore[attr-defined]
         for drawn in axes.lines:
             points = np.transpose(drawn.get_data_3d())  # type: ignore[attr-defined]
@@ -64,7 +67,7 @@ def test_legend_of_arms_lists_what_is_drawn() -> None:
         problem = Problem(task, paper_space(joints=5))
         history = optimize(problem, proposer="none", n_init=20, n_total=20, verify=False).history
         for number in (history.values[:, 0].argmin(), history.values[:, 0].argmax()):
-            figure = draw_arm(history, "arm", history.member(int(number)))
+            figure = draw_arm(history, "arm", history.member(int(number)), compute_records(history, [int(number)]))
             labels = [text.get_text() for text in figure.legends[0].get_texts()]
             assert ("line of the cycle" in labels) == (by == "line")
             missed.add("missed by" in labels)

@@ -31,7 +31,7 @@ from armwright.robot.urdf_reader import read_urdf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
-from armwright.sheet.design_sheet import Verdict, design_sheet, sheet_of
+from armwright.sheet.design_sheet import design_sheet, sheet_of
 from armwright.sheet.record import DataSheet
 from armwright.sheet.sensitivities import variations, varied
 from armwright.sheet.tables import verdict_of
@@ -180,7 +180,7 @@ def test_failed_evaluations_give_a_sheet_without_objectives(history: History) ->
         history.trials[NUMBER], number=0, values=(np.inf, np.inf), failure=Failure("exception", "no licence")
     )
     failed = replace(history, trials=[trial])
-    sheet = sheet_of(failed, failed.member(0), compute_facts(failed, [0])[0], Verdict())
+    sheet = sheet_of(failed, failed.member(0), compute_facts(failed, [0])[0], {})
     assert sheet.violated == ("its evaluation failed: no licence",)
     assert {value for value, _ in sheet.objectives.values()} == {None}
     json.dumps(sheet_record(sheet), allow_nan=False)

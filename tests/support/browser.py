@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from tests.support.command_line import PATIENCE
@@ -54,6 +55,11 @@ class Tab:
 
     def text(self, selector: str) -> str:
         return self.page.locator(selector).inner_text()
+
+    def centres(self, kind: str) -> np.ndarray:
+        """The (N, 3) middles of the drawn parts of a kind [m]."""
+        parts = map(np.array, self.ask(f"armwright.drawn('{kind}')"))
+        return np.array([(part.min(axis=0) + part.max(axis=0)) / 2 for part in parts])
 
     def close(self) -> None:
         self.context.close()

@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio
 import pytest
 import yaml
 from playwright.sync_api import Browser
 
 from armwright.exceptions import TaskError
 from armwright.page.page import write_report
-from armwright.pictures.solids import clipped
 from armwright.problem.objectives import CLEARANCES, FAR, named_objectives
 from armwright.problem.problem import Problem
 from armwright.proof.verification import verify
@@ -94,27 +92,6 @@ def test_objectives_of_clearance() -> None:
     assert np.all(alone.evaluate(designs).values <= values)
 
 
-def test_faces_are_clipped_to_the_plot() -> None:
-    rng = np.random.default_rng(0)
-    square = np.array([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)])
-    cut = 0
-    for _ in range(300):
-        turn = pinocchio.rpy.rpyToMatrix(*rng.uniform(-3, 3, 3))
-        centre, size = rng.uniform(-1, 1, 3), rng.uniform(0.2, 3.0)
-        face = centre + size * square @ turn.T
-        left = clipped(face, np.zeros(3), 1.0)
-        assert np.all(np.abs(left) <= 1.0 + 1e-9)
-        assert (left - centre) @ turn[:, 2] == pytest.approx(np.zeros(len(left)), abs=1e-9)
-        # What is within both stays: random points of the face lie on the same side of each edge.
-        points = centre + size * (rng.uniform(-1, 1, (200, 2)) @ turn[:, :2].T)
-        kept = points[np.all(np.abs(points) < 1.0 - 1e-6, axis=1)]
-        cut += len(left) != 4
-        if len(kept):
-            sides = np.einsum("kj,knj->kn", np.cross(turn[:, 2], np.roll(left, -1, 0) - left), kept - left[:, None])
-            assert np.all(sides > -1e-9)
-    assert cut > 100
-
-
 def test_page_draws_obstacles_in_place(tmp_path: Path, browser: Browser) -> None:
     task = task_of(RECORDS, objectives=["worst_error", "clearance_shortfall"])
     optimize(Problem(task), proposer="none", sampler="random", n_init=4, n_total=6, out=tmp_path, verify=False)
@@ -122,7 +99,7 @@ def test_page_draws_obstacles_in_place(tmp_path: Path, browser: Browser) -> None
     tab = Tab(browser, offline=True)
     try:
         tab.open(tmp_path / "report.html")
-        parts = [np.array(part) for part in tab.ask("armwright.drawnObstacles()")]
+        parts = [np.array(part) for part in tab.ask("armwright.drawn('obstacle')")]
         assert "obstacle" in tab.text("#arm-legend")
         assert all(words in tab.text("#design-note") for words in DESCRIPTIONS)
         assert not tab.faults

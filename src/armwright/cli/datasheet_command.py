@@ -52,7 +52,7 @@ def datasheet(
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Write the data sheet of a design of RUN or of an existing arm as JSON, and as HTML that prints on two pages."""
+    """Write the data sheet of a design of RUN or of an existing arm as JSON, and as HTML that prints on A4."""
     from armwright.proof.design_record import DESIGNS, design_name
     from armwright.robot.robot_descriptions import find_urdf
     from armwright.robot.urdf_reader import read_urdf

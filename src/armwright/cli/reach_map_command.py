@@ -73,7 +73,7 @@ def reach_map(
     from armwright.cli.notes import can_draw
     from armwright.kinematics.reach.reach_map import reach_map
     from armwright.page.page import write_report
-    from armwright.page.reach_maps import MOST_POINTS, fingerprint
+    from armwright.page.reach_maps import MOST_POINTS
     from armwright.proof.results import read_summary
 
     if not 0.0 < share <= 1.0:
@@ -105,7 +105,7 @@ def reach_map(
     around = "of the whole sphere" if cone >= 180.0 else f"within {cone:g}° of ({axis})"
     number = f"{len(found.directions)} directions" if len(found.directions) > 1 else "one direction"
     texts = {"directions_text": f"{number} {around}", "conditions": mapped.conditions}
-    found.save(file, arm=fingerprint(mapped.arm), **texts)
+    found.save(file, design=mapped.design, **texts)
     files = [file]
     if can_draw(open_console(json_)):
         from armwright.pictures.reach_figure import write_reach_figure
@@ -152,6 +152,7 @@ def _subject(
     source: str, design: int | None, tip: str | None, task: str | None, conditions: str
 ) -> "tuple[MappedArm, Path, Path | None]":
     """Return the arm of a run or of a URDF, the file of its map, and the run."""
+    from armwright.page.reach_maps import design_text
     from armwright.pictures.mapped_arm import MappedArm
     from armwright.proof.selection import pick
     from armwright.robot.robot_descriptions import find_urdf
@@ -175,7 +176,8 @@ def _subject(
     member = pick(history)[0] if design is None else history.member(design)
     title = f"design {member.number} of {source}"
     file = run / REACH_MAPS / f"{member.number:04d}.npz"
-    return MappedArm(title, member.arm, history.problem.task, conditions), file, run
+    params = history.problem.space.matrix([member.design])[0]
+    return MappedArm(title, member.arm, history.problem.task, conditions, design_text(params)), file, run
 
 
 def _numbers(option: str, text: str, n: int) -> "Array":

@@ -1,5 +1,7 @@
 """Commands that search designs: design, optimize."""
 
+import shlex
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -274,13 +276,16 @@ def _begin(console: "Console", problem: "Problem", space: Path | None, folder: P
 
 def _draw(folder: Path, drawing: bool) -> list[Path]:
     """Return the figures of a finished run; make the page, and if `drawing` the figures, if they are missing."""
+    from armwright.llm.redaction import redacted
     from armwright.page.page import write_report
-    from armwright.proof.results import FIGURES, REPORT
+    from armwright.proof.results import COMMAND, FIGURES, REPORT
     from armwright.runs.folder import RunFolder
 
-    with activity("drawing the page and the figures"), RunFolder(folder):
+    with activity("drawing the page and the figures"), RunFolder(folder) as run:
         existing = sorted((folder / FIGURES).glob("*.png"))
         if not (folder / REPORT).is_file():
+            words = [Path(word).name if Path(word).is_absolute() else word for word in sys.argv[1:]]  # pages are shared
+            run.write_text(COMMAND, redacted(shlex.join(["armwright", *words])) + "\n")
             write_report(folder)
         if existing or not drawing:
             return existing

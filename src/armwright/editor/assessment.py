@@ -11,6 +11,7 @@ from armwright.problem.checks.instant import check_instantly
 from armwright.problem.checks.reach import base_box
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.drawn_task import drawn_task
 from armwright.tasks.task import Task
 from armwright.yaml_documents import load_document, parse_document
 
@@ -64,24 +65,8 @@ def assess(texts: Texts, files: EditedFiles) -> Assessment:
 
 def _scene(task: Task, problem: Problem | None) -> dict[str, Any]:
     """Return what is drawn, positions in [m]; the bases are those that the space allows."""
-    arrays = task.target_arrays
-    lines: list[Any] = []
-    if task.cycle is not None:
-        plan = task.plan(task.target_positions)
-        pairs = [(motion.start, motion.end) for motion in plan.motions if motion.by == "line"]
-        lines = [plan.poses.position[list(pair)].tolist() for pair in pairs]
-    return {
-        "targets": task.target_positions.tolist(),
-        "names": task.target_names,
-        "n_angular": arrays.n_angular.tolist(),
-        "rotation": arrays.rotation.tolist(),
-        "obstacles": [
-            asdict(obstacle.solid) | {"rotation": obstacle.solid.rotation.tolist()} for obstacle in task.obstacles
-        ],
-        "workspace": [{"low": region.low, "high": region.high} for region in task.workspace],
-        "lines": lines,
-        "bases": None if problem is None else [corner.tolist() for corner in base_box(problem.space)],
-    }
+    bases = None if problem is None else [corner.tolist() for corner in base_box(problem.space)]
+    return drawn_task(task) | {"names": task.target_names, "bases": bases}
 
 
 def _meaning(problem: Problem) -> dict[str, str]:

@@ -1,20 +1,16 @@
 """The two files that the editor writes: a task and its design space.
 
 The page has their texts with LF line ends and no byte order mark, like any text field of a browser. `save` writes the
-line ends, the mark, and the hard and symbolic links that it found.
+line ends, the mark, the mode and the symbolic links that it found.
 """
 
 import codecs
 import os
-import re
 import stat
-import tempfile
-from collections import Counter
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from string import Template
-from typing import BinaryIO
 
 from armwright.exceptions import FailureError, TaskError, UsageError
 from armwright.files import naming_write_errors, read_bytes, replace_file
@@ -22,8 +18,6 @@ from armwright.tasks.task_template import safe_name, task_template
 
 MAX_BYTES = 256 * 1024  # a task of 3,000 targets; forms for more would be slow
 SUFFIXES = (".yaml", ".yml")
-_LINE_END = re.compile(rb"\r\n|\r|\n")
-_LINE_END_NAMES = {b"\r\n": "CRLF", b"\r": "CR", b"\n": "LF"}
 
 
 class ChangedOnDiskError(UsageError):
@@ -32,7 +26,7 @@ class ChangedOnDiskError(UsageError):
 
 @dataclass(frozen=True)
 class Texts:
-    """The text of a task file and of a space file, or about them."""
+    """The text of a task file and of a space file."""
 
     task: str
     space: str
@@ -72,11 +66,6 @@ class EditedFiles:
             space_template(self.space) if space is None else _decode(space, self.space),
         )
 
-    @property
-    def notes(self) -> Texts:
-        """What saving a change of each file will change besides; empty for nothing."""
-        return Texts(_note(self.task, self._seen[self.task]), _note(self.space, self._seen[self.space]))
-
     def save(self, texts: Texts, overwrite: bool = False) -> None:
         """Write both files.
 
@@ -96,7 +85,7 @@ class EditedFiles:
         for file, text in given.items():
             former = self._seen[file]
             if overwrite or former is None or text != _decode(former, file):
-                content = _encode(text, former)
+                content = _encode(text, former or b"")
                 _write(file, content)
                 self._seen[file] = content
 
@@ -124,65 +113,22 @@ def _read(file: Path) -> bytes | None:
 def _decode(content: bytes, file: Path) -> str:
     """Return the text of a file as the page shows it."""
     try:
-        return _LINE_END.sub(b"\n", content.removeprefix(codecs.BOM_UTF8)).decode()
+        return content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as fault:
         raise TaskError(f"{file} is not a text file in UTF-8") from fault
 
 
-def _encode(text: str, former: bytes | None) -> bytes:
-    """Return a text as bytes, with the byte order mark and the most frequent line end of the former content."""
-    mark = codecs.BOM_UTF8 if former is not None and former.startswith(codecs.BOM_UTF8) else b""
-    end = next(iter(_line_ends(former)), b"\n")
-    return mark + _LINE_END.sub(lambda _: end, text.encode())
-
-
-def _line_ends(content: bytes | None) -> list[bytes]:
-    """Return the kinds of line ends, the most frequent one first."""
-    return [end for end, _ in Counter(_LINE_END.findall(content or b"")).most_common()]
-
-
-def _note(file: Path, content: bytes | None) -> str:
-    ends = [_LINE_END_NAMES[end] for end in _line_ends(content)]
-    if len(ends) < 2:
-        return ""
-    return f"{file.name} mixes line ends ({' and '.join(ends)}); saving a change writes {ends[0]} in all lines."
+def _encode(text: str, former: bytes) -> bytes:
+    """Return a text as bytes, with the byte order mark and the line ends of the former content."""
+    mark = codecs.BOM_UTF8 if former.startswith(codecs.BOM_UTF8) else b""
+    end = "\r\n" if b"\r\n" in former else "\n"
+    return mark + text.replace("\n", end).encode()
 
 
 def _write(file: Path, content: bytes) -> None:
     target = file.resolve()  # a link stays one
     with naming_write_errors(file, error=FailureError):
-        found = target.stat() if target.exists() else None
-        if found is not None and found.st_nlink > 1:
-            _write_in_place(target, content)
-            return
-        mode = 0o666 if found is None else stat.S_IMODE(found.st_mode)
-        replace_file(target, content, mode)
-        if found is not None:
+        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+        replace_file(target, content, 0o666 if mode is None else mode)
+        if mode is not None:
             target.chmod(mode)  # of which the umask took something
-
-
-def _write_in_place(target: Path, content: bytes) -> None:
-    """Write into a file, so that its hard links stay.
-
-    Until all is written, a file beside it holds the content, too: unlike a replacement, this may stop halfway.
-    """
-    with target.open("r+b") as file:
-        descriptor, copy = tempfile.mkstemp(prefix=f"{target.name}.", suffix=".new", dir=target.parent)
-        try:
-            with os.fdopen(descriptor, "wb") as spare:
-                _fill(spare, content)
-        except OSError:
-            os.unlink(copy)
-            raise
-        try:
-            _fill(file, content)
-        except OSError as fault:
-            raise FailureError(f"cannot write {target}: {fault.strerror}; the whole text is in {copy}") from fault
-    os.unlink(copy)
-
-
-def _fill(file: BinaryIO, content: bytes) -> None:
-    file.write(content)
-    file.truncate()
-    file.flush()
-    os.fsync(file.fileno())

@@ -4,7 +4,7 @@ import copy
 import io
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import yaml
 from pydantic import BaseModel, Field
@@ -18,14 +18,13 @@ from armwright.exceptions import TaskError
 from armwright.yaml_documents import load_document
 
 MAX_DEPTH = 12
-_TEXT_TAG = "tag:yaml.org,2002:str"
 
 
 class Edit(BaseModel, frozen=True, extra="forbid"):
     """A new value of a key, or its removal."""
 
     # Keys and indices from the root, such as ("targets", 0, "position"); an index one past the end appends
-    path: tuple[str | int, ...] = Field(min_length=1, max_length=MAX_DEPTH)
+    path: tuple[str | Annotated[int, Field(ge=0)], ...] = Field(min_length=1, max_length=MAX_DEPTH)
     value: Any = None  # in JSON types
     remove: bool = False  # remove the key or item instead
 
@@ -44,108 +43,64 @@ def edit_text(text: str, edits: Sequence[Edit], where: str) -> str:
     for edit in edits:
         expected: Any = load_document(text, TaskError, where) if text.strip() else {}
         _apply(expected, edit, where, copy.deepcopy)
-        text = _edited(text, edit, where)
-        if load_document(text, TaskError, where) != expected:
+        try:
+            text = _edited(text, edit, where)
+            is_done = load_document(text, TaskError, where) == expected
+        except (YAMLError, ValueError, TypeError, AttributeError, AssertionError):  # of the library, too
+            is_done = False
+        if not is_done:
             raise TaskError(f"{where}: cannot change {_name(edit.path)} here; change it in the text")
     return text
 
 
 def _edited(text: str, edit: Edit, where: str) -> str:
-    root = cast("Any", yaml).compose(text, Loader=yaml.SafeLoader)
+    """Return the text with the key of the root that an edit changes written again; other lines stay as they are."""
+    lines = text.splitlines(keepends=True)
+    first, end = _extent(text, str(edit.path[0]), where)
+    before, own = "".join(lines[:first]), "".join(lines[first:end])
+    content: Any = _yaml(own).load(own) if own else CommentedMap()
+    _apply(content, edit, where, _styled)
+    out = io.StringIO()
+    if content:
+        _yaml(own).dump(content, out)
+    gap = "\n" if before and not before.endswith("\n") else ""
+    return before + gap + out.getvalue() + "".join(lines[end:])
+
+
+def _extent(text: str, key: str, where: str) -> tuple[int, int]:
+    """Return the first line of a key of the root, and the line after its value; comments below it are not its."""
+    root: Any = cast("Any", yaml).compose(text, Loader=yaml.SafeLoader)
     if root is not None and (not isinstance(root, yaml.MappingNode) or root.flow_style):
         raise TaskError(f"{where}: expected keys and values, one a line")
-    value = _value_on_a_line(root, edit)
-    if value is not None:
-        return text[: value.start_mark.index] + _flow(edit.value) + text[value.end_mark.index :]
-    lines = text.splitlines(keepends=True)
-    key = edit.path[0]
-    first, end = _extents(root, text).get(str(key), (len(lines), len(lines)))
-    before = lines[:first]
-    if before and not before[-1].endswith("\n"):
-        before[-1] += "\n"
-    return "".join([*before, _edited_key("".join(lines[first:end]), edit, where), *lines[end:]])
-
-
-def _edited_key(text: str, edit: Edit, where: str) -> str:
-    """Return the text of one key of the root, and its value, with an edit applied."""
-    try:
-        content: Any = _yaml(text).load(text) if text else CommentedMap()
-        _apply(content, edit, where, _styled)
-        out = io.StringIO()
-        if content:
-            _yaml(text).dump(content, out)
-    except (YAMLError, ValueError, TypeError, AttributeError, AssertionError) as fault:  # of the library, too
-        raise TaskError(f"{where}: cannot change {_name(edit.path)} here; change it in the text") from fault
-    return out.getvalue()
-
-
-def _value_on_a_line(root: Any, edit: Edit) -> Any:
-    """Return the node of an existing value if it and the new one are plain, quoted or in brackets; else None."""
-    node = root
-    for step in edit.path:
-        if isinstance(node, yaml.MappingNode) and isinstance(step, str):
-            pairs = cast("list[tuple[Any, Any]]", node.value)
-            node = next((value for key, value in pairs if key.tag == _TEXT_TAG and key.value == step), None)
-        elif isinstance(node, yaml.SequenceNode) and isinstance(step, int) and 0 <= step < len(node.value):
-            node = cast("list[Any]", node.value)[step]
-        else:
-            return None
-    if node is None or edit.remove or not _fits_a_line(edit.value):
-        return None
-    is_flow = node.style not in ("|", ">") if isinstance(node, yaml.ScalarNode) else node.flow_style
-    return node if is_flow and node.start_mark.index < node.end_mark.index else None
-
-
-def _flow(value: Any) -> str:
-    """Return a value on one line, as it may stand in brackets."""
-    style = '"' if isinstance(value, str) and _reads_as(value) != value else None
-    flow: Any = {"default_flow_style": True, "default_style": style, "allow_unicode": True, "sort_keys": False}
-    text: str = cast("Any", yaml).dump([value], Dumper=yaml.SafeDumper, width=2**20, **flow)
-    return text.strip()[1:-1]
-
-
-def _extents(root: Any, text: str) -> dict[str, tuple[int, int]]:
-    """Return the first line of each key of the root, and the line after its value; comments below it are not its."""
-    if root is None:
-        return {}
     lines = text.splitlines()
-    starts = [(str(key.value), int(key.start_mark.line)) for key, _ in cast("list[tuple[Any, Any]]", root.value)]
+    starts = [] if root is None else [(str(name.value), int(name.start_mark.line)) for name, _ in root.value]
     ends = [line for _, line in starts[1:]] + [len(lines)]
-    found: dict[str, tuple[int, int]] = {}
-    for (key, first), end in zip(starts, ends, strict=True):
-        while end > first + 1 and (not lines[end - 1].strip() or lines[end - 1].lstrip().startswith(("#", "..."))):
-            end -= 1
-        found[key] = first, end
-    return found
+    for (name, first), end in zip(starts, ends, strict=True):
+        if name == key:
+            while end > first + 1 and (not lines[end - 1].strip() or lines[end - 1].lstrip().startswith(("#", "..."))):
+                end -= 1
+            return first, end
+    return len(lines), len(lines)
 
 
 def _apply(content: Any, edit: Edit, where: str, styled: Callable[[Any], Any]) -> None:
     """Change `content` in place; `styled` converts the new value."""
-    place = content
-    for step, following in zip(edit.path, edit.path[1:], strict=False):
-        if isinstance(place, dict) and isinstance(step, str) and cast("Any", place).get(step) is None:
-            place[step] = styled([] if isinstance(following, int) else {})
-        place = _item(place, step, edit, where)
-    last = edit.path[-1]
-    if isinstance(place, dict) and isinstance(last, str):
-        if edit.remove:
-            place.pop(last, None)
-        else:
-            place[last] = styled(edit.value)
-    elif isinstance(place, list) and isinstance(last, int) and 0 <= last < len(cast("Any", place)):
-        if edit.remove:
-            del place[last]
-        else:
-            place[last] = styled(edit.value)
-    elif isinstance(place, list) and last == len(cast("Any", place)) and not edit.remove:
-        place.append(styled(edit.value))
-    else:
-        raise TaskError(f"{where}: there is no {_name(edit.path)}")
-
-
-def _item(place: Any, step: str | int, edit: Edit, where: str) -> Any:
+    place, last = content, edit.path[-1]
     try:
-        return place[step]
+        for step, following in pairwise(edit.path):
+            if isinstance(place, dict) and isinstance(step, str) and cast("Any", place).get(step) is None:
+                place[step] = styled([] if isinstance(following, int) else {})
+            place = place[step]
+        if isinstance(place, dict) != isinstance(last, str):
+            raise TypeError("expected a key of a record, or the index of an item")
+        if isinstance(place, dict) and edit.remove:
+            cast("Any", place).pop(last, None)
+        elif edit.remove:
+            del place[last]
+        elif isinstance(place, list) and last == len(cast("Any", place)):
+            place.append(styled(edit.value))
+        else:
+            place[last] = styled(edit.value)
     except (KeyError, IndexError, TypeError) as fault:
         raise TaskError(f"{where}: there is no {_name(edit.path)}") from fault
 
@@ -179,14 +134,11 @@ def _styled(value: Any) -> Any:
 def _fits_a_line(value: Any) -> bool:
     """Return True for a value that task files state on one line: one without records or lists of lists in it."""
     parts = cast("Mapping[str, Any]", value).values() if isinstance(value, Mapping) else [value]
-    return all(map(_is_short, parts))
+    return not any(isinstance(one, dict) or (isinstance(one, list) and _holds_any(one, (dict, list))) for one in parts)
 
 
-def _is_short(item: Any) -> bool:
-    """Return True for what fits into a record on one line."""
-    if isinstance(item, list):
-        return not any(isinstance(part, (dict, list)) for part in cast("list[Any]", item))
-    return not isinstance(item, dict)
+def _holds_any(items: list[Any], kinds: tuple[type, ...]) -> bool:
+    return any(isinstance(item, kinds) for item in items)
 
 
 def _reads_as(text: str) -> Any:

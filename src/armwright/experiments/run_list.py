@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import RunFolderError
-from armwright.experiments.run_record import RunSummary, describe_method, read_run_summary
+from armwright.experiments.run_record import RunSummary, read_run_summary
 from armwright.proof.results import read_summary
-from armwright.runs.config import FrontMethod
+from armwright.runs.config import FrontMethod, describe_method
 from armwright.runs.folder import CONFIG, read_config
 from armwright.runs.trials_file import TRIALS, count_trials
 

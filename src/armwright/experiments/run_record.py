@@ -1,4 +1,4 @@
-"""A finished run, read from its summary, and the short description of its method."""
+"""A finished run, read from its summary."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from armwright.exceptions import RunFolderError
 from armwright.pareto import hypervolume
 from armwright.proof.attribution import attribution_by_source
 from armwright.proof.results import read_summary
-from armwright.runs.config import FrontMethod, RunConfig
+from armwright.runs.config import FrontMethod, RunConfig, describe_method
 from armwright.runs.folder import read_config, read_run
 from armwright.runs.history import BBO, RANDOM, History
 
@@ -132,22 +132,3 @@ def read_run_summary(folder: Path, method: str | None = None) -> RunSummary:
         raise RunFolderError(f"{folder} is not finished; repeat the command that started it")
     label = method or describe_method(config)
     return RunSummary(folder, label, config.task.name, config.seed, config, summary, config.reference_point or ())
-
-
-def describe_method(config: RunConfig) -> str:
-    """Describe a run's search in a few words; only settings that differ from the defaults are named."""
-    method = config.method
-    if isinstance(method, FrontMethod):
-        return "front search"
-    text = "BBO" if method.sampler == "tpe" else f"BBO ({method.sampler})"
-    if method.proposer is not None:
-        name = str(method.proposer["name"])
-        text += "/LLM" if name == "llm" else f"/{name}"
-        text += {"plus": "+", "minus": "-", "full": " full"}.get(str(method.proposer.get("prompt", "")), "")
-        if model := method.proposer.get("model"):
-            text += f" {model}"
-        if method.n_step != 10:
-            text += f" (N_step {method.n_step})"
-    if method.n_total != 200:
-        text += f" ({method.n_total} trials)"
-    return text

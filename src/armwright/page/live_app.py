@@ -22,7 +22,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from armwright.exceptions import ArmwrightError
+from armwright.exceptions import ArmwrightError, RunFolderError
 from armwright.page.live_run import LiveRun
 from armwright.page.page import live_shell
 from armwright.page.request_guard import read_request
@@ -133,13 +133,11 @@ class LivePage:
             return PlainTextResponse("expected pause, resume, stop or hint", status_code=422)
         except ArmwrightError as fault:
             return PlainTextResponse(str(fault), status_code=409)
-        except FileNotFoundError:
-            return PlainTextResponse("the run folder is gone", status_code=409)
         return Response(status_code=204)
 
     def _apply(self, request: ControlRequest) -> None:
         if not self._folder.is_dir():
-            raise FileNotFoundError(self._folder)
+            raise RunFolderError("the run folder is gone")
         if request.action == "hint":
             add_hint(self._folder, request.text)
         else:

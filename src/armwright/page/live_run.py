@@ -1,6 +1,5 @@
 """A run folder as the live server shows it: its content, and the status of the study."""
 
-import secrets
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +9,7 @@ from armwright.exceptions import ArmwrightError
 from armwright.existing.compare_arms import EXISTING_ARMS
 from armwright.extras import naming_extras
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
-from armwright.page.content import RunContent, design_files
+from armwright.page.content import RunContent
 from armwright.proof.results import REPORT, SUMMARY
 from armwright.runs.control import (
     CONTROL,
@@ -35,7 +34,6 @@ class LiveRun:
         self.fault = ""  # the reason why the folder cannot be read
         self._content: RunContent | None = None
         self._seen: list[tuple[int, ...] | None] = []
-        self._server = secrets.token_hex(8)  # tells a page that another server took over its address
         self._run = 0  # number of runs seen in this folder since the server started
         self._lock = threading.Lock()
         self.status = self._status()
@@ -59,7 +57,7 @@ class LiveRun:
     def packed(self, designs: int, calls: int) -> bytes | None:
         """Return what is new for a page; None while there is no run."""
         with self._lock:
-            return None if self._content is None else self._content.packed(designs, calls, with_files=False)
+            return None if self._content is None else self._content.packed(designs, calls)
 
     def file(self, number: int, kind: str) -> str | None:
         """Return a design as text; None if it does not exist. kind: urdf, mjcf or datasheet."""
@@ -71,7 +69,7 @@ class LiveRun:
                     from armwright.sheet.design_sheet import design_sheet
                     from armwright.sheet.html import to_html
                 return to_html(design_sheet(self.folder, number))
-            return design_files(self._content.history, number).get(kind)
+            return self._content.file(number, kind)
 
     def _read(self) -> None:
         if not (self.folder / CONFIG).is_file():
@@ -101,7 +99,7 @@ class LiveRun:
         used = used_hints(calls)  # proposals, named PROPOSER-NUMBER, by hint
         return {
             "name": self.folder.resolve().name,
-            "run": f"{self._server}-{self._run}",
+            "run": self._run,
             "doing": doing,
             "since": 0.0 if status is None else status.since,
             "designs": len(trials),

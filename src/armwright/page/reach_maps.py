@@ -1,36 +1,18 @@
 """Reach maps of a run's designs, as the page shows them."""
 
-import hashlib
 import math
-import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arrays import Array, open_arrays
-from armwright.robot.arm import Arm
-from armwright.robot.urdf_reader import UrdfArm
-from armwright.robot.urdf_writer import to_urdf
+from armwright.arrays import UNREADABLE, Array, open_arrays
 from armwright.runs.folder import REACH_MAPS
-from armwright.runs.history import History
 
 MOST_POINTS = 20_000  # of a map; more would slow the page down
-UNREADABLE = (
-    ArithmeticError,
-    OSError,
-    EOFError,
-    KeyError,
-    MemoryError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-    BadZipFile,
-    zlib.error,
-)
 NOT_REACHED, IN_NO_DIRECTION, IN_ALL = 0, 1, 255  # levels of points; between the last two, the share of directions
 
 
@@ -38,45 +20,31 @@ NOT_REACHED, IN_NO_DIRECTION, IN_ALL = 0, 1, 255  # levels of points; between th
 class PageReachMap:
     """A reach map for the page."""
 
-    arm: str  # the fingerprint of the arm; the numbers of designs may have changed since
+    design: str  # `design_text` of its design; the numbers of designs may have changed since
     head: dict[str, Any]  # its grid and conditions
     levels: NDArray[np.uint8]  # (2, N) levels: within the joint limits, and also under the conditions
 
 
-class ReachMapFiles:
-    """The reach maps in a run folder; `read` opens only files that changed."""
+def read_reach_maps(run: Path, n: int, params: Callable[[int], Array]) -> dict[int, PageReachMap]:
+    """Return the maps in a run folder by design, without unreadable ones and those of other designs.
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder / REACH_MAPS
-        self._known: dict[Path, tuple[tuple[int, int], PageReachMap | None]] = {}
-
-    def read(self, history: History) -> dict[int, PageReachMap]:
-        """Return the maps by design number. Unreadable files and maps of other arms are skipped."""
-        found: dict[int, PageReachMap] = {}
-        for file in sorted(self._folder.glob("*.npz")):
-            if not (file.stem.isdecimal() and int(file.stem) < len(history)):
-                continue
-            shown, number = self._latest(file), int(file.stem)
-            if shown is not None and shown.arm == fingerprint(history.member(number).arm):
-                found[number] = shown
-        return found
-
-    def _latest(self, file: Path) -> PageReachMap | None:
-        try:
-            status = file.stat()
-        except OSError:
-            return None
-        version = (status.st_mtime_ns, status.st_size)
-        known, shown = self._known.get(file, (None, None))
-        if version != known:
-            shown = _read(file)
-            self._known[file] = (version, shown)
-        return shown
+    Args:
+        run: The run folder.
+        n: Number of designs of the run.
+        params: Returns the (P,) parameters of a design.
+    """
+    found: dict[int, PageReachMap] = {}
+    for file in sorted((run / REACH_MAPS).glob("*.npz")):
+        number = int(file.stem) if file.stem.isdecimal() else n
+        shown = _read(file) if number < n else None
+        if shown is not None and shown.design == design_text(params(number)):
+            found[number] = shown
+    return found
 
 
-def fingerprint(arm: Arm | UrdfArm) -> str:
-    """Return a hash that identifies an arm."""
-    return hashlib.sha256(to_urdf(arm.arm if isinstance(arm, UrdfArm) else arm).encode()).hexdigest()
+def design_text(params: Array) -> str:
+    """Return the text by which a map names its design; params: (P,)."""
+    return str(params.tolist())
 
 
 def _read(file: Path) -> PageReachMap | None:
@@ -95,7 +63,7 @@ def _read(file: Path) -> PageReachMap | None:
             levels = np.stack(
                 [_levels(arrays[f"{use}covered"], arrays[f"{use}share"], len(points)) for use in ("", "usable_")]
             )
-            arm = str(arrays["arm"])
+            design = str(arrays["design"])
             head: dict[str, Any] = {
                 "shape": shape,
                 "low": points[0].tolist(),
@@ -105,7 +73,7 @@ def _read(file: Path) -> PageReachMap | None:
             }
     except UNREADABLE:
         return None
-    return PageReachMap(arm, head, levels)
+    return PageReachMap(design, head, levels)
 
 
 def _levels(covered: NDArray[Any], share: Array, n: int) -> NDArray[np.uint8]:

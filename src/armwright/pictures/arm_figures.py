@@ -2,7 +2,7 @@
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.arms.forward import (
     column_solid,
     forward_kinematics,
@@ -23,11 +24,12 @@ from armwright.kinematics.arms.forward import (
 from armwright.pictures.drawing import legend_mark
 from armwright.pictures.solids import Extent, draw_edges, draw_obstacles, draw_solid, extent_of
 from armwright.pictures.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET
-from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import torque
+from armwright.problem.problem import Problem
+from armwright.proof.design_record import DesignRecord
+from armwright.robot.arm import Arm
 from armwright.runs.history import FrontMember, History, source_label
-from armwright.tasks.motions import Motion
-from armwright.tasks.targets import AXIS
+from armwright.tasks.targets import AXIS, TargetArrays
 
 ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's reach
 MAX_PANELS = 12
@@ -43,84 +45,79 @@ MOVE: Any = {"color": TARGET, "linewidth": 1.2}  # between two targets
 TIP: Any = {"color": FRONT, "linewidth": 1.4, "linestyle": (0, (3, 1))}  # path of the tip on a motion
 EDGE: Any = {"color": "#8A8A8A", "linewidth": 0.8}  # of boxes to cover
 
-Panel = tuple[str, str, int, Sequence[int]]  # title and its colour, row of the arm in the evaluation, targets
+SAMPLES = 40  # postures of a motion along which its tip is drawn
+
+Records = Mapping[int, DesignRecord]  # of the drawn designs, by number
+Panel = tuple[str, str, FrontMember, Sequence[int]]  # title and its colour, design, targets
 
 
-def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
+def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]], records: Records) -> Figure:
     """Draw the chosen designs side by side, each with its postures at all targets."""
-    evaluation = history.evaluation([member.number for _, member in chosen])
+    targets = range(len(history.problem.task.target_positions))
     captions = [f"{title}\n{_caption(history, member, COLUMNS)}" for title, member in chosen]
-    panels = [(caption, FRONT, row, range(len(evaluation.targets))) for row, caption in enumerate(captions)]
+    panels = [(caption, FRONT, member, targets) for caption, (_, member) in zip(captions, chosen, strict=True)]
     head = LINE_HEIGHT * max(caption.count("\n") + 1 for caption in captions) - 0.1
-    return _draw(evaluation, [member for _, member in chosen], panels, len(chosen), 3.6, head)
+    return _draw(history.problem, records, panels, len(chosen), 3.6, head)
 
 
-def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
+def draw_arm(history: History, title: str, member: FrontMember, records: Records) -> Figure:
     """Draw one design with a panel for each target; of more than 12 targets, 12 spread evenly over the list."""
-    evaluation = history.evaluation([member.number])
-    n = len(evaluation.targets)
+    targets = records[member.number].targets
+    n = len(targets)
     shown = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MAX_PANELS))})
     panels: list[Panel] = []
     for target in shown:
-        missed = evaluation.unreached[0, target]
-        verdict = f"missed by {_describe_miss(evaluation, target)}" if missed else "reached"
-        panels.append((f"Target {target + 1}: {verdict}", MISSED if missed else FRONT, 0, [target]))
-    figure = _draw(evaluation, [member], panels, min(4, max(2, math.ceil(math.sqrt(len(shown))))), 3.1, 0.75)
+        reason = targets[target].unreached_reason
+        verdict = "reached" if reason is None else f"missed by {reason.partition(':')[0]}"
+        panels.append((f"Target {target + 1}: {verdict}", FRONT if reason is None else MISSED, member, [target]))
+    columns = min(4, max(2, math.ceil(math.sqrt(len(shown)))))
+    figure = _draw(history.problem, records, panels, columns, 3.1, 0.75)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
     figure.suptitle(f"{title}{part}\n{_caption(history, member)}", fontsize=10)
     return figure
 
 
 def _draw(
-    evaluation: Evaluation,
-    members: Sequence[FrontMember],
-    panels: Sequence[Panel],
-    columns: int,
-    side: float,
-    head: float,
+    problem: Problem, records: Records, panels: Sequence[Panel], columns: int, side: float, head: float
 ) -> Figure:
     """Draw panels in rows above a legend; side, head: of a panel, and the height above the first row [inch]."""
     rows = -(-len(panels) // columns)
-    handles = _legend(evaluation)
+    members = {member.number: member for _, _, member, _ in panels}
+    handles = _legend(problem, [records[number] for number in members])
     legend_columns = NARROW if side * columns < WIDE else len(handles)
     foot = 0.35 + LINE_HEIGHT * math.ceil(len(handles) / legend_columns)  # [inch]
     height = side * rows + foot + head - 0.1
     figure = Figure(figsize=(side * columns, height))
     # The layout engines do not know how far the labels of a 3D plot reach.
     figure.subplots_adjust(left=0.01, right=0.96, bottom=foot / height, top=1 - head / height, wspace=0.08, hspace=0.12)
-    extent = _extent(evaluation, members)
-    for place, (title, colour, row, targets) in enumerate(panels, start=1):
+    extent = _extent(problem, [(member.arm, records[number]) for number, member in members.items()])
+    for place, (title, colour, member, targets) in enumerate(panels, start=1):
         axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
-        _draw_panel(axes, members[row], evaluation, row, targets, extent)
+        _draw_panel(axes, problem, member.arm, records[member.number], targets, extent)
         axes.set_title(title, y=1.0, color=colour)
     figure.legend(handles=handles, loc="lower center", ncols=legend_columns)
     return figure
 
 
 def _draw_panel(
-    axes: Any,
-    member: FrontMember,
-    evaluation: Evaluation,
-    row: int,
-    targets: Sequence[int],
-    extent: Extent,
+    axes: Any, problem: Problem, arm: Arm, record: DesignRecord, targets: Sequence[int], extent: Extent
 ) -> None:
-    """Draw one arm at some of its targets; row: that of the arm in the evaluation."""
-    draw_obstacles(axes, evaluation.obstacles, extent)
-    for region in evaluation.workspace:
+    """Draw one arm at some of its targets."""
+    task, plan = problem.task, problem.scenes[0].plan
+    draw_obstacles(axes, task.obstacles, extent)
+    for region in task.workspace:
         draw_edges(axes, region.low, region.high, EDGE)
-    for motion, points in _tip_paths(evaluation, row):
-        if evaluation.plan is not None and evaluation.plan.targets[motion.step] in targets:
+    for motion, points in zip(plan.motions if plan else (), _tip_paths(arm, record), strict=True):
+        if plan is not None and plan.targets[motion.step] in targets:
             if motion.by == "line":
-                axes.plot(*evaluation.plan.poses.position[[motion.start, motion.end]].T, **MOVE)
+                axes.plot(*plan.poses.position[[motion.start, motion.end]].T, **MOVE)
             axes.plot(*points.T, **TIP)
-    arm = member.arm
     column = column_solid(arm)
     if column is not None:
         draw_solid(axes, column, extent, LINK)
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
-        q = evaluation.q[row, target, : len(arm.joints)]
+        q = record.targets[target].q
         places = joint_positions(arm, q)
         for line in rails(arm, q):
             axes.plot(*line.T, color=FRONT, linewidth=1.0, alpha=alpha)
@@ -130,39 +127,34 @@ def _draw_panel(
             draw_solid(axes, body, extent, JOINT[axis])
         for joint, place in zip(arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
-        goal = evaluation.targets[target]
+        goal = task.target_positions[target]
         axes.plot(*goal[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
-        _draw_orientation(axes, evaluation, target, ARROW * arm.reach)
-        if evaluation.unreached[row, target]:
+        _draw_orientation(axes, goal, task.target_arrays, target, ARROW * arm.reach)
+        if record.targets[target].unreached_reason is not None:
             axes.plot(*np.array([places[-1], goal]).T, **MISS)
     axes.plot(*np.array(arm.base)[:, None], marker="s", markersize=7, color=FRONT)
     frame(axes, extent)
 
 
-def _tip_paths(evaluation: Evaluation, row: int) -> list[tuple[Motion, Array]]:
-    """Return each motion of a cycle with the path (N, 3) of an arm's tip [m]."""
-    if evaluation.plan is None:
-        return []
-    arms, paths = evaluation.paths.of_arm(row)
-    return [(path.motion, forward_kinematics(arms, path.q).tip[0]) for path in paths]
+def _tip_paths(arm: Arm, record: DesignRecord) -> list[Array]:
+    """Return the path (N, 3) of an arm's tip [m] on each motion of a cycle."""
+    found: list[Array] = []
+    for points in [] if record.motion is None else record.motion.q:
+        shares, at = np.linspace(0.0, 1.0, len(points)), np.linspace(0.0, 1.0, SAMPLES)
+        q = np.column_stack([np.interp(at, shares, values) for values in np.transpose(points)])
+        found.append(forward_kinematics(stack_arms([arm], "float64"), q[None]).tip[0])
+    return found
 
 
-def _draw_orientation(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
+def _draw_orientation(axes: Any, goal: Array, arrays: TargetArrays, target: int, size: float) -> None:
     """Draw the required tool direction: an arrow along its z axis, and for a full orientation also along x and y."""
-    goal, rows = evaluation.targets[target], evaluation.target_arrays.n_angular[target]
+    rows = arrays.n_angular[target]
     if not rows:
         return
     for k in (2,) if rows == AXIS else (0, 1, 2):
         colour = TARGET if rows == AXIS else JOINT["xyz"[k]]
-        way = (1.0 if k == 2 else 0.6) * size * evaluation.target_arrays.rotation[target, :, k]
+        way = (1.0 if k == 2 else 0.6) * size * arrays.rotation[target, :, k]
         axes.quiver(*goal, *way, color=colour, linewidth=1.4, arrow_length_ratio=0.3)
-
-
-def _describe_miss(evaluation: Evaluation, target: int) -> str:
-    distance = f"{1e3 * evaluation.position_error[0, target]:.0f} mm"
-    if not evaluation.target_arrays.n_angular[target]:
-        return distance
-    return f"{distance}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
 
 
 def frame(axes: Any, extent: Extent) -> None:
@@ -180,40 +172,42 @@ def frame(axes: Any, extent: Extent) -> None:
     axes.view_init(elev=22, azim=-58)
 
 
-def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> Extent:
+def _extent(problem: Problem, drawn: Sequence[tuple[Arm, DesignRecord]]) -> Extent:
     """Return the cube that contains all targets, columns, postures and motions."""
-    places = [
-        joint_positions(member.arm, q[: len(member.arm.joints)])
-        for row, member in enumerate(members)
-        for q in evaluation.q[row]
-    ]
-    motions = [points for row in range(len(members)) for _, points in _tip_paths(evaluation, row)]
-    lines = [] if evaluation.plan is None else [evaluation.plan.poses.position]
-    corners = [corner for region in evaluation.workspace for corner in region.corners]
-    feet = [
-        np.array(member.arm.base) - (0.0, 0.0, member.arm.column.length)
-        for member in members
-        if member.arm.column is not None
-    ]
-    return extent_of([evaluation.targets, *corners, *feet, *places, *lines, *motions], evaluation.obstacles)
+    task, plan = problem.task, problem.scenes[0].plan
+    places = [task.target_positions, *([] if plan is None else [plan.poses.position])]
+    places += [corner for region in task.workspace for corner in region.corners]
+    for arm, record in drawn:
+        places += [joint_positions(arm, target.q) for target in record.targets] + _tip_paths(arm, record)
+        if arm.column is not None:
+            places.append(np.array(arm.base) - (0.0, 0.0, arm.column.length))
+    return extent_of(places, task.obstacles)
 
 
-def _legend(evaluation: Evaluation) -> list[Line2D | Patch]:
+def _legend(problem: Problem, records: Sequence[DesignRecord]) -> list[Line2D | Patch]:
     """Return the entries of the legend below the panels."""
     handles: list[Line2D | Patch] = [
         legend_mark("base", "s", FRONT),
         *(legend_mark(JOINT_LABEL[axis], "o", JOINT[axis]) for axis in "xyz"),
         legend_mark("target", "*", TARGET, markersize=9, markeredgecolor=FRONT),
     ]
-    if evaluation.unreached.any():
+    if any(target.unreached_reason is not None for record in records for target in record.targets):
         handles.append(Line2D([], [], **MISS, label="missed by"))
-    if evaluation.obstacles:
+    return handles + scene_legend(problem, "path of the tip", TIP)
+
+
+def scene_legend(problem: Problem, label: str, style: Any) -> list[Line2D | Patch]:
+    """Return the entries of what is around an arm, and of paths that are no stated lines: their label and style."""
+    handles: list[Line2D | Patch] = []
+    if problem.task.obstacles:
         handles.append(Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle"))
-    if evaluation.plan is not None:
-        if any(motion.by == "line" for motion in evaluation.plan.motions):
-            handles.append(Line2D([], [], **MOVE, label="line of the cycle"))
-        handles.append(Line2D([], [], **TIP, label="path of the tip"))
-    if evaluation.workspace:
+    plan = problem.scenes[0].plan
+    ways = {motion.by for motion in plan.motions} if plan else set[str]()
+    if "line" in ways:
+        handles.append(Line2D([], [], **MOVE, label="line of the cycle"))
+    if ways - {"line"} or (ways and style is TIP):
+        handles.append(Line2D([], [], **style, label=label))
+    if problem.task.workspace:
         handles.append(Line2D([], [], **EDGE, label="workspace"))
     return handles
 

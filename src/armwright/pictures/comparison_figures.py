@@ -25,6 +25,7 @@ from armwright.pictures.figures import draw_samples
 from armwright.pictures.reason_figures import draw_reasons
 from armwright.pictures.solids import extent_of
 from armwright.pictures.style import BEST_KNOWN, FRONT, MISSED, TARGET, line
+from armwright.proof.design_record import read_records
 from armwright.proof.results import FIGURES
 
 MAX_SHOWN = 12  # most tasks in the figure of targets
@@ -75,7 +76,8 @@ def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[s
         solutions = paper_solution_indices(history.masked_objectives, comparison.reference_point(task))
         for i, number in enumerate(dict.fromkeys(solutions or ()), start=1):
             title = f"{task}, {shown}, seed {runs[0].seed}: Solution {i}"
-            yield f"solution-{i}-{task}", draw_arm(history, title, history.member(number))
+            records = read_records(runs[0].folder, history, [number])
+            yield f"solution-{i}-{task}", draw_arm(history, title, history.member(number), records)
         reasons = draw_reasons(runs[0], history, solutions)
         if reasons is not None:
             yield f"reasoning-{task}", reasons

@@ -1,8 +1,8 @@
 """Figures of one run, written to its folder as PNG and PDF."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
@@ -25,8 +25,8 @@ from armwright.pictures.drawing import (
     several_panels,
     write_drawn,
 )
-from armwright.pictures.point_labels import PointLabel, place_labels
 from armwright.pictures.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
+from armwright.proof.design_record import read_records
 from armwright.proof.front_gap import front_gap
 from armwright.proof.results import FIGURES, read_summary
 from armwright.runs.config import FrontMethod
@@ -36,7 +36,7 @@ from armwright.text import rounded
 
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials; 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # drawn part of the plane, as a multiple of the reference point
-OVERLAP = 0.01  # of the limits of the axes: marks that are nearer to each other overlap
+LINE = 0.18  # [inch] of the legend
 MARK_PAD = 0.08  # [inch] around a panel with marks on its edge
 
 
@@ -46,15 +46,16 @@ def write_figures(folder: str | Path) -> list[Path]:
     config, history = read_run(folder)
     search = (read_summary(folder) or {}).get("search") if isinstance(config.method, FrontMethod) else None
     existing = read_existing_arms(folder, len(config.objectives))
-    return write_drawn(folder / FIGURES, _figures(history, search, existing))
+    return write_drawn(folder / FIGURES, _figures(folder, history, search, existing))
 
 
 def _figures(
-    history: History, search: Mapping[str, Any] | None, existing: Sequence[ComparedArm]
+    folder: Path, history: History, search: Mapping[str, Any] | None, existing: Sequence[ComparedArm]
 ) -> Iterator[tuple[str, Figure]]:
     """Yield figures by name.
 
     Args:
+        folder: The run folder.
         history: The trials.
         search: The record of a direct search, whose trials are its front.
         existing: Arms to compare with.
@@ -64,7 +65,8 @@ def _figures(
     yield "hypervolume", draw_hypervolume(history) if search is None else draw_search(history, search)
     if len(history.problem.objectives) > 1:
         yield "front", draw_front(history, existing)
-    yield "arms", draw_arms(history, chosen_members(history))
+    chosen = chosen_members(history)
+    yield "arms", draw_arms(history, chosen, read_records(folder, history, [member.number for _, member in chosen]))
 
 
 def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
@@ -158,55 +160,43 @@ def draw_samples(history: History) -> Figure:
 
 
 def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure:
-    """Draw the final front by source, with the chosen designs labelled and existing arms for comparison."""
-    figure, axes = one_panel(5.2, 4.5, MARK_PAD if existing else None)
+    """Draw the final front by source, with numbers at the chosen designs and letters at existing arms."""
     reference, limits = _reference(history), _limits(history)
+    marked = [
+        (f"{title.split(':')[0].split(',')[0]}, #{member.number} {member.design.joints}", member.values)
+        for title, member in chosen_members(history)
+        if np.all(np.array(member.values[:2]) <= limits[:, 1])
+    ]
+    arms = [arm for arm in existing if None not in arm.values[:2]]
+    arms.sort(key=lambda arm: np.minimum(arm.values[0] or 0.0, limits[0, 1]), reverse=True)  # as `_named` takes turns
+    figure, axes = one_panel(5.2, 4.2 + LINE * (len(marked) + len(arms)), MARK_PAD if arms else None)
     _scatter(axes, history, reference, limits, alpha=0.25)
     for member in history.front:
         style = look(member.source)
         axes.scatter(*member.values[:2], **style.points | {"s": 1.6 * style.size}, zorder=4)
-    labels = [
-        PointLabel(
-            f"{title.split(':')[0].split(',')[0]}\n#{m.number}  {m.design.joints}",
-            (m.values[0], m.values[1]),
-            "#AAAAAA",
-        )
-        for title, m in chosen_members(history)
-        if np.all(np.array(m.values[:2]) <= limits[:, 1])
-    ]
-    arms = _draw_existing(axes, limits[:, 1], existing)
     area = hypervolume(history.masked_objectives, reference)
     n = len(history.front)
     axes.set_title(f"{history.problem.task.name}: {n} design{'s' * (n != 1)} on the front, hypervolume {area:.2f}")
-    marks = [(reference[0], reference[1]), *((m.values[0], m.values[1]) for m in history.front)]
-    marks = [mark for mark in marks if np.all(np.array(mark) <= limits[:, 1])]
     handles = [*_legend(history), *([_mark(EXISTING)] if arms else [])]
+    for number, (label, values) in enumerate(marked):
+        handles.append(_named(axes, values[:2], number, str(number + 1), label))
+    for number, arm in enumerate(arms):
+        place = np.array(arm.values[:2], dtype=float)
+        at = np.minimum(place, limits[:, 1])
+        beyond = "" if np.all(place <= at) else f", beyond, at {rounded(place[0])}, {rounded(place[1])}"
+        axes.scatter(*at, **EXISTING.points | {"edgecolors": FRONT}, zorder=6, clip_on=False)
+        handles.append(_named(axes, at, number, ascii_lowercase[number % 26], f"{arm.name}{beyond}"))
     legend_below(figure, handles)
-    place_labels(axes, labels + arms, marks)
     return figure
 
 
-def _draw_existing(axes: Any, edge: Array, existing: Sequence[ComparedArm]) -> list[PointLabel]:
-    """Draw existing arms in the plane of the first two objectives and return their labels.
-
-    An arm outside the drawn part is placed at its edge (2,), with its values in the label. Arms whose marks
-    overlap share a label.
-    """
-    labels: list[PointLabel] = []
-    for arm in existing:
-        if None in arm.values[:2]:
-            continue
-        place = np.array(arm.values[:2], dtype=float)
-        x, y = np.minimum(place, edge).tolist()
-        beyond = "" if np.all(place <= edge) else f"\nbeyond, at {rounded(place[0])}, {rounded(place[1])}"
-        axes.scatter(x, y, **EXISTING.points | {"edgecolors": FRONT}, zorder=6, clip_on=False)
-        label = PointLabel(f"{arm.name}{beyond}", (x, y), EXISTING.colour)
-        near = [i for i, one in enumerate(labels) if np.all(np.abs(np.subtract(one.at, label.at)) < OVERLAP * edge)]
-        if near:
-            labels[near[0]] = replace(labels[near[0]], text=f"{labels[near[0]].text}\n{label.text}")
-        else:
-            labels.append(label)
-    return labels
+def _named(axes: Any, place: Any, number: int, mark: str, label: str) -> Line2D:
+    """Ring a place, write a mark on one of four sides of it, and return the legend entry."""
+    x, y = (1, -1)[number % 2], (1, -1)[number // 2 % 2]
+    axes.plot(*place, marker="o", markersize=10, color=FRONT, markerfacecolor="none", clip_on=False, zorder=7)
+    sides = {"ha": "left" if x > 0 else "right", "va": "bottom" if y > 0 else "top"}
+    axes.annotate(mark, place, (5 * x, 4 * y), textcoords="offset points", **sides, weight="bold", zorder=7)
+    return legend_mark(f"{mark}: {label}", "", FRONT)
 
 
 def _limits(history: History) -> Array:

@@ -10,10 +10,10 @@ from matplotlib.patches import Patch
 
 from armwright.exceptions import TaskError
 from armwright.files import naming_write_errors
-from armwright.pictures.arm_figures import EDGE, MOVE, frame
+from armwright.pictures.arm_figures import EDGE, MOVE, frame, scene_legend
 from armwright.pictures.drawing import legend_mark, save_figure
 from armwright.pictures.solids import draw_edges, draw_obstacles, extent_of
-from armwright.pictures.style import FRONT, OBSTACLE, RC, TARGET
+from armwright.pictures.style import FRONT, RC, TARGET
 from armwright.problem.checks.reach import base_box
 from armwright.problem.problem import Problem
 
@@ -74,18 +74,8 @@ def draw_task(problem: Problem) -> Figure:
 
 def _handles(problem: Problem) -> list[Line2D | Patch]:
     """Return the entries of the legend."""
-    handles: list[Line2D | Patch] = [
+    return [
         legend_mark("target, tool direction", "*", TARGET, markersize=9, markeredgecolor=FRONT),
         Line2D([], [], **BASES, marker="s", markersize=5, label="allowed bases, their centre"),
+        *scene_legend(problem, "joint motion between", PATH),
     ]
-    if problem.task.obstacles:
-        handles.append(Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle"))
-    plan = problem.scenes[0].plan
-    ways = {motion.by for motion in plan.motions} if plan else set[str]()
-    if "line" in ways:
-        handles.append(Line2D([], [], **MOVE, label="line of the cycle"))
-    if ways - {"line"}:
-        handles.append(Line2D([], [], **PATH, label="joint motion between"))
-    if problem.task.workspace:
-        handles.append(Line2D([], [], **EDGE, label="workspace"))
-    return handles

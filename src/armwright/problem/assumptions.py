@@ -36,14 +36,18 @@ def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None, also: It
     entering |= {*YIELDING} & {rating for quantity in problem.quantities for rating in quantity.ratings}
     if problem.space.has_motor_bodies:
         entering.add("shaft_offset")
-    found = {record.name: _values(record, entering) for record in records}
-    return {name: values for name, values in found.items() if values}
+    return assumed_of(records, entering)
 
 
-def _values(record: ActuatorRecord, entering: Container[str]) -> Mapping[str, float]:
-    completed = record.completed()
-    values = {name: value_of(completed, name) for name in record.assumed if name in entering}
-    return {name: value for name, value in values.items() if value is not None}
+def assumed_of(records: Iterable[ActuatorRecord], entering: Container[str]) -> Assumed:
+    """Return the assumed values of actuators, of these names; actuators without any are left out."""
+    found: dict[str, dict[str, float]] = {}
+    for record in records:
+        completed = record.completed()
+        for name in record.assumed:
+            if name in entering and (value := value_of(completed, name)) is not None:
+                found.setdefault(record.name, {})[name] = value
+    return found
 
 
 def count_assumed(assumed: Assumed) -> str:

@@ -2,7 +2,8 @@
 
 designs/NNNN/arm.urdf     for simulators
 designs/NNNN/design.json  the record: facts, postures, errors and torques at every target, the motion through a cycle
-designs/NNNN/arm.xml, trajectory.csv  with a cycle: its model for MuJoCo, and its motion (cycle_export.py)
+designs/NNNN/arm.xml      for MuJoCo; with a cycle, the arm in its task (cycle_export.py)
+designs/NNNN/trajectory.csv  with a cycle: its motion
 """
 
 import json
@@ -24,9 +25,10 @@ from armwright.problem.facts import VOLTAGE, Fact, Facts, alike, as_json, facts_
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.over_reach import reach_lines
 from armwright.problem.unreached_reason import unreached_reason
-from armwright.proof.cycle_export import cycle_files, trajectory_of
+from armwright.proof.cycle_export import MODEL, cycle_files, trajectory_of
 from armwright.proof.cycle_faults import Extreme, path_record
 from armwright.robot.arm import Arm, Joint
+from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import History
@@ -73,11 +75,26 @@ class Loads(BaseModel, allow_inf_nan=False):
         return self
 
 
+class TargetRecord(BaseModel, extra="allow", allow_inf_nan=False):
+    """What a design does at a target, as far as others read it."""
+
+    q: list[float]  # joint values [rad] or [m]
+    unreached_reason: str | None
+    joint_torques: list[float]  # [N m] or [N]
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        """What the page says of it."""
+        torques = [float(f"{torque:.5g}") for torque in self.joint_torques]
+        return {"reason": self.unreached_reason, "torques": torques}
+
+
 class DesignRecord(BaseModel, extra="allow"):
     """What `design.json` says, as far as others read it."""
 
     number: int
     facts: dict[str, Fact]
+    targets: list[TargetRecord]
     path: dict[str, Extreme | list[int]] | None = None  # where it is worst along the cycle (cycle_faults.py)
     motion: Motion | None = None
     loads: Loads | None = None  # of recommended designs
@@ -85,8 +102,16 @@ class DesignRecord(BaseModel, extra="allow"):
 
 def write_designs(
     folder: RunFolder, history: History, verdicts: Mapping[int, Mapping[str, Any]], recommended: Collection[int]
-) -> None:
-    """Write the folders of the front's designs, with their verdicts of the verification by number; remove others."""
+) -> dict[int, DesignRecord]:
+    """Write the folders of the front's designs, with verdicts of the verification; remove others; return the records.
+
+    Args:
+        folder: The run folder.
+        history: The trials.
+        verdicts: Of the verification, by number.
+        recommended: Numbers of the recommended designs.
+    """
+    written: dict[int, DesignRecord] = {}
     numbers = [member.number for member in history.front]
     names = {design_name(number) for number in numbers}
     for stale in (folder.path / DESIGNS).glob("[0-9]*"):
@@ -95,11 +120,14 @@ def write_designs(
     for number, arm, evaluation, row, record in _records(history, numbers, recommended):
         place, name = f"{DESIGNS}/{design_name(number)}", f"{history.problem.task.name}-{number}"
         folder.write_text(f"{place}/arm.urdf", to_urdf(arm, name))
-        for file, text in cycle_files(history.problem, arm, evaluation, row, name).items():
+        files = cycle_files(history.problem, arm, evaluation, row, name) or {MODEL: to_mjcf(arm, name)}
+        for file, text in files.items():
             folder.write_text(f"{place}/{file}", text)
         if number in verdicts:
             record["verification"] = verdicts[number]
         folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
+        written[number] = DesignRecord.model_validate(record)
+    return written
 
 
 def design_name(number: int) -> str:
@@ -148,12 +176,15 @@ def _is_of(record: DesignRecord, history: History, number: int) -> bool:
     """Return whether a record is of this design, whose number another may have had, and states all that it should."""
     params = (record.model_extra or {}).get("params")
     is_design = record.number == number and params == dict(history.trials[number].design.params)
-    return is_design and record.facts.keys() >= {*QUANTITIES, VOLTAGE} and _fits(record.motion, history, number)
+    return is_design and record.facts.keys() >= {*QUANTITIES, VOLTAGE} and _fits(record, history, number)
 
 
-def _fits(motion: Motion | None, history: History, number: int) -> bool:
-    """Return whether a motion is of the task's cycle and of the joints of the design."""
+def _fits(record: DesignRecord, history: History, number: int) -> bool:
+    """Return whether targets and motion of a record are those of the task, and of the joints of the design."""
     plan, joints = history.problem.scenes[0].plan, len(history.member(number).arm.joints)
+    motion, sizes = record.motion, {len(values) for one in record.targets for values in (one.q, one.joint_torques)}
+    if len(record.targets) != len(history.problem.task.target_positions) or sizes != {joints}:
+        return False
     if plan is None or motion is None:
         return plan is None and motion is None
     is_whole = len(motion.seconds) == len(motion.q) == len(plan.motions)
@@ -279,6 +310,12 @@ def _thinned(rows: Array) -> list[list[float]]:
 def violation_record(history: History, trial: FinishedTrial) -> dict[str, float]:
     """Return the violations of a trial by constraint."""
     return {c.description: value for c, value in zip(history.problem.constraints, trial.violations, strict=True)}
+
+
+def bounded_numbers(history: History, number: int) -> dict[str, float]:
+    """Return the quantities of a design that the constraints bound, by name."""
+    pairs = zip(history.problem.constraints, history.trials[number].violations, strict=True)
+    return {constraint.quantity.name: constraint.measured(violation) for constraint, violation in pairs}
 
 
 def objective_record(history: History, values: Sequence[T]) -> dict[str, T]:

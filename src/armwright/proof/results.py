@@ -3,6 +3,7 @@
 summary.json              the result of the run
 trials.csv, front.csv     all trials, and those of the front
 designs/NNNN/             each design of the front (design_record.py)
+shown.npz                 what the page shows (shown_run.py)
 """
 
 import json
@@ -26,6 +27,7 @@ from armwright.proof.front_gap import front_gap
 from armwright.proof.infeasibility import ViolationTally, feasibility_record
 from armwright.proof.proposer_bias import proposer_bias
 from armwright.proof.recommendation import recommend, unlimited
+from armwright.proof.shown_run import SHOWN, show_run
 from armwright.proof.summary_file import ProposerSummary, parse_summary
 from armwright.proof.verification import Verification, verify_front
 from armwright.runs.config import FrontMethod, RunConfig
@@ -36,6 +38,7 @@ from armwright.runs.trial import FinishedTrial
 SUMMARY = "summary.json"
 FIGURES = "figures"  # drawn by pictures/figures.py
 REPORT = "report.html"  # made by page/page.py
+COMMAND = "command.txt"  # of the command line that made the run
 TABLES = ("trials.csv", "front.csv")
 MAX_FALLBACK_SHARE = 0.1  # of a proposer's trials; runs with more are flagged, and tables leave them out
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
@@ -43,13 +46,18 @@ CASES = ("exact", "moved")  # in which the objectives of a design are verified
 
 
 def write_results(
-    folder: RunFolder, history: History, summary: Mapping[str, Any], verification: Verification | None
+    folder: RunFolder,
+    history: History,
+    config: RunConfig,
+    summary: Mapping[str, Any],
+    verification: Verification | None,
 ) -> None:
     """Write all results, and the summary last: it marks them as complete.
 
     Args:
         folder: The run folder.
         history: The trials.
+        config: The settings of the run.
         summary: The content of summary.json.
         verification: Verification of the front; None if it was not verified.
     """
@@ -59,7 +67,8 @@ def write_results(
     on_front = sorted(member.number for member in history.front)
     folder.write_text("front.csv", to_csv(rows[number] | _flat_verdict(verdicts.get(number)) for number in on_front))
     recommended = {one["design"] for one in summary.get("recommended", ())}
-    write_designs(folder, history, verdicts, recommended)
+    records = write_designs(folder, history, verdicts, recommended)
+    folder.write_bytes(SHOWN, show_run(config, history, summary, records).to_bytes())
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
@@ -73,7 +82,7 @@ def rewrite_results(
     else:
         known = {key: summary[key] for key in ("proposer", "proposer_bias") if key in summary}
         new = summarize(history, config, None, verification) | known
-    write_results(folder, history, new, verification)
+    write_results(folder, history, config, new, verification)
     return new
 
 

@@ -11,7 +11,13 @@ from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.problem.conditions import Condition
 from armwright.problem.facts import Facts
 from armwright.problem.objectives import QUANTITIES
-from armwright.proof.design_record import DesignRecord, compute_facts, facts_by_number, read_records
+from armwright.proof.design_record import (
+    DesignRecord,
+    bounded_numbers,
+    compute_facts,
+    facts_by_number,
+    read_records,
+)
 from armwright.proof.infeasibility import describe_infeasibility
 from armwright.proof.perturbations import evaluate_survival
 from armwright.proof.ranking import knee_first
@@ -33,12 +39,6 @@ def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
     arm = {"length": member.arm.length, "mass": member.arm.mass}
     objectives = {o.name: value for o, value in zip(history.problem.objectives, member.values, strict=True)}
     return {**reals, **arm, **bounded_numbers(history, member.number), **objectives}
-
-
-def bounded_numbers(history: History, number: int) -> dict[str, float]:
-    """Return the quantities of a design that the constraints bound, by name."""
-    pairs = zip(history.problem.constraints, history.trials[number].violations, strict=True)
-    return {constraint.quantity.name: constraint.measured(violation) for constraint, violation in pairs}
 
 
 def pick(

@@ -150,6 +150,25 @@ def _recorded(record: ObjectiveRecord) -> Objective:
     return Objective(record.name, record.unit, record.label.lower(), each, "arm", record.label, record.symbol)
 
 
+def describe_method(config: RunConfig) -> str:
+    """Describe a run's search in a few words; only settings that differ from the defaults are named."""
+    method = config.method
+    if isinstance(method, FrontMethod):
+        return "front search"
+    text = "BBO" if method.sampler == "tpe" else f"BBO ({method.sampler})"
+    if method.proposer is not None:
+        name = str(method.proposer["name"])
+        text += "/LLM" if name == "llm" else f"/{name}"
+        text += {"plus": "+", "minus": "-", "full": " full"}.get(str(method.proposer.get("prompt", "")), "")
+        if model := method.proposer.get("model"):
+            text += f" {model}"
+        if method.n_step != 10:
+            text += f" (N_step {method.n_step})"
+    if method.n_total != 200:
+        text += f" ({method.n_total} trials)"
+    return text
+
+
 def versions(evaluator: Evaluator | None = None) -> dict[str, str]:
     """Return the versions that results depend on, with a part of the sha256 of an evaluator's file."""
     found = {"python": platform.python_version()}

@@ -5,7 +5,7 @@
     transcripts.jsonl  every call to a language model (llm/transcript.py)
     control.json, status.json  channel between a running study and its watchers (control.py)
     search.npz         state of a direct search (study/front/direct_search.py)
-    trials.csv, front.csv, summary.json, designs/NNNN/ (results.py), and figures/ (pictures/figures.py)
+    trials.csv, front.csv, summary.json, shown.npz, designs/NNNN/ (results.py), and figures/ (pictures/figures.py)
 
 The files of the last line are derived from the finished trials and can be written again.
 """

@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,6 @@ from armwright.sheet.record import DataSheet
 from armwright.tasks.moments import MAX_MASS
 
 REACHED = "#EDEDED"
-SPACING = 0.075  # of labels, as a share of the height of a view
-ROOM = 0.36  # for labels at the right, as a share of the width of a view
 LETTERS = 40  # of a line in a panel
 SHORT = 1e-6  # [m]; links without length are not drawn
 MARGIN = 0.06  # around a view, as a share of its size
@@ -23,28 +22,23 @@ MM = 1e3
 
 
 def draw_side(axes: Any, sheet: DataSheet) -> None:
-    """Draw the arm from the side, with its joints at 0 or the nearest limit, its dimensions, and what it reaches."""
-    drawing = sheet.drawing
-    outline = _points(drawing.side)
+    """Draw the arm from the side, with its joints at 0 or the nearest limit, and what it reaches."""
+    drawing, outline = sheet.drawing, _points(sheet.drawing.side)
     axes.fill(*(MM * outline.T), facecolor=REACHED, edgecolor=LINK, linewidth=0.8, zorder=1)
-    low, high = _limits(outline, _ends(sheet))
-    labels: list[tuple[float, float, str]] = []
     x, _, z = drawing.base
     if drawing.column is not None:
         axes.plot([MM * x] * 2, [MM * (z - drawing.column), MM * z], color=LINK, linewidth=5.0, alpha=0.5, zorder=2)
-        labels.append((x, z - drawing.column / 2.0, f"column {MM * drawing.column:.1f}"))
     for number, start, end in drawing.links:
-        length = math.dist(start, end)
-        if length < SHORT:
-            continue
-        ends = MM * np.array([start, end])[:, [0, 2]]
-        axes.plot(*ends.T, color=FRONT, linewidth=2.4 if number else 1.2, solid_capstyle="butt", zorder=3)
-        axes.plot(*ends[0], marker="o", markersize=3.5, color=FRONT, markerfacecolor="white", zorder=4)
-        name = f"link {number}" if number else "tool"
-        labels.append(((start[0] + end[0]) / 2.0, (start[2] + end[2]) / 2.0, f"{name} {MM * length:.1f}"))
+        if math.dist(start, end) >= SHORT:
+            ends = MM * np.array([start, end])[:, [0, 2]]
+            axes.plot(*ends.T, color=FRONT, linewidth=2.4 if number else 1.2, solid_capstyle="butt", zorder=3)
+            axes.plot(*ends[0], marker="o", markersize=3.5, color=FRONT, markerfacecolor="white", zorder=4)
+            name = f"link {number}" if number else "tool"
+            axes.annotate(
+                name, ends.mean(axis=0), (6, 0), textcoords="offset points", fontsize=7, va="center", zorder=5
+            )
     axes.plot(MM * x, MM * z, marker="s", markersize=5, color=FRONT, zorder=4)
-    _label(axes, labels, high[0], (high - low)[1])
-    _frame(axes, low, high + ROOM * np.array([(high - low)[0], 0.0]), "x [mm]", "z [mm]")
+    _frame(axes, *_limits(outline, _ends(sheet)), "x [mm]", "z [mm]")
     top, bottom = MM * outline[:, 1].max(), MM * outline[:, 1].min()
     posture = "joints at 0; " if drawing.is_at_zero else "joints at 0 or the limit next to it\n"
     axes.set_title(f"Side view, {posture}tip from z = {bottom:.0f} to {top:.0f} mm")
@@ -79,44 +73,50 @@ def draw_top(axes: Any, sheet: DataSheet) -> None:
 
 def draw_payload(axes: Any, sheet: DataSheet) -> None:
     """Draw the payload over the reach, and that of the task."""
-    lines = [line for line in sheet.over_reach if line.payload is not None and line.payload < MAX_MASS]
-    axes.set_title("Payload held over the reach")
-    if not lines:
-        _state_missing(axes, "payload held: " + (sheet.facts["payload_at_full_reach"].reason or "no motor feels it"))
-        return
-    axes.plot([MM * line.distance for line in lines], [line.payload for line in lines], "o-", color=FRONT, markersize=4)
-    if sheet.payload is not None:
-        axes.axhline(sheet.payload, color=LINK, linewidth=0.9, linestyle=(0, (4, 2)), label="payload of the task")
-        axes.legend(loc="upper right")
-    axes.set(
-        xlabel="distance from the base axis [mm]",
-        ylabel="payload [kg]",
-        xlim=(0.0, 1.05e3 * sheet.reach),
-    )
-    axes.set_ylim(0.0, 1.25 * max([line.payload or 0.0 for line in lines] + [sheet.payload or 0.0]) or 1.0)
+    held = [(line.distance, line.payload) for line in sheet.over_reach if (line.payload or 0.0) < MAX_MASS]
+    reason = sheet.facts["payload_at_full_reach"].reason or "no motor feels it"
+    curves = {"payload held": held}
+    if sheet.payload is not None and any(payload is not None for _, payload in held):
+        curves["payload of the task"] = [(distance, sheet.payload) for distance in (0.0, sheet.reach)]
+    _draw_over_reach(axes, sheet, "Payload held over the reach", "payload [kg]", curves, f"payload held: {reason}")
 
 
 def draw_errors(axes: Any, sheet: DataSheet) -> None:
     """Draw deflection and backlash error over the reach."""
-    axes.set_title("Deflection and backlash over the reach")
-    styles = {"deflection": ("o-", FRONT), "backlash_error": ("s--", LINK)}
+    curves = {
+        "deflection": [(line.distance, line.deflection) for line in sheet.over_reach],
+        "backlash error": [(line.distance, line.backlash_error) for line in sheet.over_reach],
+    }
+    in_mm = {name: [(x, None if y is None else MM * y) for x, y in points] for name, points in curves.items()}
+    reason = f"deflection and backlash: {sheet.facts['deflection'].reason or 'not known'}"
+    _draw_over_reach(axes, sheet, "Deflection and backlash over the reach", "tip moves by [mm]", in_mm, reason)
+
+
+def _draw_over_reach(
+    axes: Any,
+    sheet: DataSheet,
+    title: str,
+    label: str,
+    curves: Mapping[str, Sequence[tuple[float, float | None]]],
+    reason: str,
+) -> None:
+    """Draw curves by their names over the distance from the base [m]; reason: why the first has no points."""
+    axes.set_title(title)
+    known = {name: [(x, y) for x, y in points if y is not None] for name, points in curves.items()}
     most = 0.0
-    for key, (style, colour) in styles.items():
-        points = [(MM * line.distance, value) for line in sheet.over_reach if (value := getattr(line, key)) is not None]
+    for (name, points), (style, colour) in zip(known.items(), (("o-", FRONT), ("s--", LINK)), strict=False):
         if points:
             x, y = np.array(points).T
-            most = max(most, MM * float(y.max()))
-            axes.plot(x, MM * y, style, color=colour, markersize=4, label=key.replace("_", " "))
+            most = max(most, float(y.max()))
+            axes.plot(MM * x, y, style, color=colour, markersize=4, label=name)
     if not axes.lines:
-        _state_missing(axes, "deflection and backlash: " + (sheet.facts["deflection"].reason or "not known"))
+        shown = "\n".join(textwrap.wrap(f"({reason})", LETTERS))
+        axes.text(0.5, 0.5, f"not stated\n{shown}", ha="center", va="center", transform=axes.transAxes, fontsize=7)
+        axes.set(xticks=[], yticks=[])
         return
-    axes.set(
-        xlabel="distance from the base axis [mm]",
-        ylabel="tip moves by [mm]",
-        xlim=(0.0, 1.05e3 * sheet.reach),
-    )
+    axes.set(xlabel="distance from the base axis [mm]", ylabel=label, xlim=(0.0, 1.05e3 * sheet.reach))
     axes.set_ylim(0.0, 1.4 * most or 1.0)
-    axes.legend(loc="upper left")
+    axes.legend()
 
 
 def _points(outline: Outline) -> Array:
@@ -144,27 +144,3 @@ def _frame(axes: Any, low: Array, high: Array, x: str, y: str) -> None:
     axes.set(xlabel=x, ylabel=y, xlim=MM * np.array([low[0], high[0]]), ylim=MM * np.array([low[1], high[1]]))
     axes.set_aspect("equal")
     axes.locator_params(nbins=5)
-
-
-def _label(axes: Any, labels: list[tuple[float, float, str]], x: float, height: float) -> None:
-    """Write labels at x [m] beside their points, far enough from each other, each with a line to its point."""
-    step = SPACING * height
-    ordered = sorted(labels, key=lambda label: (round(label[1], 6), -label[0]))
-    places = np.array([z for _, z, _ in ordered])
-    for _ in range(100):  # push neighbours apart until all have room
-        gaps = np.diff(places)
-        short = np.maximum(step - gaps, 0.0)
-        if not short.max(initial=0.0) > 1e-3 * step:
-            break
-        places[:-1] -= short / 2.0
-        places[1:] += short / 2.0
-    for (at, z, text), place in zip(ordered, places, strict=True):
-        axes.plot([MM * at, MM * x], [MM * z, MM * place], color=LINK, linewidth=0.6, zorder=2)
-        axes.text(MM * x, MM * place, f" {text}", fontsize=7, va="center", zorder=5)
-
-
-def _state_missing(axes: Any, text: str) -> None:
-    """Write why there is no curve."""
-    shown = "\n".join(textwrap.wrap(f"({text})", LETTERS))
-    axes.text(0.5, 0.5, f"not stated\n{shown}", ha="center", va="center", transform=axes.transAxes, fontsize=7)
-    axes.set(xticks=[], yticks=[])

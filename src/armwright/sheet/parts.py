@@ -1,16 +1,22 @@
-"""The mass of a design by parts, and its parts list with prices and sources."""
+"""The mass of a design by parts, and parts lists with prices and sources."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from armwright.robot.actuators import ActuatorRecord
-from armwright.robot.arm import Actuator, Arm, Link
+from armwright.robot.arm import Arm, Link
 from armwright.robot.tubes import Tube
 from armwright.sheet.record import MassLine, Part
 from armwright.spaces.design_space import DesignSpace
 
 _SENTENCE = re.compile(r"(?:[^;()]|\([^()]*+\)|[()])++")  # of a note: up to a semicolon outside parentheses
 NEGLIGIBLE = 1e-9  # [kg]
+RATINGS = {
+    "peak_torque": ", peak {:.4g} N m",
+    "continuous_torque": ", continuous {:.4g} N m",
+    "speed": ", no-load speed {:.4g} rad/s",
+    "voltage": ", {:g} V",
+}
 
 
 def mass_lines(arm: Arm) -> tuple[MassLine, ...]:
@@ -26,46 +32,32 @@ def mass_lines(arm: Arm) -> tuple[MassLine, ...]:
 
 def parts_list(arm: Arm, space: DesignSpace) -> tuple[Part, ...]:
     """Return the parts list of a design of a space; a price is None if the space or the catalogue states none."""
-    return (*_actuators(arm, space), *_tubes(arm, space), *_column(arm), *_others(arm, space))
-
-
-def _actuators(arm: Arm, space: DesignSpace) -> Iterator[Part]:
     records = {record.name: record for record in space.actuators}
-    names = [joint.actuator.name for joint in arm.joints if joint.actuator is not None]
-    motors = {joint.actuator.name: joint.actuator for joint in arm.joints if joint.actuator is not None}
-    for name, motor in motors.items():
-        record, count = records[name], names.count(name)
-        made = f"{record.maker} {record.kind}".strip()
+    used = [records[joint.actuator.name] for joint in arm.joints if joint.actuator is not None]
+    return (*actuator_parts(used), *_tubes(arm, space), *_others(arm, space))
+
+
+def actuator_parts(records: Sequence[ActuatorRecord]) -> Iterator[Part]:
+    """Yield a line for each kind of actuator among those of an arm."""
+    for record in dict.fromkeys(records):
+        count, motor = records.count(record), record.actuator()
+        stated = {text: getattr(motor, name) for name, text in RATINGS.items()}
+        ratings = "".join(text.format(value) for text, value in stated.items() if value is not None)
+        notes = () if record.price is None else map(str.strip, _SENTENCE.findall(record.note))
         yield Part(
-            part=name,
+            part=record.name,
             count=count,
             unit_price=record.price,
             price=None if record.price is None else count * record.price,
-            detail=f"{made}, {1e3 * record.mass:.4g} g each{_ratings(motor)}",
+            detail=f"{f'{record.maker} {record.kind}'.strip()}, {1e3 * record.mass:.4g} g each{ratings}",
             source=record.source,
-            price_source=price_source(record),
+            price_source="; ".join(note for note in notes if "price" in note.lower()),
         )
-
-
-def _ratings(motor: Actuator) -> str:
-    stated = [
-        (", peak {:.4g} N m", motor.peak_torque),
-        (", continuous {:.4g} N m", motor.continuous_torque),
-        (", no-load speed {:.4g} rad/s", motor.speed),
-        (", {:g} V", motor.voltage),
-    ]
-    return "".join(text.format(value) for text, value in stated if value is not None)
-
-
-def price_source(record: ActuatorRecord) -> str:
-    """Return what the note of an actuator says of its price; empty if it says nothing."""
-    if record.price is None:
-        return ""
-    return "; ".join(part.strip() for part in _SENTENCE.findall(record.note) if "price" in part.lower())
 
 
 def _tubes(arm: Arm, space: DesignSpace) -> Iterator[Part]:
     material = space.link_section.material
+    kind = "" if material is None else f"{material.name or 'custom material'}, "
     of_tube: dict[str, list[Link]] = {}
     for link in arm.links:
         if link.length > 0.0:
@@ -73,24 +65,13 @@ def _tubes(arm: Arm, space: DesignSpace) -> Iterator[Part]:
             of_tube.setdefault(name, []).append(link)
     for name, links in of_tube.items():
         price = sum(link.price for link in links)
-        cuts = ", ".join(f"{1e3 * link.length:.1f}" for link in links)
-        kind = f"{material.name or 'custom material'}, " if material is not None else ""
-        yield Part(
-            part=name,
-            count=len(links),
-            price=price or None,
-            detail=f"{kind}cut to {cuts} mm",
-            price_source="price per kg of the space file" if price else "",
-        )
-
-
-def _column(arm: Arm) -> Iterator[Part]:
+        detail = f"{kind}cut to {', '.join(f'{1e3 * link.length:.1f}' for link in links)} mm"
+        source = "price per kg of the space file" if price else ""
+        yield Part(name, len(links), price=price or None, detail=detail, price_source=source)
     if arm.column is not None:
-        name = Tube(arm.column.outer_diameter, arm.column.wall).name
-        price = arm.column.price or None
-        detail = f"cut to {1e3 * arm.column.length:.1f} mm"
-        note = "price per metre of the space file" if price else ""
-        yield Part(f"column, tube {name} mm", 1, price, price, detail, price_source=note)
+        name = f"column, tube {Tube(arm.column.outer_diameter, arm.column.wall).name} mm"
+        price, detail = arm.column.price or None, f"cut to {1e3 * arm.column.length:.1f} mm"
+        yield Part(name, 1, price, price, detail, price_source="price per metre of the space file" if price else "")
 
 
 def _others(arm: Arm, space: DesignSpace) -> Iterator[Part]:

@@ -4,7 +4,7 @@ Each changed design is evaluated like any other, with the postures that suit it 
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from armwright.spaces.parameters import CategoricalParameter, Design, FloatParam
 
 LONGER = 0.01  # [m]
 ACTUATOR = "actuator"
-# Comparative, superlative, name of the part, and what a space may lack.
+# Of choices: comparative, superlative, name of the part, and what a space may lack.
 WORDS = {
     "tube": ("stiffer", "stiffest", "tube", "tube of a known material"),
     "motor": ("larger", "largest", ACTUATOR, "actuator"),
@@ -36,7 +36,6 @@ class Variation:
     change: str  # how
     params: Mapping[str, float | str] = field(default_factory=dict[str, float | str])  # the changed parameters
     impossible: str = ""  # why it cannot be changed so; empty if it can
-    is_priced: bool = True  # whether the price of what is changed is known
 
 
 def _price(evaluation: Evaluation) -> Array:
@@ -45,7 +44,13 @@ def _price(evaluation: Evaluation) -> Array:
     return (0.0 if drives is None else drives.price) + evaluation.arms.structure_price
 
 
-MEASURES: Sequence[Callable[[Evaluation], Array]] = (worst_error, deflection, backlash_error, mass, _price)
+MEASURES: Mapping[str, Callable[[Evaluation], Array]] = {  # by field of `Sensitivity`
+    "position_error": worst_error,
+    "deflection": deflection,
+    "backlash_error": backlash_error,
+    "mass": mass,
+    "price": _price,
+}
 
 
 def sensitivities(problem: Problem, design: Design) -> tuple[Sensitivity, ...]:
@@ -54,29 +59,21 @@ def sensitivities(problem: Problem, design: Design) -> tuple[Sensitivity, ...]:
     possible = [variation for variation in found if not variation.impossible]
     designs = [design, *(varied(problem.space, design, variation) for variation in possible)]
     evaluation = problem.physics(stack_arms([problem.arm(each) for each in designs]))
-    changes = [_changes(measure, evaluation) for measure in MEASURES]
+    changes = {name: _changes(measure, evaluation)[1:] for name, measure in MEASURES.items()}
     violations = problem.violations(evaluation)
-    lines: list[Sensitivity] = []
-    row = 0
-    for variation in found:
-        if variation.impossible:
-            lines.append(Sensitivity(variation.part, variation.change, variation.impossible))
-            continue
-        row += 1
-        error, sag, play, mass, price = (finite_or_none(column[row]) for column in changes)
-        broken = (violations[row] > ROUNDING) & (violations[0] <= ROUNDING)
-        line = Sensitivity(
+    broken = (violations[1:] > ROUNDING) & (violations[0] <= ROUNDING)
+    if not _states_prices(problem.space):  # of links; those of actuators are the catalogue's
+        changes["price"][[ACTUATOR not in variation.part for variation in possible]] = np.nan
+    lines = iter(
+        Sensitivity(
             part=variation.part,
             change=variation.change,
-            position_error=error,
-            deflection=sag,
-            backlash_error=play,
-            mass=mass,
-            price=price if variation.is_priced else None,
-            broken=tuple(c.description for c, one in zip(problem.constraints, broken, strict=True) if one),
+            **{name: finite_or_none(column[row]) for name, column in changes.items()},
+            broken=tuple(c.description for c, one in zip(problem.constraints, broken[row], strict=True) if one),
         )
-        lines.append(line)
-    return tuple(lines)
+        for row, variation in enumerate(possible)
+    )
+    return tuple(Sensitivity(v.part, v.change, v.impossible) if v.impossible else next(lines) for v in found)
 
 
 def varied(space: DesignSpace, design: Design, variation: Variation) -> Design:
@@ -86,17 +83,41 @@ def varied(space: DesignSpace, design: Design, variation: Variation) -> Design:
 
 def variations(space: DesignSpace, design: Design) -> Iterator[Variation]:
     """Yield the changes of each link, tube and actuator of a design."""
-    parameters = {parameter.name: parameter for parameter in space.parameters}
-    free = space.free_values(design)
-    material = space.link_section.material
-    has_price = material is not None and material.price_per_kg > 0.0
-    links = [
-        _longer(name, float(free[name]), parameters[name], _part(space, design, name, "link"))
-        for name in _of_kind(free, "link")
-    ]
-    tubes = _next(space, design, parameters, "tube", _tube_order(space))
-    yield from (replace(variation, is_priced=has_price) for variation in (*links, *tubes))
-    yield from _next(space, design, parameters, "motor", _motor_order(space))
+    for name in _of_kind(space, design, "link"):
+        part, parameter = _part(space, design, name, "link"), _parameter(space, name)
+        length, change = float(space.free_values(design)[name]), f"{1e3 * LONGER:+g} mm"
+        assert isinstance(parameter, FloatParameter)
+        if length + LONGER <= parameter.high:
+            yield Variation(part, change, {name: length + LONGER})
+        else:
+            reason = f"the space allows at most {1e3 * parameter.high:.4g} mm, it has {1e3 * length:.1f} mm"
+            yield Variation(part, change, impossible=reason)
+    stiffness = [(tube.bending_stiffness, tube.name) for tube in space.link_section.options]
+    yield from _next(space, design, "tube", [(ei, name) for ei, name in stiffness if ei is not None])
+    yield from _next(space, design, "motor", [(one.peak_torque, one.name) for one in space.arm_actuators])
+
+
+def _next(space: DesignSpace, design: Design, kind: str, choices: Sequence[tuple[float, str]]) -> Iterator[Variation]:
+    """Yield the next choice of each tube or actuator; choices: of the space, strength and name."""
+    word, most, title, what = WORDS[kind]
+    names = _of_kind(space, design, kind)
+    if not names:
+        stated = "one" if choices else "no"
+        yield Variation(f"each {title}", f"next {word}", impossible=f"the space names {stated} {what}")
+    strength = {name: value for value, name in choices}
+    for name in names:
+        parameter, own = _parameter(space, name), str(space.free_values(design)[name])
+        part = _part(space, design, name, title)
+        assert isinstance(parameter, CategoricalParameter)
+        stronger = [
+            (value, choice)
+            for value, choice in choices
+            if choice in parameter.choices and value > strength.get(own, np.inf)
+        ]
+        if stronger:
+            yield Variation(part, f"{own} → {min(stronger)[1]}", {name: min(stronger)[1]})
+        else:
+            yield Variation(part, f"next {word}", impossible=f"{own} is the {most} of the space")
 
 
 def _changes(measure: Callable[[Evaluation], Array], evaluation: Evaluation) -> Array:
@@ -108,8 +129,19 @@ def _changes(measure: Callable[[Evaluation], Array], evaluation: Evaluation) -> 
     return values - values[0]
 
 
-def _of_kind(free: Mapping[str, float | str], kind: str) -> list[str]:
-    return [name for name in free if name == kind or name.rpartition("_")[0] == kind]
+def _states_prices(space: DesignSpace) -> bool:
+    """Return whether the space states the price of its tubes."""
+    material = space.link_section.material
+    return material is not None and material.price_per_kg > 0.0
+
+
+def _parameter(space: DesignSpace, name: str) -> Parameter:
+    return next(parameter for parameter in space.parameters if parameter.name == name)
+
+
+def _of_kind(space: DesignSpace, design: Design, kind: str) -> list[str]:
+    """Return the free parameters KIND or KIND_1, KIND_2, … of a design."""
+    return [name for name in space.free_values(design) if name == kind or name.rpartition("_")[0] == kind]
 
 
 def _part(space: DesignSpace, design: Design, name: str, title: str) -> str:
@@ -126,49 +158,3 @@ def _part(space: DesignSpace, design: Design, name: str, title: str) -> str:
     changed = [joints[module] for module in modules if module in joints]
     numbers = [number for of_module in changed for number in (of_module if title == ACTUATOR else of_module[-1:])]
     return f"{title} {', '.join(map(str, numbers))}"
-
-
-def _longer(name: str, length: float, parameter: Parameter, part: str) -> Variation:
-    change = f"{1e3 * LONGER:+g} mm"
-    assert isinstance(parameter, FloatParameter)
-    if length + LONGER > parameter.high:
-        reason = f"the space allows at most {1e3 * parameter.high:.4g} mm, it has {1e3 * length:.1f} mm"
-        return Variation(part, change, impossible=reason)
-    return Variation(part, change, {name: length + LONGER})
-
-
-def _next(
-    space: DesignSpace,
-    design: Design,
-    parameters: Mapping[str, Parameter],
-    kind: str,
-    order: Sequence[tuple[float, str]],
-) -> Iterator[Variation]:
-    """Yield the next choice of each tube or actuator; order: strength and name of the choices."""
-    word, most, title, what = WORDS[kind]
-    free = space.free_values(design)
-    names = _of_kind(free, kind)
-    if not names:
-        stated = "no" if not order else "one"
-        yield Variation(f"each {title}", f"next {word}", impossible=f"the space names {stated} {what}")
-    for name in names:
-        parameter, own, part = parameters[name], str(free[name]), _part(space, design, name, title)
-        assert isinstance(parameter, CategoricalParameter)
-        strength = {choice: value for value, choice in order}
-        stronger = [
-            choice for value, choice in order if choice in parameter.choices and value > strength.get(own, np.inf)
-        ]
-        if stronger:
-            yield Variation(part, f"{own} → {stronger[0]}", {name: stronger[0]})
-        else:
-            reason = f"{own} is the {most} of the space"
-            yield Variation(part, f"next {word}", impossible=reason)
-
-
-def _tube_order(space: DesignSpace) -> list[tuple[float, str]]:
-    tubes = space.link_section.options
-    return sorted((tube.bending_stiffness, tube.name) for tube in tubes if tube.bending_stiffness is not None)
-
-
-def _motor_order(space: DesignSpace) -> list[tuple[float, str]]:
-    return sorted((actuator.peak_torque, actuator.name) for actuator in space.arm_actuators)

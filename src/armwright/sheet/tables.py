@@ -178,11 +178,8 @@ def _joint_row(sheet: DataSheet, joint: JointLine) -> tuple[str, ...]:
     factor, digits = (1e3, 1) if joint.kind == "prismatic" else (math.degrees(1.0), 0)
 
     def pair(values: tuple[float, float] | None, between: str) -> str:
-        return (
-            "–"
-            if values is None
-            else between.join(f"{round(factor * value, digits) + 0.0:.{digits}f}" for value in values)
-        )
+        shown = [f"{round(factor * value, digits) + 0.0:.{digits}f}" for value in values or ()]
+        return between.join(shown) or "–"
 
     def share(value: float | None) -> str:
         return "–" if value is None else f"{value:.0%}"

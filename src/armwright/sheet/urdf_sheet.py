@@ -2,25 +2,25 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.existing.existing_arm import ExistingArm
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.problem.assumptions import ALONG_CYCLE, describe_assumed
+from armwright.problem.assumptions import ALONG_CYCLE, assumed_of, describe_assumed
 from armwright.problem.facts import VOLTAGE, Fact, Facts, fact_of, reach_facts
 from armwright.problem.objectives import QUANTITIES
-from armwright.problem.over_reach import reach_lines
 from armwright.problem.problem import Problem
-from armwright.robot.actuators import ActuatorRecord, named_actuator, value_of
+from armwright.robot.actuators import ActuatorRecord, named_actuator
 from armwright.robot.arm import Arm, Joint
 from armwright.robot.mounting import Mounting
 from armwright.robot.urdf_reader import UrdfArm
-from armwright.sheet.arm_drawing import drawing_of, link_line
+from armwright.sheet.arm_lines import ASSUMED, arm_lines
 from armwright.sheet.joint_lines import joint_lines
-from armwright.sheet.parts import price_source
-from armwright.sheet.record import DataSheet, JointLine, MassLine, Part
+from armwright.sheet.parts import actuator_parts
+from armwright.sheet.record import DataSheet, JointLine, MassLine
 
 SAFETY_FACTOR = 1.5  # of torques, as that of designs by default
 NO_TASK = "an arm without a task"
@@ -87,50 +87,42 @@ def urdf_sheet(
     if price is not None and not 0.0 <= price < np.inf:
         raise SettingsError(f"price: expected a finite number of at least 0 USD, got {price:g}")
     actuators, arm = actuators or {}, described.arm
+    existing, payload, targets = None, 0.0, np.zeros((0, 3))
     if job is None:
         arm = replace(arm, safety_factor=SAFETY_FACTOR)
-        existing, payload, targets = None, 0.0, np.zeros((0, 3))
     else:
         existing = ExistingArm(job.problem, job.problem.physics(stack_arms([arm])), price)
         payload, targets = float(job.problem.task.payloads.max()), existing.evaluation.targets
-    over_reach = reach_lines(arm, payload)
-    sheet = DataSheet(
-        name=described.name,
+    lines = arm_lines(arm, payload, targets, described.values_in_arm(np.zeros(len(arm.joints))).tolist())
+    assumptions = _assumptions(described, actuators, arm.safety_factor, job)
+    if existing is not None and existing.undecided:
+        assumptions["constraints"] = f"unknown whether it meets {', '.join(existing.undecided)}"
+    if price is not None:
+        assumptions["price"] = "as stated by the user"
+    return DataSheet(
+        name=described.name if job is None else f"{described.name} on {job.problem.task.name}",
         design=None,
         joint_letters="",
-        facts={**_facts(arm, existing, price), **reach_facts(over_reach[-1])},
+        facts={**_facts(arm, existing, price), **reach_facts(lines["over_reach"][-1])},
         joints=_joints(described, existing),
-        links=tuple(link_line(arm, n) for n in range(1, len(arm.links) + 1)),
         masses=_masses(arm),
-        parts=_parts(actuators),
-        over_reach=over_reach,
-        drawing=drawing_of(arm, targets, described.values_in_arm(np.zeros(len(arm.joints))).tolist()),
-        assumptions=_assumptions(described, actuators, arm.safety_factor, job),
-        not_modelled="",
-    )
-    if existing is not None:
-        sheet = _on_task(sheet, existing)
-    if job is not None:
-        sheet = replace(sheet, base_position=job.mounting.position, base_yaw=job.mounting.yaw)
-    if price is not None:
-        sheet = replace(sheet, assumptions={**sheet.assumptions, "price": "as stated by the user"})
-    return sheet
-
-
-def _on_task(sheet: DataSheet, existing: ExistingArm) -> DataSheet:
-    """Return a data sheet with what an arm does on its task."""
-    objectives = existing.problem.objectives
-    assumptions = dict(sheet.assumptions)
-    if existing.undecided:
-        assumptions["constraints"] = f"unknown whether it meets {', '.join(existing.undecided)}"
-    return replace(
-        sheet,
+        parts=tuple(actuator_parts(list(actuators.values()))),
         assumptions=assumptions,
-        name=f"{sheet.name} on {existing.problem.task.name}",
-        violated=existing.violated,
-        objectives={o.name: (one, o.unit) for o, one in zip(objectives, existing.objectives, strict=True)},
-        payload=float(existing.problem.task.payloads.max()) or None,
+        not_modelled="",
+        **lines,
+        **({} if existing is None else _on_task(existing)),
+        **({} if job is None else {"base_position": job.mounting.position, "base_yaw": job.mounting.yaw}),
     )
+
+
+def _on_task(existing: ExistingArm) -> dict[str, Any]:
+    """Return what an arm does on its task, by field of a data sheet."""
+    objectives = zip(existing.problem.objectives, existing.objectives, strict=True)
+    return {
+        "violated": existing.violated,
+        "objectives": {objective.name: (value, objective.unit) for objective, value in objectives},
+        "payload": float(existing.problem.task.payloads.max()) or None,
+    }
 
 
 def _joints(described: UrdfArm, existing: ExistingArm | None) -> tuple[JointLine, ...]:
@@ -186,22 +178,6 @@ def _masses(arm: Arm) -> tuple[MassLine, ...]:
     return tuple(line for line in lines if line.mass > 0.0)
 
 
-def _parts(actuators: Mapping[str, ActuatorRecord]) -> tuple[Part, ...]:
-    records = list(actuators.values())
-    return tuple(
-        Part(
-            part=record.name,
-            count=records.count(record),
-            unit_price=record.price,
-            price=None if record.price is None else records.count(record) * record.price,
-            detail=f"{record.maker} {record.kind}".strip(),
-            source=record.source,
-            price_source=price_source(record),
-        )
-        for record in dict.fromkeys(records)
-    )
-
-
 def _facts(arm: Arm, existing: ExistingArm | None, price: float | None) -> Facts:
     """Return what is known of an arm; without a task, its mass and its price."""
     if existing is not None:
@@ -218,28 +194,16 @@ def _assumptions(
     described: UrdfArm, actuators: Mapping[str, ActuatorRecord], safety_factor: float, job: Job | None
 ) -> dict[str, str]:
     """Return what the values assume, by what they are about."""
-    found: dict[str, str] = {}
-    if job is not None:
-        found["place"] = job.place
+    named = ", or those of the named actuators, whose masses are included in those of the links" if actuators else ""
+    found = {} if job is None else {"place": job.place}
     found |= {
-        "reach": "horizontal distance of the tip from the first joint; the outlines show the farthest point found in "
-        "each of 72 directions around the base, without obstacles",
-        "over the reach": "the least favourable of all postures found, in directions in which the arm reaches nearly "
-        "as far as in any; the payload is a point at the tip",
-        "torques": f"with a safety factor of {safety_factor:g}; peaks are the efforts of the URDF"
-        + (", or those of the named actuators, whose masses are included in those of the links" if actuators else ""),
+        "reach": ASSUMED["reach"],
+        "over the reach": f"{ASSUMED['over the reach']}; the payload is a point at the tip",
+        "torques": f"with a safety factor of {safety_factor:g}; peaks are the efforts of the URDF{named}",
     }
     if described.notes:
         found["URDF"] = "; ".join(described.notes)
     entering = ENTERING if job is None or job.problem.task.cycle is None else (*ENTERING, *ALONG_CYCLE)
-    assumed = {record.name: _assumed(record, entering) for record in actuators.values()}
-    if any(assumed.values()):
-        shown = {name: values for name, values in assumed.items() if values}
-        found["actuators"] = f"defaults of their kind or estimates: {describe_assumed(shown)}"
+    if assumed := assumed_of(actuators.values(), entering):
+        found["actuators"] = f"defaults of their kind or estimates: {describe_assumed(assumed)}"
     return found
-
-
-def _assumed(record: ActuatorRecord, entering: Sequence[str]) -> dict[str, float]:
-    completed = record.completed()
-    values = {name: value_of(completed, name) for name in record.assumed if name in entering}
-    return {name: value for name, value in values.items() if value is not None}

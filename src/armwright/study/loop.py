@@ -323,5 +323,5 @@ class Study:
             proposer = None if self._proposer is None else self._proposer.summary()
             summary = summarize(history, config, proposer, verification)
             if folder is not None:
-                write_results(folder, history, summary, verification)
+                write_results(folder, history, config, summary, verification)
         return StudyResult(history, config, summary, None if folder is None else folder.path, resumed)

@@ -1,7 +1,7 @@
 // The table of targets: names, positions, tool directions, tolerances; points pasted from a spreadsheet.
 
 import { ask, change, complain, opened } from "./editor-document.js";
-import { button, choiceField, isNumber, length, list, numberField, record, redraw, removal, set, textField, unitName } from "./editor-fields.js";
+import { choiceField, isNumber, length, list, numberField, record, redraw, removal, set, textField, unitName } from "./editor-fields.js";
 import { $, element, plural } from "./format.js";
 
 const MOST_ROWS = 300; // a longer table would be slow

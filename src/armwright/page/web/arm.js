@@ -1,33 +1,30 @@
 // The selected arm in space, in one posture for each target.
 
 import { during } from "./cycle.js";
-import { describeMiss, postures, why } from "./design.js";
-import { PRISMATIC, chain, columnBody, length, motorBody, rail } from "./kinematics.js";
-import { arrow, ball, boxEdges, empty, floorParts, octahedra, rod, segments } from "./shapes.js";
+import { describeReason, postures } from "./design.js";
+import { FIXED, PRISMATIC, chain, columnBody, length, motorBody, rail } from "./kinematics.js";
+import { arrow, ball, boxEdges, empty, floorParts, rod, segments } from "./shapes.js";
 import { solidParts } from "./solids.js";
 import { Stage, frameOf } from "./stage.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, number, onTheme, shown } from "./format.js";
 
-const MOVE = 700; // [ms] from one posture to the next
-const REST = 500; // [ms] at a target while playing
+const REST = 1200; // [ms] at a target while playing
 const VIEW = [0.55, -1, 0.42]; // initial direction of the camera
 const PICTURE = [480, 320], BORDER = 0.12, CLOSEST = 2; // [px] of snapshots, what they leave free, and their largest zoom
 const FILLS = 0.8; // an arm smaller than this share of the frame's radius gets a new frame
 const ARROW = 0.16; // length of arrows, as a share of the frame's radius
 const SLACK = 0.2; // share of the frame's radius by which an arm may leave it before it grows
 
-const GROUPS = ["floor", "obstacles", "lines", "workspace", "targets", "goals", "ghost", "compared", "cloud", "arm"];
+const GROUPS = ["floor", "obstacles", "lines", "workspace", "targets", "goals", "ghost", "compared", "arm"];
 const [HIT, NOW] = ["#009E73", "#E69F00"]; // colours of targets
 
 let content = null;
 let stage = null, groups = {}; // null without 3D graphics
 let materials = {};
-let moving = null; // { from, to, began } in joint space
 let playing = false;
 let began = null; // time [ms] at which the played cycle began; null while not moving along one
 let onTheWay = false; // whether the arm moves along the cycle, so that it is at no target
-let cloud = null; // { points, colours, radius, corners } of points around the arm; null for none
 
 export function openArm(shownContent) {
   content = shownContent;
@@ -54,13 +51,11 @@ export function openArm(shownContent) {
     note.className = "note";
     note.textContent = "This browser shows no 3D graphics (WebGL). Everything else on this page works without.";
     $("arm").replaceChildren(note);
-    for (const id of ["ghost", "reset", "play", "reach-space"]) $(id).disabled = true;
+    for (const id of ["ghost", "reset", "play"]) $(id).disabled = true;
   }
   listen((changed) => {
     const isDriven = began !== null;
-    if (changed.has("target") && !changed.has("design")) {
-      if (!isDriven) move();
-    } else if (changed.has("design") || changed.has("compared")) drawArm();
+    if (changed.has("design") || changed.has("compared") || (changed.has("target") && !isDriven)) drawArm();
     if (changed.has("design") && playing && (isDriven || during(content.head, state.design, 0) !== null)) play(true);
     if (changed.size) describeTarget();
   });
@@ -71,10 +66,8 @@ export function openArm(shownContent) {
 // Returns a picture of a design as a data address; null without 3D graphics.
 export function snapshot(design) {
   if (!stage) return null;
-  const { renderer, camera, controls } = stage, kept = { ...state }, keptFrame = stage.frame, keptCloud = cloud;
+  const { renderer, camera, controls } = stage, kept = { ...state }, keptFrame = stage.frame;
   const way = camera.position.clone(), [width, height] = PICTURE;
-  cloud = null;
-  groups.cloud.visible = false;
   Object.assign(state, { design, compared: null, target: 0 });
   stage.frame = null;
   renderer.setPixelRatio(1);
@@ -88,8 +81,6 @@ export function snapshot(design) {
   const picture = stage.canvas.toDataURL();
   camera.zoom = 1;
   Object.assign(state, kept);
-  cloud = keptCloud;
-  groups.cloud.visible = true;
   stage.frame = null;
   stage.fit();
   drawArm();
@@ -101,45 +92,13 @@ export function snapshot(design) {
   return picture;
 }
 
-// Draws points around the arm, or removes them; the view stays while their corners do.
-export function drawCloud(shownCloud) {
-  if (!stage || (cloud === null && shownCloud === null)) return;
-  if (String(cloud?.corners) !== String(shownCloud?.corners)) stage.frame = null;
-  cloud = shownCloud;
-  empty(groups.cloud);
-  if (cloud !== null && cloud.points.length) groups.cloud.add(octahedra(cloud.points, cloud.radius, cloud.colours));
-  drawArm();
-}
-
-// Returns the number of drawn points around the arm; for tests.
-export const drawnPoints = () => groups.cloud.children.reduce((n, mesh) => n + mesh.geometry.attributes.position.array.length / 72, 0);
-
-// Returns the positions of the drawn joints; for tests.
-export function drawnJoints() {
-  return groups.arm.children.filter((mesh) => mesh.userData.joint !== undefined)
-    .map((mesh) => mesh.position.toArray());
-}
-
-// Returns the middles of the drawn motor bodies in the world; for tests.
-export function drawnMotors() {
-  return groups.arm.children.filter((mesh) => mesh.userData.motor).map((mesh) => [12, 13, 14].map((k) => mesh.matrix.elements[k]));
-}
-
-// Returns the middle and half the length of the drawn column in the world; null without one; for tests.
-export function drawnColumn() {
-  const mesh = groups.arm.children.find((part) => part.userData.column);
-  return mesh ? { centre: [12, 13, 14].map((k) => mesh.matrix.elements[k]), half: mesh.matrix.elements[6] / 2 } : null;
-}
-
-// Returns the corners of the drawn obstacles in the world; for tests.
-export function drawnObstacles() {
-  return groups.obstacles.children.map((part) => {
+// Returns the corners in the world of each drawn part of a kind, such as "joint"; for tests.
+export function drawn(kind) {
+  const parts = kind === "obstacle" ? groups.obstacles.children : groups.arm.children.filter((mesh) => mesh.userData.kind === kind);
+  return parts.map((part) => {
     part.updateMatrixWorld();
-    const { array } = part.geometry.attributes.position, corners = [];
-    for (let k = 0; k < array.length; k += 3) {
-      corners.push(new THREE.Vector3(array[k], array[k + 1], array[k + 2]).applyMatrix4(part.matrixWorld).toArray());
-    }
-    return corners;
+    const { array, count } = part.geometry.attributes.position;
+    return Array.from({ length: count }, (_, k) => new THREE.Vector3().fromArray(array, 3 * k).applyMatrix4(part.matrixWorld).toArray());
   });
 }
 
@@ -183,7 +142,7 @@ function legend() {
 
 // Returns the points of the selected design that must be visible: targets, and the arm in all postures.
 function extent() {
-  const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high]), ...(cloud?.corners ?? [])];
+  const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high])];
   for (const i of new Set([state.design, state.compared ?? state.design])) {
     const arm = content.arm(i), column = columnBody(arm);
     content.targets.forEach((_, t) => points.push(...chain(arm, content.q(i, t)).joints));
@@ -245,7 +204,7 @@ function drawTargets() {
 
 // Draws the required tool direction: an arrow along z, and for a full orientation also along x and y.
 function drawGoal(target, t) {
-  const { n_angular, rotation } = content.head.target_arrays, size = ARROW * stage.frame.radius;
+  const { n_angular, rotation } = content.head, size = ARROW * stage.frame.radius;
   if (!n_angular[t]) return;
   for (const k of n_angular[t] === 3 ? [0, 1, 2] : [2]) {
     const way = rotation[t].map((row) => row[k]), long = k === 2 ? size : 0.6 * size;
@@ -266,21 +225,21 @@ function drawPosture(group, arm, q, paints) {
     group.add(rod(joints[j], ends[j], radius, paints.link));
     if (arm.kind[j] === PRISMATIC) group.add(rod(...rail(arm, posed, q, j), 0.5 * radius, paints.base));
     const along = axes[j].map((v) => v * 1.25 * wide);
-    const joint = rod(joints[j].map((v, k) => v - along[k]), joints[j].map((v, k) => v + along[k]), wide, paints.joints[arm.axis[j]]);
-    joint.userData.joint = j;
+    const joint = rod(joints[j].map((v, k) => v - along[k]), joints[j].map((v, k) => v + along[k]), wide, arm.kind[j] === FIXED ? paints.link : paints.joints[arm.axis[j]]);
+    joint.userData.kind = "joint";
     joint.position.set(...joints[j]);
     group.add(joint);
     const body = motorBody(arm, posed, j);
     if (body) {
       const [mesh, ...edges] = solidParts(body, stage.frame, paints.motors[arm.axis[j]]);
-      mesh.userData.motor = true;
+      mesh.userData.kind = "motor";
       group.add(mesh, ...edges);
     }
   }
   const column = columnBody(arm);
   if (column) {
     const [mesh, ...edges] = solidParts(column, stage.frame, paints.column);
-    mesh.userData.column = true;
+    mesh.userData.kind = "column";
     group.add(mesh, ...edges);
   }
   const radius = thick(arm, 0);
@@ -288,13 +247,12 @@ function drawPosture(group, arm, q, paints) {
   group.add(rod(behind(2.05 * radius), behind(1.15 * radius), 2.4 * radius, paints.base));
   if (length(arm.tip) > 0) group.add(rod(ends.at(-1), joints.at(-1), 0.6 * radius, paints.base));
   const tip = ball(joints.at(-1), 1.15 * radius, paints.link);
-  tip.userData.joint = q.length;
+  tip.userData.kind = "joint";
   group.add(tip);
   return joints.at(-1);
 }
 
 export function drawArm() {
-  moving = null;
   if (!stage || state.design === null) return;
   reframe();
   const arm = content.arm(state.design), posed = postures(state.design);
@@ -333,44 +291,11 @@ function gap(tip) {
   groups.arm.add(line);
 }
 
-// Animates the joints from the drawn posture to that of the selected target.
-function move() {
-  if (!stage || state.design === null) return;
-  const to = Array.from(content.q(state.design, state.target));
-  const from = moving?.now ?? moving?.to ?? lastPosture ?? to;
-  lastPosture = to;
-  if (isStill()) {
-    drawArm();
-    return;
-  }
-  moving = { from, to, began: performance.now(), now: from };
-  requestAnimationFrame(tick);
-}
-
-const isStill = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
-
-let lastPosture = null;
-
-function tick(now) {
-  if (moving === null) return;
-  const share = Math.min(1, Math.max(0, (now - moving.began) / MOVE)), eased = share * share * (3 - 2 * share);
-  moving.now = moving.from.map((v, j) => v + eased * (moving.to[j] - v));
-  if (share >= 1) {
-    drawArm();
-    return;
-  }
-  gap(drawPosture(groups.arm, content.arm(state.design), moving.now, materials));
-  stage.render();
-  requestAnimationFrame(tick);
-}
-
 function step(by) {
   if (state.design === null) return;
   if (began !== null) play(false);
   const n = content.targets.length;
-  lastPosture = Array.from(content.q(state.design, state.target));
   set({ target: (state.target + by + n) % n });
-  if (n === 1) move();
 }
 
 let beat = null;
@@ -386,11 +311,11 @@ function play(on) {
   $("play").setAttribute("aria-pressed", on);
   $("play").textContent = on ? "Stop" : "Play";
   if (!on) drawArm();
-  else if (during(content.head, state.design, 0) !== null && !isStill()) {
+  else if (during(content.head, state.design, 0) !== null && !matchMedia("(prefers-reduced-motion: reduce)").matches) {
     began = performance.now();
     requestAnimationFrame(drive);
   } else {
-    beat = setInterval(() => step(1), MOVE + REST);
+    beat = setInterval(() => step(1), REST);
     step(1);
   }
 }
@@ -419,7 +344,7 @@ function describeTarget() {
   if (i === null) return;
   const one = postures(i)[state.target], n = content.targets.length;
   $("arm-title").textContent = `#${i} ${content.joints(i)}`;
-  const verdict = one.missed ? `missed by ${describeMiss(one)}: ${why(content.arm(i), one)}` : "reached", which = `${state.target + 1} of ${n}`;
+  const verdict = one.missed ? `missed by ${describeReason(one)}` : "reached", which = `${state.target + 1} of ${n}`;
   $("target-note").textContent = onTheWay ? `To target ${which}` : `Target ${which}: ${verdict}`;
   $("target-note").className = one.missed ? "missed" : "";
   $("compare").setAttribute("aria-pressed", state.compared !== null);

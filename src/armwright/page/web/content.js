@@ -4,6 +4,9 @@ const VIEWS = {
   uint8: Uint8Array, int32: Int32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
 };
 
+const OF_ARM = ["base", "up", "tip", "tool_axis", "tool_side", "column_half"];
+const OF_JOINTS = ["motion", "lower", "upper", "offset", "radius", "body_shape", "body_half", "body_centre"];
+
 // A JSON head, and arrays that are views of the bytes (see page/content.py, pack).
 export function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
@@ -108,16 +111,17 @@ export class Content {
     return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
   }
 
+  // What is drawn of a design: `kind` (kinematics.js) and `axis` of each joint, and its parts of these arrays.
   arm(i) {
-    const arm = {}, n = this._part("joints", i)[0];
-    for (const name of ["base", "up", "tip", "tool_axis", "tool_side", "payload_center"]) arm[name] = this._part(name, i);
-    for (const name of ["kind", "axis", "lower", "upper", "travel", "mass", "radius"]) arm[name] = this._part(name, i).subarray(0, n);
-    for (const name of ["offset", "com"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
-    if (this.head.arrays.body_shape) {
-      arm.body_shape = this._part("body_shape", i).subarray(0, n);
-      for (const name of ["body_half", "body_centre"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
+    const arrays = this._chunks[this._chunk[i]], [, room] = arrays.motion.shape, n = this._part("joints", i)[0], arm = {};
+    for (const name of OF_ARM) if (name in arrays) arm[name] = this._part(name, i);
+    for (const name of OF_JOINTS) {
+      if (!(name in arrays)) continue;
+      const part = this._part(name, i);
+      arm[name] = part.subarray(0, (n * part.length) / room);
     }
-    if (this.head.arrays.column_half) arm.column_half = this._part("column_half", i);
+    arm.kind = Array.from(arm.motion, (motion) => Math.floor(motion / 3));
+    arm.axis = Array.from(arm.motion, (motion) => motion % 3);
     return arm;
   }
 

@@ -1,9 +1,8 @@
 // The hypervolume over the iterations, and the gain of each source.
 
 import { set } from "./state.js";
-import { $, colour, element, isTouched, number, onTheme, percent, plain } from "./format.js";
-
-const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
+import { axis, marker, onClick, plot } from "./plot.js";
+import { $, colour, element, number, onTheme, percent, plain } from "./format.js";
 
 let content = null;
 
@@ -11,10 +10,7 @@ export function openCurve(shownContent) {
   content = shownContent;
   $("curve-box").hidden = false;
   drawCurve();
-  $("curve").on("plotly_click", ({ points }) => {
-    const hit = points.find((point) => point.customdata !== undefined);
-    if (hit) set({ design: hit.customdata });
-  });
+  onClick("curve", (design) => set({ design }));
   onTheme(drawCurve);
 }
 
@@ -25,24 +21,18 @@ export function drawCurve() {
   const traces = search ? ofSearch(search) : ofStudy();
   const best = content.head.best_known;
   const layout = {
-    xaxis: {
-      title: { text: search ? "Designs evaluated" : content.head.is_study ? `Iteration (after ${content.nInit} random designs)` : "Designs of the front", standoff: 6 },
-      type: search ? "log" : "linear", gridcolor: colour("grid"), zeroline: false, linecolor: colour("line"), showline: true,
-    },
-    yaxis: {
-      title: { text: "Hypervolume", standoff: 8 }, rangemode: "tozero", gridcolor: colour("grid"), zeroline: false,
-      linecolor: colour("line"), showline: true,
-    },
+    xaxis: axis(search ? "Designs evaluated" : content.head.is_study ? `Iteration (after ${content.nInit} random designs)` : "Designs of the front",
+      { type: search ? "log" : "linear" }),
+    yaxis: axis("Hypervolume", { rangemode: "tozero" }),
     shapes: best === null ? [] : [{
       type: "line", xref: "paper", x0: 0, x1: 1, y0: best, y1: best,
       line: { color: colour("missed"), width: 1.2, dash: "dash" },
       label: { text: `best known ${number(best)}`, textposition: "start", font: { color: colour("missed"), size: 11 }, yanchor: "bottom" },
     }],
-    margin: { l: 58, r: 12, t: 14, b: 42 }, showlegend: false, hovermode: "closest", dragmode: isTouched() ? false : "pan",
-    paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { color: colour("ink"), size: 13 },
+    showlegend: false,
   };
   if (best !== null) layout.yaxis.range = [0, 1.08 * Math.max(best, ...content.curve.slice(-1))];
-  Plotly.react($("curve"), traces, layout, { displaylogo: false, responsive: true, displayModeBar: false });
+  plot("curve", traces, layout);
   gains();
 }
 
@@ -59,10 +49,7 @@ function ofStudy() {
       x: hits.map((i) => i - first + 1), y: hits.map((i) => curve[i]), customdata: hits, mode: "markers",
       text: hits.map((i) => plain(`#${i} ${content.joints(i)}: +${number(curve[i] - (curve[i - 1] ?? 0), 3)}`)),
       hovertemplate: `%{text}<extra>${plain(look.label)}</extra>`,
-      marker: {
-        symbol: SYMBOLS[look.marker] ?? "circle", color: look.colour, size: 8,
-        line: { width: look.marker === "x" ? 1.5 : 0.6, color: look.marker === "x" ? look.colour : colour("paper") },
-      },
+      marker: marker(look),
     });
   }
   return traces;

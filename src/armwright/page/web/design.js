@@ -1,10 +1,11 @@
 // The selected design in numbers, and as files.
 
-import { angleOff, chain, distance, holding, length, linkLength, reach } from "./kinematics.js";
+import { FIXED, angleOff, chain, distance, length, linkLength } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
 import { $, element, metres, millimetres, number, quantity, save } from "./format.js";
 
 const AT_LIMIT = 1e-3; // rad or m
+const ONLY_FRONT = "Torques are stated of the designs of the front";
 const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv", datasheet: "text/html" };
 const ENDINGS = { urdf: "urdf", mjcf: "xml", csv: "csv", datasheet: "datasheet.html" };
 
@@ -25,37 +26,30 @@ export function openDesign(shownContent, fetched) {
   drawDesign();
 }
 
-// A design at every target: error [m], angle [rad] (null if none is required), whether it is missed, joint values,
-// what holds each joint.
+// A design at every target: joint values, error [m], angle [rad] (null if none is required), whether it is missed; of a
+// design of the front also what holds each joint, and why it misses.
 export function postures(i) {
-  const arm = content.arm(i), { n_angular, rotation, tolerance, angle_tolerance } = content.head.target_arrays;
+  const arm = content.arm(i), known = content.head.postures[i], { n_angular, rotation, tolerance, angle_tolerance } = content.head;
   return content.targets.map((target, t) => {
     const q = content.q(i, t), posed = chain(arm, q), error = distance(posed.joints.at(-1), target);
     const angle = n_angular[t] ? angleOff(posed.tool, rotation[t].flat(), n_angular[t] === 3) : null;
     const missed = error >= tolerance[t] || (angle ?? 0) >= angle_tolerance[t];
-    return { target, q, ...posed, error, angle, missed, torques: holding(arm, posed, content.head.payloads[t]) };
+    return { target, q, ...posed, error, angle, missed, ...known?.[t] };
   });
 }
 
-// By how much a target is missed.
-export function describeMiss(one) {
+// By how much a target is missed, and why if that is known.
+export const describeReason = (one) => one.reason ?? describeMiss(one);
+
+function describeMiss(one) {
   return one.angle === null ? millimetres(one.error) : `${millimetres(one.error)}, ${degrees(one.angle)}`;
 }
 
 const degrees = (angle) => `${number((180 * angle) / Math.PI, 3)}°`;
 
-// Why a target is missed: as problem/unreached_reason.py has it.
-export function why(arm, one) {
-  const beyond = distance(one.target, arm.base) - reach(arm);
-  const reasons = beyond > 0 ? [`out of reach by ${millimetres(beyond)}`] : [];
-  for (let j = 0; j < one.q.length; j++) {
-    const side = arm.kind[j] < 2 ? at(arm, one.q, j) : "";
-    if (side) reasons.push(`joint ${j + 1} at its ${side} limit`);
-  }
-  return reasons.join(", ") || "no better posture was found";
-}
-
+// The limit that a joint is at; empty for none.
 function at(arm, q, j) {
+  if (arm.kind[j] === FIXED) return "";
   if (q[j] >= arm.upper[j] - AT_LIMIT) return "upper";
   return q[j] <= arm.lower[j] + AT_LIMIT ? "lower" : "";
 }
@@ -137,7 +131,7 @@ function drawLinks(arm) {
     const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves} at first)` },
       `${letter} ${millimetres(long)}`);
     bar.style.flex = `${1e6 * Math.max(long, 1e-6)} 1 0`;
-    bar.style.background = joint["xyz"[axis]];
+    bar.style.background = arm.kind[j] === FIXED ? content.head.colours.infeasible : joint["xyz"[axis]];
     return bar;
   }));
 }
@@ -159,19 +153,20 @@ function drawPostures(arm, posed) {
   },
   element("td", {}, String(t + 1)),
   element("td", { class: "text" }, one.target.map((v) => number(v, 3)).join(", ")),
-  element("td", { class: one.missed ? "missed" : "", title: one.missed ? why(arm, one) : null }, one.missed ? describeMiss(one) : "reached"),
-  element("td", { title: one.torques.map((v, j) => `joint ${j + 1}: ${number(v, 3)} N m`).join("\n") }, describeLargest(one.torques)),
+  element("td", { class: one.missed ? "missed" : "", title: one.missed ? describeReason(one) : null }, one.missed ? describeMiss(one) : "reached"),
+  element("td", { title: one.torques?.map((v, j) => `joint ${j + 1}: ${number(v, 3)} N m`).join("\n") ?? ONLY_FRONT }, describeLargest(one.torques)),
   ...joints.map((j) => {
     const side = at(arm, one.q, j);
     return element("td", {}, element("span", { class: side ? "limit" : "", title: side ? `at its ${side} limit` : null }, one.q[j].toFixed(3).replace(/^-(?=[0.]+$)/, "")));
   })));
   const limits = element("tr", {}, element("td", { class: "text", colspan: "4" }, "limits"),
-    ...joints.map((j) => element("td", {}, `${number(arm.lower[j], 3)}…${number(arm.upper[j], 3)}`)));
+    ...joints.map((j) => element("td", {}, arm.kind[j] === FIXED ? "–" : `${number(arm.lower[j], 3)}…${number(arm.upper[j], 3)}`)));
   $("postures").replaceChildren(element("thead", {}, head), element("tbody", {}, ...rows), element("tfoot", {}, limits));
   mark();
 }
 
 function describeLargest(torques) {
+  if (!torques) return "–";
   const largest = torques.reduce((best, v, j) => (Math.abs(v) > Math.abs(torques[best]) ? j : best), 0);
   return `${number(Math.abs(torques[largest]), 3)} (joint ${largest + 1})`;
 }
@@ -221,9 +216,10 @@ export async function downloadOf(i, format) {
 
 function asCsv(i) {
   const arm = content.arm(i), joints = [...arm.axis.keys()].map((j) => j + 1);
-  const { oriented } = content.head.target_arrays;
-  const head = ["target", "x", "y", "z", "position_error", ...(oriented ? ["angle_error"] : []), "torque_norm",
-    ...joints.map((j) => `q_${j}`), ...joints.map((j) => `torque_${j}`)];
-  const rows = postures(i).map((one, t) => [t + 1, ...one.target, one.error, ...(oriented ? [one.angle ?? ""] : []), length(one.torques), ...one.q, ...one.torques]);
+  const { is_oriented } = content.head, posed = postures(i), hasTorques = Boolean(posed[0].torques);
+  const head = ["target", "x", "y", "z", "position_error", ...(is_oriented ? ["angle_error"] : []), ...(hasTorques ? ["torque_norm"] : []),
+    ...joints.map((j) => `q_${j}`), ...(hasTorques ? joints.map((j) => `torque_${j}`) : [])];
+  const rows = posed.map((one, t) => [t + 1, ...one.target, one.error, ...(is_oriented ? [one.angle ?? ""] : []),
+    ...(hasTorques ? [length(one.torques)] : []), ...one.q, ...(one.torques ?? [])]);
   return [head, ...rows].map((row) => row.join(",")).join("\n") + "\n";
 }

@@ -22,7 +22,7 @@ export function drawExisting() {
   const rows = [...recommended.map(ofDesign), ...arms.map(ofArm)];
   const names = [...new Set([...content.objectives.map(({ name }) => name), ...content.head.asked])];
   const columns = names.filter((name) => rows.some((row) => isKnown(row.values[name])))
-    .map((name) => ({ name, more: MORE.includes(name), ...content.objectives.find((one) => one.name === name), ...quantities[name] }));
+    .map((name) => ({ name, more: MORE.includes(name), ...content.objectives.find((one) => one.name === name), ...quantities[name], ...rows.find((row) => name in row.facts)?.facts[name] }));
   const best = new Map(columns.map((column) => [column.name, bestOf(column, rows)]));
   const heads = columns.map(({ label, description }) => element("th", {}, label, why(label, description)));
   $("existing").replaceChildren(
@@ -39,11 +39,12 @@ export function drawExisting() {
 const isKnown = (value) => value !== null && value !== undefined;
 
 function ofDesign({ design, facts }) {
-  return { name: `#${design} ${content.joints(design)}`, design, verdict: "meets all constraints", ...known(facts, content.values(design)) };
+  return { name: `#${design} ${content.joints(design)}`, design, facts, verdict: "meets all constraints", ...known(facts, content.values(design)) };
 }
 
-function ofArm({ name, facts, values, violated, dominance }) {
-  return { name, violated, verdict: describeDominance({ violated, dominance, values }), ...known(facts, values) };
+function ofArm(arm) {
+  const { name, facts, values, violated } = arm;
+  return { name, violated, facts, verdict: describeDominance(arm), ...known(facts, values) };
 }
 
 // Values and texts of the facts, and the values of the objectives, by name.
@@ -70,13 +71,17 @@ function tableRow({ name, values, texts, design, violated, verdict }, columns, b
     element("td", { class: `text wrap${violated?.length ? " missed" : ""}` }, verdict));
 }
 
-export function describeDominance({ violated, dominance, values }) {
+// Whether one arm is worse than another in no objective and better in one.
+const dominates = (one, other) => one.every((v, k) => v <= other[k]) && one.some((v, k) => v < other[k]);
+
+export function describeDominance({ violated, values }) {
   if (violated.length) return `violates ${violated.join(", ")}`;
   const unknown = content.objectives.filter((_, k) => values[k] === null).map(({ label }) => label.toLowerCase());
   if (unknown.length) return `not comparable with the front: ${unknown.join(", ")} unknown`;
-  if (dominance === null) return "not comparable: there is no front";
-  const [worse, better] = dominance;
-  return `dominates ${plural(worse, "design")} of the front, dominated by ${better}`;
+  const front = content.head.front.map((i) => content.values(i));
+  if (!front.length) return "not comparable: there is no front";
+  const worse = front.filter((other) => dominates(values, other)).length;
+  return `dominates ${plural(worse, "design")} of the front, dominated by ${front.filter((other) => dominates(other, values)).length}`;
 }
 
 function mark() {

@@ -1,8 +1,8 @@
-// Forward kinematics and static torques: the formulas of armwright/kinematics in double precision.
+// Where the parts of an arm are in a posture.
 
-const GRAVITY = 9.81; // m/s², along -z
 const REVOLUTE = 0;
 export const PRISMATIC = 1;
+export const FIXED = 2;
 
 const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -23,10 +23,10 @@ function rotated(m, k, angle) {
 }
 
 // joints: positions of the joints and, last, of the tip [m]; ends: of the links; axes: of the joints, in the world;
-// centres: of mass; mounts: frame of the link before each joint, and the joint at displacement 0; payload: its centre of mass; tool: its own x, y and z in the world.
+// mounts: frame of the link before each joint, and the joint at displacement 0; tool: its own x, y and z in the world.
 export function chain(arm, q) {
   let frame = [1, 0, 0, 0, 1, 0, 0, 0, 1], place = Array.from(arm.base);
-  const joints = [], ends = [], axes = [], centres = [], mounts = [];
+  const joints = [], ends = [], axes = [], mounts = [];
   for (let j = 0; j < q.length; j++) {
     const axis = column(frame, arm.axis[j]);
     axes.push(axis);
@@ -34,28 +34,11 @@ export function chain(arm, q) {
     if (arm.kind[j] === PRISMATIC) place = add(place, axis.map((v) => v * q[j]));
     joints.push(place);
     if (arm.kind[j] === REVOLUTE) frame = rotated(frame, arm.axis[j], q[j]);
-    centres.push(add(place, turned(frame, at(arm.com, j))));
     place = add(place, turned(frame, at(arm.offset, j)));
     ends.push(place);
   }
   const [x, z] = [turned(frame, arm.tool_side), turned(frame, arm.tool_axis)];
-  const tip = add(place, turned(frame, arm.tip)), payload = add(tip, turned(frame, arm.payload_center));
-  return { joints: [...joints, tip], ends, axes, centres, mounts, payload, tool: [x, cross(z, x), z] };
-}
-
-// Returns the joint torques [N m] that hold the arm and its payload [kg] against gravity.
-export function holding(arm, posed, payload) {
-  const { joints, axes } = posed;
-  const loads = [...posed.centres.map((place, k) => [arm.mass[k], place]), [payload, posed.payload]];
-  return axes.map((a, i) => {
-    if (arm.kind[i] > PRISMATIC) return 0;
-    let sum = 0;
-    for (const [mass, place] of loads.slice(i)) {
-      const [x, y] = [place[0] - joints[i][0], place[1] - joints[i][1]];
-      sum += mass * GRAVITY * (arm.kind[i] === REVOLUTE ? a[0] * y - a[1] * x : a[2]);
-    }
-    return sum * arm.travel[i];
-  });
+  return { joints: [...joints, add(place, turned(frame, arm.tip))], ends, axes, mounts, tool: [x, cross(z, x), z] };
 }
 
 // Returns the ends of a prismatic joint's rail in a posture.
@@ -89,15 +72,6 @@ export function angleOff(tool, frame, isWhole) {
   if (!isWhole) return Math.atan2(length(cross(tool[2], goal[2])), dot(tool[2], goal[2]));
   const skew = tool.map((axis, k) => cross(axis, goal[k])).reduce(add); // 2 sin(angle) times the axis of rotation
   return Math.atan2(length(skew), tool.reduce((sum, axis, k) => sum + dot(axis, goal[k]), -1));
-}
-
-// Returns the largest possible distance of the tip from the first joint [m].
-export function reach(arm) {
-  let sum = length(arm.tip);
-  for (let j = 0; j < arm.kind.length; j++) {
-    sum += linkLength(arm, j) + (arm.kind[j] === PRISMATIC ? Math.max(Math.abs(arm.lower[j]), Math.abs(arm.upper[j])) : 0);
-  }
-  return sum;
 }
 
 export const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);

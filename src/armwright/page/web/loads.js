@@ -1,7 +1,8 @@
 // Torque and speed of each joint of a recommended design along the cycle, as shares of their limits.
 
 import { listen, state } from "./state.js";
-import { $, colour, isTouched, number, onTheme, plain } from "./format.js";
+import { axis, plot } from "./plot.js";
+import { $, colour, number, onTheme, plain } from "./format.js";
 
 const PAINTS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B", "#7F7F7F"];
 
@@ -37,16 +38,11 @@ export function drawLoads() {
   }));
   const line = (y) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: colour("missed"), width: 1.2, dash: "dash" } });
   const layout = {
-    xaxis: { title: { text: "Time [s]", standoff: 6 }, gridcolor: colour("grid"), zeroline: false, linecolor: colour("line"), showline: true },
-    yaxis: {
-      title: { text: kind === "torque" ? "Torque [% of peak]" : "Speed [% of no-load]", standoff: 8 }, range: [-108, 108],
-      gridcolor: colour("grid"), zerolinecolor: colour("line"), linecolor: colour("line"), showline: true,
-    },
-    shapes: [line(100), line(-100)], margin: { l: 58, r: 12, t: 8, b: 42 }, legend: { orientation: "h", y: -0.22, font: { size: 12 } },
-    hovermode: "closest", dragmode: isTouched() ? false : "pan",
-    paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { color: colour("ink"), size: 13 },
+    xaxis: axis("Time [s]"),
+    yaxis: axis(kind === "torque" ? "Torque [% of peak]" : "Speed [% of no-load]", { range: [-108, 108], zeroline: true, zerolinecolor: colour("line") }),
+    shapes: [line(100), line(-100)], legend: { orientation: "h", y: -0.22, font: { size: 12 } },
   };
-  Plotly.react($("loads"), traces, layout, { displaylogo: false, responsive: true, displayModeBar: false });
+  plot("loads", traces, layout);
   const most = values.map((row, j) => `${j + 1}: ${number(Math.max(...row.map(Math.abs)), 3)} of ${limits[j] === null ? "an unknown limit" : number(limits[j], 3)} ${unit(j)}`);
   const rated = kind === "torque" ? loads.continuous.map((value, j) => (value === null ? null : `${j + 1}: ${number(value, 3)}`)).filter((text) => text !== null) : [];
   const forever = rated.length ? ` Torque that can be held forever, by joint: ${rated.join("; ")}.` : "";

@@ -1,6 +1,6 @@
 // Opens the page with its embedded content or with that of its server.
 
-import { drawArm, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawnPoints, openArm, snapshot } from "./arm.js";
+import { drawArm, drawn, openArm, snapshot } from "./arm.js";
 import { Content, embedded } from "./content.js";
 import { drawCurve, openCurve } from "./curve.js";
 import { during } from "./cycle.js";
@@ -29,7 +29,9 @@ function begin() {
 }
 
 function open() {
+  const { task, seed } = content.head.config;
   isOpen = true;
+  if ($("content")) document.title = `${task.name}, seed ${seed}: armwright`;
   arrange(content.head);
   openHeader(content);
   openCurve(content);
@@ -98,5 +100,5 @@ async function start() {
 }
 
 // For the console and for tests.
-window.armwright = { content, state, set, postures, during, drawnColumn, drawnJoints, drawnMotors, drawnObstacles, drawnPoints, drawArm, snapshot };
+window.armwright = { content, state, set, postures, during, drawn, drawArm, snapshot };
 start();

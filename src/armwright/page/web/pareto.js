@@ -2,9 +2,9 @@
 
 import { describeDominance } from "./existing.js";
 import { listen, set, state } from "./state.js";
-import { $, colour, element, isTouched, number, onTheme, plain, plural, title } from "./format.js";
+import { axis, marker, onClick, plot } from "./plot.js";
+import { $, colour, element, number, onTheme, plain, plural, title } from "./format.js";
 
-const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
 const VIEW = 1.35; // initial range of the axes, as a multiple of the reference point
 const FAR = 2; // times the largest value; an axis does not reach to a reference point beyond
 const FITTED = 1.1; // range of such an axis, as a multiple of the largest value
@@ -13,10 +13,7 @@ const PRECISE = 0.02; // errors below this share of the axis count as precise
 const FLOOR = 1e-4; // [m] smaller errors are drawn here on a logarithmic axis; on a short one, at this share of it
 const DENSE = 100; // from this number of designs on a front, markers have no outlines
 const MARKS = [0.05, 0.35, 0.65, 1]; // shares of the iterations: 10, 70, 130, 200 of 200
-const CONFIG = {
-  displaylogo: false, responsive: true, plotlyServerURL: "",
-  modeBarButtons: [["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
-};
+const CONFIG = { plotlyServerURL: "", modeBarButtons: [["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]] };
 
 let content = null;
 let x = 0, y = 1, log = false, floor = FLOOR;
@@ -47,10 +44,7 @@ export function openPareto(shownContent) {
   $("ring-compared").style.borderColor = content.head.colours.target;
   mark();
   for (const event of ["plotly_relayout", "plotly_relayouting", "plotly_afterplot"]) $("pareto").on(event, mark);
-  $("pareto").on("plotly_click", ({ points }) => {
-    const hit = points.find((point) => point.customdata !== undefined);
-    if (hit) set({ design: hit.customdata });
-  });
+  onClick("pareto", (design) => set({ design }));
   listen((changed) => {
     if (changed.has("iteration")) draw();
     else if (changed.has("design") || changed.has("compared")) mark();
@@ -156,12 +150,7 @@ function draw() {
   const infeasible = [...Array(n).keys()].filter((i) => !content.isFeasible(i) && !content.hasFailed(i));
   if (infeasible.length) {
     traces.push({
-      x: infeasible.map((i) => placed(content.values(i)[x], 0)),
-      y: infeasible.map((i) => content.values(i)[y]),
-      customdata: infeasible,
-      text: infeasible.map((i) => plain(`#${i} ${content.joints(i)}`)),
-      hovertemplate: `%{text}<br>%{x:.4g}, %{y:.4g}<extra>infeasible</extra>`,
-      mode: "markers", name: "infeasible",
+      ...points(infeasible), hovertemplate: "%{text}<br>%{x:.4g}, %{y:.4g}<extra>infeasible</extra>", name: "infeasible",
       marker: { symbol: "circle-open", color: content.head.colours.infeasible, size: 7, line: { width: 1 } },
     });
   }
@@ -170,21 +159,11 @@ function draw() {
     for (let i = 0; i < n; i++) if (content.source(i) === source && content.isFeasible(i)) rows.push(i);
     if (!rows.length) continue;
     traces.push({
-      x: rows.map((i) => placed(content.values(i)[x], 0)),
-      y: rows.map((i) => content.values(i)[y]),
-      customdata: rows,
-      text: rows.map((i) => plain(`#${i} ${content.joints(i)}`)),
-      hovertemplate: `%{text}<br>%{x:.4g}, %{y:.4g}<extra>${plain(look.label)}</extra>`,
-      mode: "markers",
-      name: plain(look.label),
+      ...points(rows), hovertemplate: `%{text}<br>%{x:.4g}, %{y:.4g}<extra>${plain(look.label)}</extra>`, name: plain(look.label),
       marker: {
-        symbol: SYMBOLS[look.marker] ?? "circle", color: look.colour,
+        ...marker(look, front.length > DENSE ? 0 : 0.6),
         size: rows.map((i) => (onFront.has(i) ? 10 : isProposer(source) ? 9 : 7)),
         opacity: rows.map((i) => (onFront.has(i) ? 1 : isProposer(source) ? 0.9 : 0.55)),
-        line: {
-          width: look.marker === "x" ? 1.5 : front.length > DENSE ? 0 : 0.6,
-          color: look.marker === "x" ? look.colour : colour("paper"),
-        },
       },
     });
   }
@@ -210,15 +189,13 @@ function draw() {
   }
   const low = Math.max(floor, Math.min(...inside.map((i) => content.values(i)[x]), high(x) ?? 1));
   const layout = {
-    xaxis: axis(content.objectives[x], log ? [Math.log10(low / 1.5), Math.log10(high(x) ?? 10)] : ranges.get(x), log),
-    yaxis: axis(content.objectives[y], ranges.get(y), false),
-    margin: { l: 58, r: 12, t: 8, b: 46 },
+    xaxis: log ? logarithmic([Math.log10(low / 1.5), Math.log10(high(x) ?? 10)]) : axis(title(content.objectives[x]), { range: ranges.get(x) }),
+    yaxis: axis(title(content.objectives[y]), { range: ranges.get(y) }),
     legend: { orientation: "h", y: -64 / Math.max(100, $("pareto").clientHeight - 54), font: { size: 12 } },
-    paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { color: colour("ink"), size: 13 },
     modebar: { bgcolor: "transparent", color: colour("soft"), activecolor: colour("accent") },
-    hovermode: "closest", uirevision: `${x} ${y} ${log}`, dragmode: isTouched() ? false : "pan",
+    uirevision: `${x} ${y} ${log}`,
   };
-  Plotly.react($("pareto"), traces, layout, CONFIG);
+  plot("pareto", traces, layout, CONFIG);
   const outside = reference === null ? 0
     : [...Array(n).keys()].filter((i) => !content.hasFailed(i)).filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
   const notes = ["Click a design to see its arm."];
@@ -232,6 +209,12 @@ function draw() {
   $("pareto-note").textContent = notes.join(" ");
 }
 
+// The trace of these designs, without its looks.
+const points = (numbers) => ({
+  x: numbers.map((i) => placed(content.values(i)[x], 0)), y: numbers.map((i) => content.values(i)[y]), customdata: numbers,
+  text: numbers.map((i) => plain(`#${i} ${content.joints(i)}`)), mode: "markers",
+});
+
 // Says where an existing arm is that the view does not show; empty for others.
 function whereExisting({ name, values }, high) {
   const [u, v] = [values[x], values[y]];
@@ -240,13 +223,9 @@ function whereExisting({ name, values }, high) {
   return isOutside ? `${name} lies outside this view, at ${number(u)}, ${number(v)}.` : "";
 }
 
-function axis(objective, range, isLog) {
-  return {
-    title: { text: title(objective), standoff: 8 }, type: isLog ? "log" : "linear", range, gridcolor: colour("grid"),
-    zeroline: false, linecolor: colour("line"), showline: true,
-    ...(isLog ? { dtick: range[1] - range[0] > 2 ? 1 : "D2", exponentformat: "power" } : {}),
-  };
-}
+// The x axis with a range in decades.
+const logarithmic = (range) => axis(title(content.objectives[x]),
+  { type: "log", range, dtick: range[1] - range[0] > 2 ? 1 : "D2", exponentformat: "power" });
 
 // Rings around the selected and the compared design are elements above the plot: moving them redraws nothing.
 function mark() {

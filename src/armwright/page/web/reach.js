@@ -1,21 +1,20 @@
-// The reach map of the selected design: a slice, and points in the 3D view.
+// The reach map of the selected design, by slices.
 
-import { drawCloud } from "./arm.js";
 import { listen, state } from "./state.js";
-import { $, colour, isTouched, number, onTheme, percent } from "./format.js";
+import { axis as plotAxis, plot } from "./plot.js";
+import { $, colour, number, onTheme, percent } from "./format.js";
 
 const AXES = ["x", "y", "z"];
 const [NO_DIRECTION, ALL] = [1, 255]; // levels of points, see page/reach_maps.py
 const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // from the least share to all directions
 const GREY = [190, 190, 198]; // of points that are reached in none of the directions
-const POINT = 0.16; // radius of a point in the 3D view, as a share of the grid's spacing
 
 let content = null;
 let design = null, at = [null, null, null]; // index of the slice along each axis, for this design
 
 export function openReach(shownContent) {
   content = shownContent;
-  for (const id of ["reach-axis", "reach-use", "reach-space"]) $(id).addEventListener("change", drawReach);
+  for (const id of ["reach-axis", "reach-use"]) $(id).addEventListener("change", drawReach);
   $("reach-at").addEventListener("input", () => {
     at[Number($("reach-axis").value)] = Number($("reach-at").value);
     drawReach();
@@ -28,10 +27,7 @@ export function openReach(shownContent) {
 export function drawReach() {
   const map = content.reach[state.design];
   $("reach-box").hidden = map === undefined;
-  if (map === undefined) {
-    drawCloud(null);
-    return;
-  }
+  if (map === undefined) return;
   if (design !== state.design) [design, at] = [state.design, [null, null, null]];
   const axis = Number($("reach-axis").value), n = map.shape[axis];
   at[axis] = Math.min(at[axis] ?? nearestToBase(map, axis), n - 1);
@@ -45,7 +41,6 @@ export function drawReach() {
   const levels = isUse ? map.levels.subarray(half) : map.levels.subarray(0, half);
   drawSlice(map, levels, axis);
   describeVolumes(map, levels);
-  drawCloud($("reach-space").checked ? pointsUpToSlice(map, levels, axis) : null);
 }
 
 const coordinate = (map, axis, index) => map.low[axis] + index * map.spacing;
@@ -106,38 +101,18 @@ function drawSlice(map, levels, axis) {
     marks([content.arm(state.design).base], "base", { color: colour("ink"), size: 10, symbol: "triangle-up" }),
     marks(near, "targets in the slice", { color: content.head.colours.target, size: 9, line: { color: colour("paper"), width: 1 } }),
   ];
-  const edge = { gridcolor: colour("grid"), zeroline: false, linecolor: colour("line"), showline: true, constrain: "domain" };
   const layout = {
     images: [{ source: image, xref: "x", yref: "y", x: low[0], y: low[1] + size[1], sizex: size[0], sizey: size[1], sizing: "stretch", layer: "below" }],
-    xaxis: { ...edge, title: { text: `${AXES[right]} [m]`, standoff: 6 }, range: [low[0], low[0] + size[0]] },
-    yaxis: { ...edge, title: { text: `${AXES[up]} [m]`, standoff: 8 }, range: [low[1], low[1] + size[1]], scaleanchor: "x" },
-    margin: { l: 58, r: 12, t: 8, b: 42 }, legend: { orientation: "h", y: -0.16, font: { size: 12 } }, hovermode: "closest",
-    dragmode: isTouched() ? false : "pan", paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { color: colour("ink"), size: 13 },
+    xaxis: plotAxis(`${AXES[right]} [m]`, { range: [low[0], low[0] + size[0]], constrain: "domain" }),
+    yaxis: plotAxis(`${AXES[up]} [m]`, { range: [low[1], low[1] + size[1]], constrain: "domain", scaleanchor: "x" }),
+    legend: { orientation: "h", y: -0.16, font: { size: 12 } },
   };
-  Plotly.react($("reach"), traces, layout, { displaylogo: false, responsive: true, displayModeBar: false });
+  plot("reach", traces, layout);
 }
 
 function describeVolumes(map, levels) {
   const volume = (isCounted) => `${number(levels.reduce((n, found) => n + isCounted(found), 0) * map.spacing ** 3, 3)} m³`;
-  const upTo = $("reach-space").checked ? " The 3D view shows the points up to the slice." : "";
   $("reach-note").textContent = `Colours show the share of the tool's directions that are reached: ${map.directions}, at points ${number(map.spacing, 3)} m `
     + `apart. Grey: reached, but in none of these directions. Volume reached: ${volume((found) => found > 0)}; in all directions: `
-    + `${volume((found) => found === ALL)}.${upTo}`;
-}
-
-// The reached points up to the slice, and the corners of the whole grid.
-function pointsUpToSlice(map, levels, axis) {
-  const points = [], colours = [], [nx, ny, nz] = map.shape;
-  for (let i = 0; i < nx; i++) {
-    for (let j = 0; j < ny; j++) {
-      for (let k = 0; k < nz; k++) {
-        const place = [i, j, k], found = level(map, levels, place);
-        if (found === 0 || place[axis] > at[axis]) continue;
-        points.push(place.map((index, way) => coordinate(map, way, index)));
-        colours.push(paint(found).map((v) => v / 255));
-      }
-    }
-  }
-  const corners = [map.low, map.low.map((v, k) => v + (map.shape[k] - 1) * map.spacing)];
-  return { points, colours, radius: POINT * map.spacing, corners };
+    + `${volume((found) => found === ALL)}.`;
 }

@@ -63,7 +63,7 @@ const downloads = () => [["urdf", "URDF"], ["mjcf", "MJCF"], ...(hasServer() ? [
 // What an engineer asks, as far as it is known, and the objectives: label, text, explanation.
 function rows({ design, facts }) {
   const { asked, quantities } = content.head;
-  const known = asked.filter((name) => name in facts).map((name) => [quantities[name].label, facts[name].text, quantities[name].description]);
+  const known = asked.filter((name) => name in facts).map((name) => [facts[name].label, facts[name].text, facts[name].description]);
   const others = content.objectives.flatMap((o, k) => (o.name in facts ? [] : [[o.label, quantity(content.values(design)[k], o.unit), quantities[o.name]?.description ?? o.description]]));
   return [...known, ...others];
 }

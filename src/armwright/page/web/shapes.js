@@ -51,28 +51,6 @@ export function segments(points, material) {
   return new THREE.LineSegments(geometry, material);
 }
 
-// Returns one mesh of many small octahedra; colours: red, green and blue of each, 0 to 1.
-export function octahedra(places, radius, colours) {
-  const corners = [0, 1, 2].flatMap((axis) => [1, -1].map((way) => [0, 1, 2].map((k) => (k === axis ? way * radius : 0))));
-  const sides = [0, 1].flatMap((x) => [2, 3].flatMap((y) => [4, 5].map((z) => ((x + y + z) % 2 ? [x, z, y] : [x, y, z])))); // outside in front
-  const points = [], normals = [], paints = [];
-  places.forEach((place, i) => {
-    for (const side of sides) {
-      const normal = [0, 1, 2].map((k) => side.reduce((sum, corner) => sum + corners[corner][k], 0) / (Math.sqrt(3) * radius));
-      for (const corner of side) {
-        points.push(...place.map((v, k) => v + corners[corner][k]));
-        normals.push(...normal);
-        paints.push(...colours[i]);
-      }
-    }
-  });
-  const geometry = new THREE.BufferGeometry();
-  for (const [name, values] of [["position", points], ["normal", normals], ["color", paints]]) {
-    geometry.setAttribute(name, new THREE.Float32BufferAttribute(values, 3));
-  }
-  return new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ vertexColors: true }));
-}
-
 // Returns the ends of the twelve edges of a box along the axes.
 export function boxEdges(low, high) {
   return [0, 1, 2].flatMap((axis) => [0, 1, 2, 3].flatMap((corner) => {

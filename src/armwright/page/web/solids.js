@@ -1,16 +1,12 @@
 // Obstacles: translucent, with the edges of boxes and the rims of cylinders.
 
+import { segments } from "./shapes.js";
+
 const RIM = 48; // points of a circle
 
 // Transforms a point from the obstacle's frame to the world.
 function placed({ centre, rotation }, p) {
   return [0, 1, 2].map((r) => centre[r] + rotation[r][0] * p[0] + rotation[r][1] * p[1] + rotation[r][2] * p[2]);
-}
-
-function lines(points, material) {
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.Float32BufferAttribute(points.flat(), 3));
-  return new THREE.LineSegments(geometry, material);
 }
 
 // A box is a four-sided prism with unit sides, scaled.
@@ -26,7 +22,7 @@ export function solidParts(solid, frame, { face, edge }) {
     mesh.rotation.set(Math.PI / 2, 0, 0);
     mesh.position.set(x, y, centre[2] - thick / 2);
     const corners = [[x - r, y - r], [x + r, y - r], [x + r, y + r], [x - r, y + r]].map((p) => [...p, centre[2]]);
-    return [mesh, lines(corners.flatMap((p, k) => [p, corners[(k + 1) % 4]]), edge)];
+    return [mesh, segments(corners.flatMap((p, k) => [p, corners[(k + 1) % 4]]).flat(), edge)];
   }
   const geometry = shape === "sphere" ? new THREE.SphereGeometry(1, 32, 20)
     : shape === "box" ? prism() : new THREE.CylinderGeometry(1, 1, 1, RIM);
@@ -52,5 +48,5 @@ function outline(solid, edge) {
     const at = (k, z) => [a * Math.cos((2 * Math.PI * k) / RIM), a * Math.sin((2 * Math.PI * k) / RIM), z];
     for (let k = 0; k < RIM; k++) points.push(at(k, -c), at(k + 1, -c), at(k, c), at(k + 1, c));
   }
-  return points.length ? [lines(points.map((p) => placed(solid, p)), edge)] : [];
+  return points.length ? [segments(points.flatMap((p) => placed(solid, p)), edge)] : [];
 }

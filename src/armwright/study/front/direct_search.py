@@ -272,7 +272,7 @@ class DirectSearch:
             self.folder.replace_trials(trials)
             verification = verify_front(history)
             summary = summarize(verification)
-            write_results(self.folder, history, summary, verification)
+            write_results(self.folder, history, self.config, summary, verification)
         return FrontRun(history, self.config, summary, self.folder.path, self.resumed)
 
     def _settle_reference_point(self) -> None:

@@ -1,0 +1,58 @@
+"""What any sheet states of its arm, whatever it is for: links, drawing, payload and errors over the reach."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.forward import link_lines
+from armwright.kinematics.reach.reach_outline import reach_outline
+from armwright.problem.over_reach import reach_lines
+from armwright.robot.arm import Arm
+from armwright.sheet.record import Drawing, LinkLine
+
+SIDE, TOP = (0, 2), (0, 1)  # axes of the views
+ASSUMED = {  # of the values of any sheet
+    "reach": "horizontal distance of the tip from the first joint; the outlines show the farthest point found in each "
+    "of 72 directions around the base, without obstacles",
+    "over the reach": "the least favourable of all postures found, in directions in which the arm reaches nearly as "
+    "far as in any",
+}
+
+
+def arm_lines(arm: Arm, payload: float, targets: Array, zeros: Sequence[float] | None = None) -> dict[str, Any]:
+    """Return these parts of a data sheet, by field.
+
+    Args:
+        arm: The arm.
+        payload: What moves the tip [kg].
+        targets: (T, 3) [m], or none.
+        zeros: Values of the joints that count as 0; 0 by default.
+    """
+    return {
+        "links": tuple(_link_line(arm, n) for n in range(1, len(arm.links) + 1)),
+        "over_reach": reach_lines(arm, payload),
+        "drawing": _drawing(arm, targets, [0.0] * len(arm.joints) if zeros is None else zeros),
+    }
+
+
+def _link_line(arm: Arm, number: int) -> LinkLine:
+    """Return the line of a link, from 1; its tube is stated if its wall is known."""
+    link = arm.links[number - 1]
+    diameter = None if link.wall is None or link.length == 0.0 else 2.0 * link.radius
+    return LinkLine(number, link.length, diameter, None if diameter is None else link.wall, link.mass)
+
+
+def _drawing(arm: Arm, targets: Array, zeros: Sequence[float]) -> Drawing:
+    q = [min(max(zero, joint.lower), joint.upper) for joint, zero in zip(arm.joints, zeros, strict=True)]
+    numbers = [*range(1, len(arm.links) + 1), 0]
+    return Drawing(
+        base=arm.base,
+        is_at_zero=np.allclose(q, zeros),
+        links=tuple((n, *map(tuple, line.tolist())) for n, line in zip(numbers, link_lines(arm, q), strict=True)),
+        column=None if arm.column is None else arm.column.length,
+        targets=tuple(map(tuple, targets.tolist())),
+        side=reach_outline(arm, SIDE),
+        top=reach_outline(arm, TOP),
+    )
