@@ -95,8 +95,8 @@ def test_evaluator_that_swallows_interrupts_is_named_and_ended(in_folder: Path, 
         process.send_signal(signal.SIGINT)
         output, _ = process.communicate(timeout=PATIENCE)  # after ten seconds
     assert process.returncode == 130
-    assert "armwright: waiting for the evaluator; Ctrl-C again ends at once\n" in output
-    assert "armwright: ended without the evaluator\n" in output
+    assert "armwright: waiting for the evaluator ev; Ctrl-C again ends at once\n" in output
+    assert "armwright: ended without the evaluator ev\n" in output
     (in_folder / "good").touch()
     assert is_resumed(in_folder / "run", *evaluator)
 

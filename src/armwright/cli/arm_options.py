@@ -23,12 +23,15 @@ BasePose = Annotated[
 ]
 
 
-def parse_price(text: str) -> float:
-    """Parse `28000` into a price [USD]."""
+def parse_numbers(option: str, text: str, expected: str, *counts: int) -> list[float]:
+    """Parse finite numbers with commas, as many as one of the counts."""
     try:
-        return float(text)
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
-        raise SettingsError(f'--price "{text}": expected a number of USD, such as 28000') from None
+        numbers = []
+    if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
+        raise SettingsError(f'{option} "{text}": expected {expected}')
+    return numbers
 
 
 def parse_prices(texts: Sequence[str]) -> dict[str, float]:
@@ -51,10 +54,6 @@ def parse_base(text: str | None) -> "Mounting | None":
 
     if text is None:
         return None
-    try:
-        x, y, z, *yaw = (float(part) for part in text.split(","))
-        return Mounting.of((x, y, z, *map(math.radians, yaw)))
-    except (ValueError, SettingsError):
-        raise SettingsError(
-            f'--base "{text}": expected three numbers with commas, such as 0,0,0.5 [m], or a fourth, the turn [°]'
-        ) from None
+    expected = "three numbers with commas, such as 0,0,0.5 [m], or a fourth, the turn [°]"
+    x, y, z, *yaw = parse_numbers("--base", text, expected, 3, 4)
+    return Mounting.of((x, y, z, *map(math.radians, yaw)))

@@ -143,11 +143,11 @@ def doctor(
 
     console = open_console()
     options = load_model_options(model_options, model=model)
-    wrong = False
-    for finding in examine(options):
-        console.print(f"{finding.mark} {finding.subject}: {finding.message}")
-        wrong = wrong or finding.mark == WRONG
-    if wrong:
+    marks: set[str] = set()
+    for mark, finding in examine(options):
+        console.print(f"{mark} {finding}")
+        marks.add(mark)
+    if WRONG in marks:
         sys.exit(FailureError.exit_code)
     if call:
         console.print(try_model(options))

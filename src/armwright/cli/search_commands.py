@@ -75,7 +75,7 @@ def design(
     started = time.monotonic()
     from armwright.cli.notes import can_draw
     from armwright.cli.progress import search_progress
-    from armwright.cli.show_results import show_search
+    from armwright.cli.show_results import show_result
     from armwright.study.front.front_run import find_front
     from armwright.study.front.search_budget import SearchBudget
     from armwright.study.front.time_plan import TimePlan
@@ -111,7 +111,7 @@ def design(
             if search["evaluations"] > run.resumed
             else f"{folder}/ is finished; nothing was computed again. Use {option} to continue."
         )
-    show_search(console, run, drawn)
+    show_result(console, run, drawn)
 
 
 def optimize(
@@ -207,7 +207,7 @@ def optimize(
     console.print(choice.reason)
     is_method_chosen = proposer != "auto" or model is not None or sampler != "auto"
     if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
-        console.print(note)
+        console.print(note, soft_wrap=True)  # it holds a command
     _begin(console, problem, task, space, folder)
     if live:
         from armwright.page.live_server import start_server

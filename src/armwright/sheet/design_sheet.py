@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from armwright.arrays import finite_or_none
-from armwright.exceptions import SettingsError
 from armwright.files import MAX_DERIVED, read_text
 from armwright.problem.assumptions import assumed_values, describe_assumed
 from armwright.problem.facts import Facts, reach_facts
@@ -49,11 +48,10 @@ def design_sheet(run: Path, number: int | None = None) -> DataSheet:
     _, history = read_run(run)
     recommended = (read_summary(run) or {}).get("recommended", ())
     chosen = _first(history, recommended) if number is None else number
-    if not 0 <= chosen < len(history):
-        raise SettingsError(f"--design {chosen}: {run} has the designs 0 to {len(history) - 1}")
+    member = history.member(chosen)
     records = [one for one in recommended if one["design"] == chosen]
     facts = read_records(run, history, [chosen])[chosen].facts
-    return sheet_of(history, history.member(chosen), facts, _verdict(run, chosen, records))
+    return sheet_of(history, member, facts, _verdict(run, chosen, records))
 
 
 def _first(history: History, recommended: Sequence[Mapping[str, Any]]) -> int:
