@@ -1,6 +1,5 @@
 """Ctrl-C ends a command in order, says what it waits for, and ends it in any case; the resumed run is the same."""
 
-import json
 import os
 import signal
 import subprocess
@@ -12,9 +11,7 @@ from pathlib import Path
 import pytest
 
 from armwright.cli.signals import interruptible
-from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request
 from tests.support.command_line import PATIENCE, armwright
-from tests.support.wire_formats import model_options
 from tests.torture.short import is_same_run
 
 STUDY = ("optimize", "target-1", "--n-init", "3", "--n-step", "3", "--n-total", "6", "--no-figures", "--out")
@@ -127,28 +124,6 @@ def test_compilation_is_interrupted(in_folder: Path) -> None:
     assert process.returncode == 130
     assert "Traceback" not in output
     assert is_resumed(in_folder / "run")
-
-
-@pytest.mark.slow
-def test_hostile_answer_is_interrupted(chat_server: ChatServer, in_folder: Path) -> None:
-    """It once kept the program from ending, and from everything else."""
-    hostile = 40_000 * "-" + 40_000 * "a-" + 20_000 * "***"
-    is_hostile = True
-
-    def answer(_: Request) -> Answer:
-        (in_folder / "begun").touch()
-        return hostile if is_hostile else json.dumps(GOOD_DESIGN)
-
-    chat_server.answer = answer
-    how = ("--model", "m", *model_options(base_url=chat_server.url, answer="one-step", on_failure="continue"))
-    with begun(*STUDY, in_folder / "run", *how, until="begun", MY_API_KEY="abcdefgh12345678") as process:
-        process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 130, output
-    assert "Traceback" not in output
-    is_hostile = False
-    chat_server.answer = answer
-    assert is_resumed(in_folder / "run", *how)
 
 
 def test_error_that_code_in_c_makes_of_an_interrupt_is_one() -> None:

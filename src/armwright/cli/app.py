@@ -44,11 +44,7 @@ COMMANDS = {
         input_commands.actuators,
         input_commands.draft,
     ),
-    "Search": (
-        search_commands.design,
-        search_commands.optimize,
-        experiment_commands.experiment,
-    ),
+    "Search": (search_commands.design, search_commands.optimize, experiment_commands.experiment),
     "After a run": (
         output_commands.pick,
         output_commands.export,

@@ -22,21 +22,22 @@ from armwright.cli.options import (
 from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError
 
+MAX_SEEDS = 10_000  # as in experiment files
+
 
 def experiment(
     name: Annotated[
         str,
         typer.Argument(help="A built-in experiment (paper, recorded, rules, n-step, samplers, ...), or a YAML file."),
     ],
-    seeds: Annotated[int | None, option("Number of seeds, from 0, instead of the file's.")] = None,
+    seeds: Annotated[
+        int | None, option("Number of seeds, from 0, instead of the file's.", min=1, max=MAX_SEEDS)
+    ] = None,
+    seed: Annotated[list[int] | None, option("Only this seed (may be repeated).")] = None,
     method: Annotated[list[str] | None, option("Only this method of the file (may be repeated).")] = None,
     task: Annotated[list[str] | None, option("Only this task of the file (may be repeated).")] = None,
     model: ModelName = None,
     model_options: ModelOptionsFile = None,
-    replay: Annotated[
-        Path | None,
-        option("Replay the recorded calls of this experiment folder."),
-    ] = None,
     workers: Annotated[
         int | None,
         option(
@@ -45,7 +46,6 @@ def experiment(
         ),
     ] = None,
     scheduler: Scheduler = None,
-    print_commands: Annotated[bool, option("Print one command per cell to run, and exit.", "--print-commands")] = False,
     print_: Annotated[bool, option("Print the file of a built-in experiment, and exit.", "--print")] = False,
     figures: Figures = True,
     out: Annotated[Path | None, option("Folder.", default="experiments/NAME")] = None,
@@ -66,23 +66,19 @@ def experiment(
     if print_:
         print_text(plan.builtin_text(name), end="")
         return
-    console = open_console(json_ or print_commands)
+    console = open_console(json_)
     whole, folder = plan.load_experiment(name)
-    chosen = plan.with_model(
-        plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds),
-        load_model_options(model_options, model=model),
-    )
+    chosen = plan.with_model(whole, load_model_options(model_options, model=model))
+    if seeds is not None:
+        chosen = chosen.model_copy(update={"seeds": seeds})
     out = out or Path("experiments") / chosen.name
-    cells, skipped = plan_cells(chosen, folder, out, replay)
+    cells, skipped = plan_cells(chosen, folder, out, methods=method or (), tasks=task or (), seeds=seed or ())
     before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
     finished = {done.cell for done in before}
     due = [cell for cell in cells if cell not in finished]
     is_default = workers is None and scheduler is None
     placed = running.default_workers(len(due)) if is_default else select_workers(workers, scheduler)
     show_plan(console, due, len(before), skipped, placed)
-    if print_commands:
-        print_text("\n".join(cell.command for cell in due))
-        return
     drawing = can_draw(console, figures)
     failed: list[running.CellOutcome] = []
     try:
@@ -173,10 +169,7 @@ def compare_arms(
             metavar="ARM...", help="URDF files, or names such as ur5e or panda (robot_descriptions; extra arms)."
         ),
     ],
-    run: Annotated[
-        Path | None,
-        option("A run of the task to compare with; its figures then show the arms."),
-    ] = None,
+    run: Annotated[Path | None, option("A run of the task to compare with; its figures then show the arms.")] = None,
     base: BasePose = None,
     tip: Tip = None,
     base_link: BaseLink = None,
@@ -184,8 +177,7 @@ def compare_arms(
     figures: Figures = True,
     seed: Annotated[int, option("Seed of the base search.")] = 0,
     price: Annotated[
-        list[str] | None,
-        option("Price of an existing arm, such as ur5e=28000 (may be repeated).", metavar="ARM=USD"),
+        list[str] | None, option("Price of an existing arm, such as ur5e=28000 (may be repeated).", metavar="ARM=USD")
     ] = None,
     json_: Json = False,
     csv_: Csv = False,

@@ -30,15 +30,10 @@ from armwright.exceptions import FailureError, TaskError
 def init(
     file: Annotated[Path, typer.Argument(help="The task file to write, such as my-task.yaml.")],
     points: Annotated[
-        Path | None,
-        option("CSV or text file of points, with columns named x, y, z in its header.", "--from"),
+        Path | None, option("CSV or text file of points, with columns named x, y, z in its header.", "--from")
     ] = None,
     unit: Annotated[str | None, option("Unit of x, y, z: m or mm.", default="as in the header, else m")] = None,
-    offset: Annotated[tuple[float, float, float], option(r"Offset X Y Z added to every point \[m].")] = (
-        0,
-        0,
-        0,
-    ),
+    offset: Annotated[tuple[float, float, float], option(r"Offset X Y Z added to every point \[m].")] = (0, 0, 0),
 ) -> None:
     """Write a commented task file to edit."""
     from armwright.files import naming_write_errors
@@ -65,10 +60,7 @@ def init(
 
 def edit(
     task: Annotated[Path, typer.Argument(metavar="TASK", help="The task file, such as my-task.yaml; it may be new.")],
-    space: Annotated[
-        Path | None,
-        option("The space file.", default="TASK's name with -space"),
-    ] = None,
+    space: Annotated[Path | None, option("The space file.", default="TASK's name with -space")] = None,
     port: Annotated[int, option("Port to listen on; 0: any free port.")] = 0,
     open_: Annotated[bool, option("Open the page in the browser.", "--open")] = False,
 ) -> None:

@@ -8,14 +8,7 @@ from typing import Annotated
 import typer
 
 from armwright.cli.activity import activity
-from armwright.cli.options import (
-    Csv,
-    Json,
-    ModelName,
-    ModelOptionsFile,
-    RunFolder,
-    option,
-)
+from armwright.cli.options import Csv, Json, ModelName, ModelOptionsFile, RunFolder, option
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
@@ -25,8 +18,7 @@ def pick(
     where: Annotated[list[str] | None, option('A condition such as "position_error<=0.05" (may be repeated).')] = None,
     by: Annotated[str | None, option("The quantity to minimise: torque, mass, link_1, …")] = None,
     weights: Annotated[
-        str | None,
-        option("Weights of objectives relative to the reference point: position_error=2,torque=1."),
+        str | None, option("Weights of objectives relative to the reference point: position_error=2,torque=1.")
     ] = None,
     robust: Annotated[
         bool, option("Only designs that stay good with the base or a link 1 mm off.", "--robust")
@@ -37,7 +29,7 @@ def pick(
     csv_: Csv = False,
 ) -> None:
     """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee."""
-    from armwright.cli.show_picked import picked_records, picked_rows, show_picked, show_picked_table
+    from armwright.cli.show_picked import picked_rows, show_picked, show_picked_table, with_parts
     from armwright.problem.conditions import read_condition, read_weights
     from armwright.proof.selection import pick_from, survival_of
 
@@ -50,8 +42,9 @@ def pick(
         history, picked, records = pick_from(run, conditions, by, weighed, robust)
     chosen = picked if all_ else picked[:n]
     names = [*(condition.name for condition in conditions), *([] if by is None else [by])]
+    rows = picked_rows(history, chosen, names, records)
     if csv_:
-        print_csv(picked_rows(history, chosen, names, records))
+        print_csv(rows)
         return
     if all_ and not json_:
         show_picked_table(open_console(), history, chosen, names, records)
@@ -59,7 +52,7 @@ def pick(
     with activity("perturbing the chosen designs"):
         survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
     if json_:
-        print_json(list(picked_records(history, chosen, names, records, survival)))
+        print_json(list(with_parts(rows, records, survival)))
         return
     show_picked(open_console(), run, history, picked, records, survival, n)
 
@@ -68,8 +61,7 @@ def export(
     run: RunFolder,
     design: Annotated[int | None, option("Number of the design.", default="the knee of the front")] = None,
     format_: Annotated[
-        str,
-        option("urdf, ros2_control or mjcf; optuna: the whole run as a study.", "--format"),
+        str, option("urdf, ros2_control or mjcf; optuna: the whole run as a study.", "--format")
     ] = "urdf",
     out: Annotated[
         Path | None, option("Output file.", default="stdout; for optuna, study.db in the run folder")

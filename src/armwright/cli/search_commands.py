@@ -1,6 +1,7 @@
 """Commands that search designs: design, optimize."""
 
 import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -30,17 +31,27 @@ from armwright.cli.options import (
     SpaceFile,
     SummaryJson,
     TaskName,
+    is_run,
     load_problem,
     option,
     select_workers,
 )
 from armwright.cli.signals import interruptible
-from armwright.cli.streams import exit_interrupted, open_console, print_command, print_json, repeat_command
-from armwright.exceptions import AnswerPendingError, StoppedError
+from armwright.cli.streams import (
+    exit_interrupted,
+    open_console,
+    print_command,
+    print_error,
+    print_json,
+    print_text,
+    repeat_command,
+)  # fmt: skip
+from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from armwright.llm.model_options import ModelOptions
     from armwright.problem.problem import Problem
 
 
@@ -89,13 +100,7 @@ def design(
     try:
         with interruptible(), search_progress(console) as watch:
             run = find_front(
-                problem,
-                budget=plan,
-                seed=seed,
-                initial_designs=from_,
-                stop_at_stall=stall,
-                out=folder,
-                watch=watch,
+                problem, budget=plan, seed=seed, initial_designs=from_, stop_at_stall=stall, out=folder, watch=watch
             )
         drawn = _draw(folder, drawing) if figures else []
     except KeyboardInterrupt:
@@ -164,8 +169,7 @@ def optimize(
     ] = None,
     device: DeviceName = "auto",
     workers: Annotated[
-        int,
-        option("Local processes that evaluate designs; 0: this process (extra distributed).", panel=EVALUATION),
+        int, option("Local processes that evaluate designs; 0: this process (extra distributed).", panel=EVALUATION)
     ] = 0,
     scheduler: Scheduler = None,
     evaluation_timeout: EvaluationTimeout = None,
@@ -173,8 +177,7 @@ def optimize(
     out: Annotated[Path | None, option("Run folder.", panel=OUTPUT, default="runs/TASK-seedSEED")] = None,
     figures: Figures = True,
     live: Annotated[
-        bool,
-        option("Serve the page of the run on 127.0.0.1 while it runs (extra live).", "--live", panel=OUTPUT),
+        bool, option("Serve the page of the run on 127.0.0.1 while it runs (extra live).", "--live", panel=OUTPUT)
     ] = False,
     json_: SummaryJson = False,
 ) -> None:
@@ -193,9 +196,9 @@ def optimize(
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
     load = partial(load_problem, task, space, robust, device, objectives=objectives, evaluator=evaluator)
     if print_prompt is not None:
-        from armwright.cli.show_prompt import show_prompt
-
-        show_prompt(print_prompt, task, space, load, given, n_init, n_total, seed)
+        if space is not None and is_run(task):
+            raise SettingsError(f"--space {space} is for a new run; {task} has its own")
+        _show_prompt(print_prompt, task, load, given, n_init=n_init, n_total=n_total, seed=seed)
         return
     problem = load()
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
@@ -258,6 +261,26 @@ def optimize(
         show_result(console, run, drawn)
     if all(trial.failure is not None for trial in run.trials):
         raise typer.Exit(1)
+
+
+def _show_prompt(what: str, task: str, load: Callable[[], "Problem"], options: "ModelOptions", **new_run: int) -> None:
+    """Print the prompt of a trial, or the schema of its answer: of a run if the task is one, else of a new run."""
+    from armwright.study.prompt_preview import preview, preview_after
+
+    number = int(what) if what.isdecimal() else None
+    if number is None and what not in ("next", "schema"):
+        raise SettingsError(f'--print-prompt "{what}": expected next, schema, or the number of a trial of a run')
+    if is_run(task):
+        shown = preview_after(Path(task), options, number=number)
+    elif number is None:
+        shown = preview(load(), options, **new_run)
+    else:
+        raise SettingsError(f"--print-prompt {number}: expected a run folder, got {task}")
+    if what == "schema":
+        print_json(shown.schema)
+        return
+    print_text(shown.prompt, end="")
+    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}")
 
 
 def _begin(console: "Console", problem: "Problem", task: str, space: Path | None, folder: Path) -> None:

@@ -12,7 +12,7 @@ from armwright.cli.notes import payload_note
 from armwright.cli.streams import list_files
 from armwright.cli.tables import Column, number, print_table, text
 from armwright.existing.compare_arms import ArmComparison, ComparedArm
-from armwright.experiments.cells import Cell, Skipped
+from armwright.experiments.cells import Cell
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.tables import markdown, remarks_on, sections
 from armwright.extras import install_command, missing_packages
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def show_plan(
-    console: Console, due: Sequence[Cell], finished: int, skipped: Sequence[Skipped], workers: Workers | None
+    console: Console, due: Sequence[Cell], finished: int, skipped: Sequence[Cell], workers: Workers | None
 ) -> None:
     """Print what an experiment is about to run."""
     where = "one after another" if workers is None else f"on {workers.description}"
@@ -49,9 +49,9 @@ def show_plan(
         console.print(f"{len(with_model)} of them ask {models} for about {proposals:,} proposals in total")
 
 
-def notes_on_cells(skipped: Sequence[Skipped], failed: "Sequence[CellOutcome]") -> list[str]:
+def notes_on_cells(skipped: Sequence[Cell], failed: "Sequence[CellOutcome]") -> list[str]:
     """Return a line for each method and reason of skipped cells, and one for each failure."""
-    reasons = Counter((one.cell.plan.label, one.reason) for one in skipped)
+    reasons = Counter((one.plan.label, one.reason) for one in skipped)
     notes = [
         f"skipped: {label}, {count} {'cell' if count == 1 else 'cells'}: {reason}"
         for (label, reason), count in reasons.items()
@@ -72,12 +72,7 @@ def show_outcome(console: Console, outcome: "CellOutcome", number: int, of: int)
     console.file.flush()
 
 
-def show_comparison(
-    console: Console,
-    comparison: Comparison,
-    title: str,
-    notes: Sequence[str] = (),
-) -> None:
+def show_comparison(console: Console, comparison: Comparison, title: str, notes: Sequence[str] = ()) -> None:
     """Print a comparison: in a terminal its tables as wide as that, elsewhere Markdown."""
     if not console.is_terminal:
         console.print(markdown(comparison, title, notes), end="")

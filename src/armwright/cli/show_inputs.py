@@ -71,12 +71,7 @@ def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
         text("source", "source", rank=4, least=24),
     )  # fmt: skip
     print_table(console, columns, records)
-    n_values = sum(value_of(record.completed(), name) is not None for record in records for name in UNITS)
-    n_assumed = sum(len(record.assumed) for record in records)
-    console.print(
-        f"\n{n_values} values of {len(records)} actuators, {n_assumed} of them assumed: estimates, or defaults of the "
-        "kind of actuator.\narmwright actuators NAME lists the values of one with their sources."
-    )
+    console.print("\narmwright actuators NAME lists the values of one with their sources.")
 
 
 def show_actuator(console: Console, record: ActuatorRecord) -> None:
@@ -170,10 +165,10 @@ def show_target_table(console: Console, problem: Problem) -> None:
     distances = distance_to_bases(problem.space, points)
 
     def column(head: str, values: Array, rank: int = 0) -> Column:
-        return Column(head, lambda i: rounded(values[i], 4), is_number=True, rank=rank)
+        return Column(head, lambda i: rounded(float(values[i]), 4), is_number=True, rank=rank)
 
     columns = (
-        Column("target", lambda i: str(task.target_names[i]), least=12),
+        Column("target", task.target_names.__getitem__, least=12),
         *(column(f"{axis} [m]", points[:, k]) for k, axis in enumerate("xyz")),
         column("tolerance [mm]", 1e3 * arrays.tolerance), column("payload [kg]", task.payloads, rank=1),
         column(f"nearest{NO_BREAK}base [m]", distances),

@@ -1,7 +1,7 @@
 """Print designs that were picked: each with all that is known of it, or many in a table."""
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,34 +25,10 @@ from armwright.spaces.parameters import CategoricalParameter
 Records = Mapping[int, DesignRecord]
 
 
-def picked_records(
-    history: History,
-    picked: Sequence[FrontMember],
-    names: Sequence[str],
-    records: Records,
-    survival: Mapping[int, Mapping[str, Any]],
-) -> Iterator[dict[str, Any]]:
-    """Yield the chosen designs for JSON.
-
-    Args:
-        history: The trials of the run.
-        picked: The chosen designs.
-        names: Quantities to include beside those that the run evaluated.
-        records: Records of the designs by number.
-        survival: Records of their survival by number.
-    """
-    quantities = quantities_of_front(history, names, facts_by_number(records))
-    for member in picked:
-        record = {"number": member.number, "source": member.source, **quantities[member.number]}
-        path = records[member.number].path
-        record |= {"joints": member.design.joints} | ({} if path is None else {"path": to_jsonable_python(path)})
-        yield record | ({"survival": survival[member.number]} if member.number in survival else {})
-
-
 def picked_rows(
     history: History, picked: Sequence[FrontMember], names: Sequence[str], records: Records
 ) -> Iterator[dict[str, Any]]:
-    """Yield the chosen designs as rows of CSV: parameters and quantities."""
+    """Yield the chosen designs as rows of CSV: parameters, quantities of the run, and those of these names."""
     quantities = quantities_of_front(history, names, facts_by_number(records))
     categorical = [p.name for p in history.problem.space.parameters if isinstance(p, CategoricalParameter)]
     for member in picked:
@@ -61,7 +37,18 @@ def picked_rows(
             "source": member.source,
             **{name: member.design.params.get(name) for name in categorical},
             **quantities[member.number],
+            "joints": member.design.joints,
         }
+
+
+def with_parts(
+    rows: Iterable[dict[str, Any]], records: Records, survival: Mapping[int, Mapping[str, Any]]
+) -> Iterator[dict[str, Any]]:
+    """Yield rows for JSON: with the worst along the cycle, and with what a design survives."""
+    for row in rows:
+        number = row["number"]
+        parts = {"path": to_jsonable_python(records[number].path), "survival": survival.get(number)}
+        yield row | {name: part for name, part in parts.items() if part is not None}
 
 
 def show_picked_table(
