@@ -1,26 +1,13 @@
-"""Options of commands about existing arms."""
+"""Numbers in options, such as those of commands about existing arms."""
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from armwright.cli.options import option
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
     from armwright.robot.mounting import Mounting
-
-Tip = Annotated[str | None, option("Link of the URDF at the tip.", default="the last one")]
-BaseLink = Annotated[str | None, option("Link of the URDF at the base.", default="the root")]
-BasePose = Annotated[
-    str | None,
-    option(
-        r"Where base links stand \[m], and how far they are turned about the vertical [°].",
-        "--base",
-        default="searched",
-        metavar="X,Y,Z[,YAW]",
-    ),
-]
 
 
 def parse_numbers(option: str, text: str, expected: str, *counts: int) -> list[float]:

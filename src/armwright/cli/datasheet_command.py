@@ -1,47 +1,43 @@
 """The command that writes data sheets of designs and of existing arms: datasheet."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from armwright.cli.activity import activity
-from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base
-from armwright.cli.options import TASK, Json, SpaceFile, load_problem, option
+from armwright.cli.arm_options import parse_base
+from armwright.cli.options import load_problem
 from armwright.cli.streams import print_json, print_text
 from armwright.exceptions import SettingsError
 
 
 def datasheet(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="RUN|ARM",
-            help="A run folder, a URDF file, or a name such as ur5e (robot_descriptions; extra arms).",
-        ),
-    ],
-    design: Annotated[
-        int | None, option("Number of the design of the run.", default="the first recommended one")
-    ] = None,
-    actuators: Annotated[
-        str | None,
-        option(
-            "Actuators of the catalogue at joints of the URDF, by name or number.",
-            metavar="JOINT=NAME,...",
-            default="the efforts of the URDF",
-        ),
-    ] = None,
-    task: Annotated[str | None, option("The task of an arm that exists.", panel=TASK, default="none")] = None,
-    space: SpaceFile = None,
-    base: BasePose = None,
-    price: Annotated[float | None, option("Price of an arm that exists.", metavar="USD")] = None,
-    tip: Tip = None,
-    base_link: BaseLink = None,
-    seed: Annotated[int | None, option("Seed of the base search.", default="0")] = None,
-    out: Annotated[Path | None, option("Output folder.", default="designs/NNNN of the run, or NAME-datasheet")] = None,
-    json_: Json = False,
+    source: str,
+    *,
+    design: int | None = None,
+    actuators: str | None = None,
+    task: str | None = None,
+    space: Path | None = None,
+    base: str | None = None,
+    price: float | None = None,
+    tip: str | None = None,
+    base_link: str | None = None,
+    seed: int | None = None,
+    out: Path | None = None,
+    json_: bool = False,
 ) -> None:
-    """Write the data sheet of a design of RUN or of an existing arm as JSON, and as HTML that prints on two pages."""
+    """Write the data sheet of a design of RUN or of an existing arm as JSON, and as HTML that prints on two pages.
+
+    Parameters:
+        source (RUN|ARM): A run folder, a URDF file, or a name such as ur5e (robot_descriptions; extra arms).
+        design: Number of the design of the run. Default: the first recommended one.
+        actuators (JOINT=NAME,...): Actuators of the catalogue at joints of the URDF, by name or number. Default: the
+            efforts of the URDF.
+        price (USD): Price of an arm that exists.
+        seed: Seed of the base search. Default: 0.
+        out: Output folder. Default: designs/NNNN of the run, or NAME-datasheet.
+
+    Task:
+        task: The task of an arm that exists. Default: none.
+    """
     from armwright.proof.design_record import DESIGNS, design_name
     from armwright.sheet.design_sheet import design_sheet
     from armwright.sheet.writer import sheet_record, write_datasheet

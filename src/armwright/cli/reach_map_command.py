@@ -2,12 +2,9 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from armwright.cli.arm_options import Tip, parse_numbers
-from armwright.cli.options import Json, option
+from armwright.cli.arm_options import parse_numbers
 from armwright.cli.streams import open_console, print_json
 from armwright.cli.tables import number, print_table, text
 from armwright.exceptions import SettingsError
@@ -20,43 +17,42 @@ GRID, CONDITIONS = "Grid and directions", "Conditions"
 
 
 def reach_map(
-    source: Annotated[
-        str, typer.Argument(metavar="RUN|ARM", help="A run folder, a URDF file, or a name such as ur5e (extra arms).")
-    ],
-    design: Annotated[int | None, option("Number of the design of RUN.", default="the knee of the front")] = None,
-    tip: Tip = None,
-    spacing: Annotated[
-        float | None, option(r"Distance of neighbouring points \[m].", panel=GRID, default="about 2,000 points")
-    ] = None,
-    box: Annotated[
-        str | None,
-        option(
-            r"Smallest, then largest coordinates x,y,z,x,y,z of the points \[m].",
-            panel=GRID,
-            default="all that the tip reaches",
-        ),
-    ] = None,
-    axis: Annotated[str, option("Middle x,y,z of the cone of tool directions.", panel=GRID)] = "0,0,-1",
-    cone: Annotated[float, option("Half the opening angle of the cone [°]; 180: all directions.", panel=GRID)] = 180.0,
-    directions: Annotated[int, option("Number of directions.", panel=GRID)] = 50,
-    payload: Annotated[
-        float | None, option(r"Payload at the tip that the motors have to hold \[kg].", panel=CONDITIONS)
-    ] = None,
-    clearance: Annotated[
-        float | None, option(r"Least distance from the arm itself and from obstacles \[m].", panel=CONDITIONS)
-    ] = None,
-    obstacles: Annotated[
-        bool, option("Keep clear of the obstacles of the task.", "--obstacles", panel=CONDITIONS)
-    ] = False,
-    task: Annotated[
-        str | None, option("The task with the obstacles and targets, for a URDF.", panel=CONDITIONS, default="none")
-    ] = None,
-    out: Annotated[
-        Path | None, option("The npz file; the figure is beside it.", default="RUN/reach-maps/, or this folder")
-    ] = None,
-    json_: Json = False,
+    source: str,
+    *,
+    design: int | None = None,
+    tip: str | None = None,
+    spacing: float | None = None,
+    box: str | None = None,
+    axis: str = "0,0,-1",
+    cone: float = 180.0,
+    directions: int = 50,
+    payload: float | None = None,
+    clearance: float | None = None,
+    obstacles: bool = False,
+    task: str | None = None,
+    out: Path | None = None,
+    json_: bool = False,
 ) -> None:
-    """Map in which directions an arm can hold its tool at each point of a grid."""
+    """Map in which directions an arm can hold its tool at each point of a grid.
+
+    Parameters:
+        source (RUN|ARM): A run folder, a URDF file, or a name such as ur5e (extra arms).
+        design: Number of the design of RUN. Default: the knee of the front.
+        out: The npz file; the figure is beside it. Default: RUN/reach-maps/, or this folder.
+
+    Grid and directions:
+        spacing: Distance of neighbouring points [m]. Default: about 2,000 points.
+        box: Smallest, then largest coordinates x,y,z,x,y,z of the points [m]. Default: all that the tip reaches.
+        axis: Middle x,y,z of the cone of tool directions.
+        cone: Half the opening angle of the cone [°]; 180: all directions.
+        directions: Number of directions.
+
+    Conditions:
+        payload: Payload at the tip that the motors have to hold [kg].
+        clearance: Least distance from the arm itself and from obstacles [m].
+        obstacles: Keep clear of the obstacles of the task.
+        task: The task with the obstacles and targets, for a URDF. Default: none.
+    """
     from armwright.cli.notes import can_draw
     from armwright.kinematics.reach.reach_map import reach_map
     from armwright.page.page import write_report

@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from armwright.cli.activity import activity
-from armwright.cli.options import Csv, Json, RunFolder
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json
 from armwright.cli.tables import number, print_table, text
 from armwright.exceptions import SettingsError
@@ -20,16 +17,22 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    run: RunFolder,
-    design: Annotated[int | None, typer.Option(help="Number of the design.")] = None,
-    recommended: Annotated[bool, typer.Option("--recommended", help="The recommended designs (the default).")] = False,
-    all_: Annotated[bool, typer.Option("--all", help="All designs of the front.")] = False,
-    json_: Json = False,
-    csv_: Csv = False,
+    run: Path,
+    *,
+    design: int | None = None,
+    recommended: bool = False,
+    all_: bool = False,
+    json_: bool = False,
+    csv_: bool = False,
 ) -> None:
     """Drive designs of RUN through their cycle in MuJoCo, and say which pass.
 
     If a recommended design fails, the next one is tried.
+
+    Parameters:
+        design: Number of the design.
+        recommended: The recommended designs (the default).
+        all_: All designs of the front.
     """
     import json
 
