@@ -1,15 +1,7 @@
 """Tables in terminals of any width."""
 
-import fcntl
 import io
-import os
-import pty
-import re
-import struct
-import sys
-import termios
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -69,35 +61,3 @@ def test_texts_are_shortened_to_whole_characters() -> None:
     assert shorten("an arm", 5) == "an a…"
     assert shorten("an arm", 4) == "an…"
     assert shorten("中中中", 5) == "中中…"
-
-
-ESCAPE = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]")
-
-
-def in_terminal(width: int, *arguments: str) -> tuple[int, list[str]]:
-    """Return the exit code of a command and what a terminal of this width has on its lines in the end."""
-    child, terminal = pty.fork()
-    if child == 0:
-        environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"} | {"TERM": "xterm"}
-        fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
-        os.execve(sys.executable, [sys.executable, "-m", "armwright", *arguments], environment)
-    written = b""
-    while True:
-        try:
-            part = os.read(terminal, 65536)
-        except OSError:  # the command has ended
-            break
-        written += part
-    os.close(terminal)
-    _, status = os.waitpid(child, 0)
-    text = ESCAPE.sub("", written.decode("utf-8", "replace")).replace("\r\n", "\n")
-    return os.waitstatus_to_exitcode(status), [line.split("\r")[-1] for line in text.split("\n")]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", [("actuators", "XM430-W350", "MG996R"), ("check", "desk-sorting", "--no-picture")])
-def test_terminals_wrap_only_what_has_no_spaces(command: tuple[str, ...]) -> None:
-    code, lines = in_terminal(60, *command)
-    assert code == 0
-    for line in lines:
-        assert len(line) <= 60 or len(line.split()) == 1 or "https://" in line, line
