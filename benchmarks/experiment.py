@@ -10,7 +10,7 @@ from pathlib import Path
 
 from armwright.experiments.cells import plan_cells
 from armwright.experiments.outcome import collect
-from armwright.experiments.plan import load_experiment, with_only, with_seeds
+from armwright.experiments.plan import load_experiment
 from armwright.experiments.runner import run_cells
 from armwright.experiments.tables import markdown
 from armwright.study.workers.cluster import Workers
@@ -34,9 +34,9 @@ def main() -> None:
 def run(seeds: int, n_workers: int) -> tuple[float, str]:
     """The seconds that the cells take, and their tables."""
     plan, beside = load_experiment("paper")
-    plan = with_seeds(with_only(plan, ["bbo", "rules"], []), seeds)
+    plan = plan.model_copy(update={"seeds": seeds})
     with tempfile.TemporaryDirectory() as out:
-        cells, _ = plan_cells(plan, beside, Path(out))
+        cells, _ = plan_cells(plan, beside, Path(out), methods=["bbo", "rules"])
         started = time.perf_counter()
         faults = [outcome.fault for outcome in run_cells(cells, Workers(n_workers), print) if outcome.fault]
         seconds = time.perf_counter() - started

@@ -84,15 +84,6 @@ def test_experiment_with_too_many_cells_is_refused(tmp_path: Path) -> None:
         plan_cells(*load_experiment(str(file)), tmp_path)
 
 
-def test_experiment_with_line_breaks_in_its_commands_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "x.yaml"
-    method = '{label: A, proposer: llm, model_options: {model: "a\\n"}}'
-    file.write_text(f"name: x\ntasks: [target-1]\nseeds: 1\nmethods: {{a: {method}}}\n", encoding="utf-8")
-    with pytest.raises(SettingsError, match="is not printable") as refusal:
-        plan_cells(*load_experiment(str(file)), tmp_path)
-    assert str(refusal.value).isprintable()
-
-
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
     """A finished run, to be damaged."""

@@ -47,35 +47,31 @@ def missing_packages(extra: str) -> list[str]:
 
 def check_extra(extra: str, subject: str) -> None:
     """Raise MissingExtraError if a package of the extra is not installed; `subject` needs them all."""
-    missing = missing_packages(extra)
-    if missing:
+    if missing := missing_packages(extra):
         raise _missing(extra, subject, missing)
 
 
 @contextmanager
-def requires_extra(extra: str, subject: str) -> Generator[None]:
-    """Convert failed imports inside the context to MissingExtraError; `subject` needs them."""
+def naming_extras(subject: str, extra: str | None = None) -> Generator[None]:
+    """Convert failed imports inside the context to MissingExtraError; `subject` needs them.
+
+    Args:
+        subject: What needs them.
+        extra: What brings them; None for the extra whose package is missing, if it is one of those.
+    """
     try:
         yield
-    except ModuleNotFoundError as fault:
-        raise _missing(extra, subject, missing_packages(extra) or [str(fault.name)]) from fault
-    except ImportError as fault:  # another version
-        reason = " ".join(str(fault).split())
-        raise MissingExtraError(
-            f"{subject} needs another version of {fault.name} ({reason}): {install_command(extra)}"
-        ) from fault
-
-
-@contextmanager
-def naming_extras(subject: str) -> Generator[None]:
-    """Convert failed imports of an extra's package inside the context to MissingExtraError; `subject` needs them."""
-    try:
-        yield
-    except ModuleNotFoundError as fault:
-        extra = next((extra for extra, packages in EXTRAS.items() if fault.name in packages), None)
+    except ImportError as fault:
+        name = str(fault.name)
+        extra = extra or next((extra for extra, packages in EXTRAS.items() if name in packages), None)
         if extra is None:
             raise
-        raise _missing(extra, subject, missing_packages(extra) or [str(fault.name)]) from fault
+        if isinstance(fault, ModuleNotFoundError):
+            raise _missing(extra, subject, missing_packages(extra) or [name]) from fault
+        reason = " ".join(str(fault).split())
+        raise MissingExtraError(
+            f"{subject} needs another version of {name} ({reason}): {install_command(extra)}"
+        ) from fault
 
 
 def install_command(extra: str) -> str:

@@ -1,12 +1,14 @@
 """Messages about values that a schema refuses: the key, what is expected with its unit, what was found, what to try."""
 
 import json
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from types import NoneType
 from typing import Any, Literal, cast, get_args, get_origin
 
-from pydantic import ValidationError
+from pydantic import PydanticUserError, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from armwright.exceptions import did_you_mean
@@ -14,7 +16,7 @@ from armwright.schema_types import all_keys_of, field_path, keys_of, members_of,
 from armwright.units import KEY_UNITS, read_quantity
 
 _COUNTS = {2: "two", 3: "three", 4: "four"}
-_DIRECTIONS = {"down": "[0, 0, -1]", "up": "[0, 0, 1]"}
+_DIRECTIONS = {"down": [0, 0, -1], "up": [0, 0, 1]}
 _BOUNDS = {
     "greater_than": "above",
     "greater_than_equal": "of at least",
@@ -79,10 +81,9 @@ def _describe(error: ErrorDetails, path: Sequence[str | int], schema: Any, data:
         return f"{key}: expected {_choice(tags)}, got {show(given[key])}" + (f".{hint}" if hint else "")
     expected, hint = _limits(error, unit), ""
     if not expected:
-        around = _value_at(data, path[:-1])
-        is_point = bool(path) and isinstance(path[-1], int) and _is_one_point(annotation, around)
-        expected = _expected(annotation, unit)
-        hint = show([around]) if is_point else _suggest(annotation, given, unit)
+        expected, around = _expected(annotation, unit), [_value_at(data, path[:-1])]
+        is_entry = bool(path) and isinstance(path[-1], int) and _is_accepted(type_at(schema, path[:-1]), around)
+        hint = show(around) if is_entry else _suggest(annotation, given, unit)
     if kind == "string_pattern_mismatch" and isinstance(given, str):
         hint = show(_LETTERS.sub("-", given).strip("-._")[:40]) if _LETTERS.search(given) else ""
     got = limits["actual_length"] if kind in ("too_short", "too_long") else show(given)
@@ -157,45 +158,38 @@ def _in(unit: str) -> str:
 
 
 def _suggest(annotation: Any, given: Any, unit: str) -> str:
-    """Return a value that the user may have meant; an empty string if there is none."""
-    members = members_of(annotation)
-    pairs = [get_args(m) for m in members if get_origin(m) is tuple and get_args(m)[-1] is not Ellipsis]
-    lists = [get_args(m)[0] for m in members if get_origin(m) is tuple and get_args(m)[-1] is Ellipsis]
-    choices = [choice for m in members if get_origin(m) is Literal for choice in get_args(m)]
+    """Return a value that the user may have meant, the first repair that the type accepts; empty if there is none."""
+    choices = [choice for m in members_of(annotation) if get_origin(m) is Literal for choice in get_args(m)]
+    if isinstance(given, str) and len(given) > 1 and set(given) <= set(choices):
+        return f"[{', '.join(given)}]"
+    near = get_close_matches(given, choices, n=1) if isinstance(given, str) else []
+    return next((show(repair) for repair in (*near, *_repairs(given, unit)) if _is_accepted(annotation, repair)), "")
+
+
+def _repairs(given: Any, unit: str) -> Iterator[Any]:
+    """Yield values that a value may stand for: `200 g` for a number, one entry for a list, and the like."""
     if isinstance(given, str):
-        if choices:
-            if len(given) > 1 and set(given) <= set(choices):
-                return f"[{', '.join(given)}]"
-            return did_you_mean(given, choices).removeprefix(" Did you mean ").rstrip("?")
-        if float in members or int in members:
-            number = read_quantity(given, unit)
-            return "" if number is None else f"{number:.10g}"
-        if any(len(pair) == 3 for pair in pairs) and given in _DIRECTIONS:
-            return _DIRECTIONS[given]
-        split = [read_quantity(part, unit) for part in re.split(r"[,;]\s*|\s+", given.strip("[]() "))]
-        if pairs and len(split) == len(pairs[0]) and None not in split:
-            return show(split)
-    is_number = isinstance(given, (int, float)) and not isinstance(given, bool)
-    if isinstance(given, float) and int in members:
-        return str(round(given))
-    if is_number and str in members:
-        return show(show(given))
-    if is_number and pairs and all(members_of(entry) == [float] for entry in pairs[0]) and len(pairs[0]) == 2:
-        return show([given, given])
-    if isinstance(given, list) and len(cast("list[Any]", given)) == 1 and (float in members or int in members):
-        return show(cast("list[Any]", given)[0])
-    if lists and not isinstance(given, (list, dict)) and isinstance(given, str) == (members_of(lists[0]) == [str]):
-        return show([given])
-    return ""
+        for parts in ([given], re.split(r"[,;]\s*|\s+", given.strip("[]() "))):
+            numbers = [read_quantity(part, unit) for part in parts]
+            known = [float(f"{number:.10g}") for number in numbers if number is not None]
+            if len(known) == len(parts):
+                yield known if len(parts) > 1 else known[0]
+        yield from (_DIRECTIONS.get(given, given), [given])
+    elif isinstance(given, list) and len(cast("list[Any]", given)) == 1:
+        yield from cast("list[Any]", given)
+    elif isinstance(given, (int, float)) and not isinstance(given, bool):
+        yield from ([given], [given, given], show(given))
+        if isinstance(given, float) and math.isfinite(given):
+            yield round(given)
 
 
-def _is_one_point(annotation: Any, around: Any) -> bool:
-    """Return whether a list holds the numbers of one entry, where a list of entries is expected."""
-    entries = [get_args(member) for member in members_of(annotation) if get_origin(member) is tuple]
-    if not isinstance(around, list) or not entries:
+def _is_accepted(annotation: Any, value: Any) -> bool:
+    """Return whether a value is one of a type."""
+    try:
+        TypeAdapter[Any](annotation).validate_python(value)
+    except (ValidationError, PydanticUserError, OverflowError):
         return False
-    values = cast("list[Any]", around)
-    return len(values) == len(entries[0]) and all(isinstance(value, (int, float)) for value in values)
+    return True
 
 
 def show(value: Any) -> str:

@@ -55,9 +55,8 @@ def test_urdf_is_mapped_into_arrays_and_a_figure(urdf: Path) -> None:
     ("options", "message"),
     [
         (("--design", "3"), "--design 3 is for a run"),
-        (("--axis", "down"), '--axis "down": expected 3 numbers with commas, such as 0,0,-1'),
-        (("--box", "1,2"), '--box "1,2": expected 6 numbers'),
-        (("--share", "0"), "--share 0.0: expected more than 0 and at most 1"),
+        (("--axis", "down"), '--axis "down": expected three numbers with commas, such as 0,0,-1'),
+        (("--box", "1,2"), '--box "1,2": expected six numbers'),
         (("--out", "map.png"), "--out map.png: expected a name that ends in .npz"),
         (("--obstacles",), "--obstacles: expected a task; try --task TASK"),
         (("--obstacles", "--task", "target-1"), "--obstacles: expected obstacles in the task, which has none"),

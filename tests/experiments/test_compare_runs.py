@@ -18,11 +18,10 @@ from armwright import Problem, Task, find_front, load_task, optimize, read_run
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.experiments.compare_runs import Comparison, compare_runs, compare_summaries
-from armwright.experiments.outcome import Published
 from armwright.experiments.run_list import find_runs, list_runs
 from armwright.experiments.run_record import RunSummary, read_run_summary, shares_by_source
 from armwright.experiments.statistics import interval, paired_test
-from armwright.experiments.tables import latex, markdown, write_tables
+from armwright.experiments.tables import markdown, write_tables
 from armwright.pictures.comparison_figures import write_comparison_figures
 from armwright.proof.front_gap import known_front
 from tests.support.chat_server import ChatServer, wants_design
@@ -163,9 +162,8 @@ def test_flagged_runs_are_excluded_and_scripted_ones_marked(runs: Path, tmp_path
     found = compare_summaries([read_run_summary(folder) for folder in find_runs([place])])
     assert [run.seed for run in found.runs if run.folder.name.startswith("target-1-rules")] == [0, 2]
     assert "excluded, because 50% of its proposals failed" in markdown(found, "x")
-    for text in (markdown(found, "x"), latex(found)):
-        assert "[scripted]" in text
-        assert "gpt-x" not in text
+    assert "[scripted]" in markdown(found, "x")
+    assert "gpt-x" not in markdown(found, "x")
 
 
 def test_incomparable_runs_are_refused(runs: Path, tmp_path: Path) -> None:
@@ -230,24 +228,18 @@ def test_front_search_is_compared_with_studies(runs: Path, tmp_path: Path) -> No
     assert "hypervolume-methods.png" in {path.name for path in write_comparison_figures(tmp_path, found)}
 
 
-def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: Path) -> None:
-    comparison.published = Published({("BBO (12 trials)", "target-1"): (6.7, 2.03)}, "The Paper")
+def test_markdown_and_csv_tables_agree(comparison: Comparison, tmp_path: Path) -> None:
+    comparison.published, comparison.published_in = {("BBO (12 trials)", "target-1"): (6.7, 2.03)}, "The Paper"
     files = write_tables(tmp_path, comparison, "All", ["one cell is missing"])
-    assert {path.name for path in files} >= {"table.md", "table.csv", "table.tex", "contrasts.csv", "time-to.csv"}
-    text, tex = ((tmp_path / f"table.{form}").read_text(encoding="utf-8") for form in ("md", "tex"))
+    assert {path.name for path in files} >= {"table.md", "table.csv", "contrasts.csv", "time-to.csv"}
+    text = (tmp_path / "table.md").read_text(encoding="utf-8")
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(comparison.rows) == 4
     for row in rows:
-        cell = f"{float(row['e_hv']):.2f} ({float(row['sigma_hv']):.2f})"
-        assert cell in text
-        assert cell in tex
+        assert f"{float(row['e_hv']):.2f} ({float(row['sigma_hv']):.2f})" in text
     for words in ("6.70 (2.03)", "The Paper", "one cell is missing", "the smallest p of 3 pairs is 0.25"):
         assert words in text
     assert all(line.endswith("|") for line in re.findall(r"(?m)^\|.*$", text))
-    columns, part = re.findall(r"(?s)\\begin\{tabular\}\{(\w+)\}(.*?)\\end\{tabular\}", tex)[0]
-    assert {line.count("&") for line in part.splitlines() if line.endswith(r"\\")} == {len(columns) - 1}
-    assert tex.count("{") == tex.count("}")
-    assert "_" not in tex.replace(r"\_", "")
 
 
 @pytest.mark.slow
@@ -280,7 +272,7 @@ def test_compare_command(runs: Path, tmp_path: Path) -> None:
     runner = CliRunner()
     result = runner.invoke(app, ["compare", str(runs), "--out", str(tmp_path / "out"), "--no-figures"])
     assert result.exit_code == 0, result.output
-    assert (tmp_path / "out" / "table.tex").is_file()
+    assert (tmp_path / "out" / "table.md").is_file()
     listed = json.loads(runner.invoke(app, ["compare", "--list", str(runs), "--json"]).output)
     assert [run["state"] for run in listed] == ["finished"] * 12
     assert "random-4" in runner.invoke(app, ["compare", "--list", str(runs)]).output

@@ -28,7 +28,7 @@ def argument_seeds() -> list[bytes]:
         ["optimize", "target-1", "--print-prompt", "next", "--model-options", "{answer: one-step}", "--n-init", "3"],
         ["optimize", run, "--print-prompt", "next"], ["optimize", "target-1", "--print-prompt", "schema"],
         ["design", "target-1", "--evaluations", "100", "--no-stall", "--seed", "1"],
-        ["experiment", "paper", "--seeds", "1", "--task", "target-1", "--method", "bbo", "--print-commands"],
+        ["experiment", "paper", "--seeds", "1", "--task", "target-1", "--method", "bbo", "--print"],
         ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"], ["compare", "--list", run, "--json"],
         ["compare-arms", "target-1", "arm.urdf", "--base", "0,0,0.5", "--tip", "tip", "--base-link", "base"],
         ["pick", run, "--where", "torque<=9", "--by", "mass", "-n", "2"], ["pick", run, "--weights", "torque=1"],
@@ -43,7 +43,7 @@ def argument_seeds() -> list[bytes]:
 SHORT = {
     "optimize": ["--n-init=1", "--n-total=2"],
     "design": ["--evaluations=50"],
-    "experiment": ["--print-commands"],
+    "experiment": ["--print"],
 }
 NEVER = ("--live", "--call", "--scheduler", "--workers")  # these wait for others or start processes
 

@@ -82,11 +82,6 @@ def test_address_of_python_code_gets_the_key(server: ChatServer, monkeypatch: py
     assert {headers["authorization"] for headers in server.headers} == {f"Bearer {SERVER_KEY}"}
 
 
-def test_printed_commands_of_an_experiment_send_no_key(in_folder: Path) -> None:
-    printed = armwright(*experiment("http://127.0.0.1:9/v1"), "--print-commands", **KEY)
-    assert printed.stdout.startswith("env -u ARMWRIGHT_API_KEY ")
-
-
 def test_options_without_an_address_keep_that_of_the_user() -> None:
     theirs = ModelOptions(temperature=0.5).named_in("theirs.yaml")
     own = ModelOptions(base_url="http://localhost:1/v1")

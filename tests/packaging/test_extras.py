@@ -16,7 +16,7 @@ import pytest
 import armwright as aw
 from armwright import extras
 from armwright.exceptions import MissingExtraError, UsageError
-from armwright.extras import EXTRAS, missing_packages, naming_extras, requires_extra
+from armwright.extras import EXTRAS, missing_packages, naming_extras
 from armwright.page.live_server import serve, start_server
 from armwright.robot.robot_descriptions import find_urdf
 from tests import ROOT
@@ -93,7 +93,7 @@ def test_missing_package_names_its_install_command(asked: str, monkeypatch: pyte
 
 
 def test_incompatible_version_is_reported() -> None:
-    with pytest.raises(MissingExtraError) as fault, requires_extra("live", "the page"):
+    with pytest.raises(MissingExtraError) as fault, naming_extras("the page", "live"):
         from json import no_such_name  # type: ignore[attr-defined] # noqa: F401
     words = str(fault.value)
     assert words.startswith("the page needs another version of json (cannot import name 'no_such_name'")

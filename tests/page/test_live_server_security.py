@@ -1,7 +1,6 @@
 """The live server under attack from other pages and hand-made requests."""
 
 import http.client
-import http.server
 import json
 import re
 import shutil

@@ -1,22 +1,19 @@
 """`armwright design --budget`: a run ends on time. Clocks are injected: no test depends on the machine's speed."""
 
-import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from armwright import Problem, find_front, load_task
-from armwright.cli.progress import search_progress
 from armwright.exceptions import SettingsError
 from armwright.kinematics.devices import Compilation
 from armwright.proof.results import read_summary
 from armwright.spaces.design_space import default_space
 from armwright.study.front import direct_search
-from armwright.study.front.search_budget import SearchBudget, SearchProgress, read_seconds
+from armwright.study.front.search_budget import SearchBudget, read_seconds
 from armwright.study.front.time_plan import ChunkSize, TimePlan
 from tests.support.controlled_runs import interrupt_at
 
@@ -180,19 +177,3 @@ def test_chunks_take_a_small_share_of_the_budget(seconds: float) -> None:
     assert size.value * seconds == pytest.approx(2.0, rel=0.01)
     size.adapt(size.value, 60.0 * size.value)
     assert size.value == 16  # of slow designs, chunks are not too small
-
-
-@pytest.mark.parametrize(
-    ("progress", "line"),
-    [
-        (SearchProgress(2_000, 2.0, 0.0, 1, SearchBudget(evaluations=9_000), new_evaluations=2_000, new_seconds=2.0),
-         "about 1,000 designs/s: 9,000 designs in 9 s"),
-        (SearchProgress(50_500, 11.0, 0.0, 1, SearchBudget(seconds=30.0), 9.0, 500, 1.0),
-         "about 500 designs/s: 55,000 designs in 20 s"),
-    ],
-)  # fmt: skip
-def test_rate_counts_what_the_budget_allows(progress: SearchProgress, line: str) -> None:
-    output = io.StringIO()
-    with search_progress(Console(file=output, width=200)) as watch:
-        watch(progress)
-    assert line in output.getvalue()

@@ -21,6 +21,7 @@ from armwright.cli import (
     search_commands,
     simulate_command,
 )
+from armwright.cli.options import read_declaration
 from armwright.cli.signals import INTERRUPTED, install_handlers
 from armwright.cli.streams import abandon_streams, claim_streams, print_error
 from armwright.exceptions import ArmwrightError
@@ -44,11 +45,7 @@ COMMANDS = {
         input_commands.actuators,
         input_commands.draft,
     ),
-    "Search": (
-        search_commands.design,
-        search_commands.optimize,
-        experiment_commands.experiment,
-    ),
+    "Search": (search_commands.design, search_commands.optimize, experiment_commands.experiment),
     "After a run": (
         output_commands.pick,
         output_commands.export,
@@ -62,8 +59,8 @@ COMMANDS = {
 }
 
 
-def _claiming_streams(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a command that claims the streams first, and names the extra that it lacks.
+def _command(function: Callable[..., None]) -> Callable[..., None]:
+    """Return a command as Typer declares it, which claims the streams first and names the extra that it lacks.
 
     Not before Typer has printed help, which uses sys.stdout.
     """
@@ -74,12 +71,13 @@ def _claiming_streams(function: Callable[..., None]) -> Callable[..., None]:
         with naming_extras(function.__name__.replace("_", "-")):
             function(*arguments, **options)
 
+    command.__doc__, command.__signature__ = read_declaration(function)  # pyright: ignore[reportAttributeAccessIssue]
     return command
 
 
 for _panel, _functions in COMMANDS.items():
     for _function in _functions:
-        app.command(rich_help_panel=_panel)(_claiming_streams(_function))
+        app.command(rich_help_panel=_panel)(_command(_function))
 
 
 def main() -> NoReturn:

@@ -1,34 +1,24 @@
-"""Options of commands about existing arms."""
+"""Numbers in options, such as those of commands about existing arms."""
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from armwright.cli.options import option
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
     from armwright.robot.mounting import Mounting
 
-Tip = Annotated[str | None, option("Link of the URDF at the tip.", default="the last one")]
-BaseLink = Annotated[str | None, option("Link of the URDF at the base.", default="the root")]
-BasePose = Annotated[
-    str | None,
-    option(
-        r"Where base links stand \[m], and how far they are turned about the vertical [°].",
-        "--base",
-        default="searched",
-        metavar="X,Y,Z[,YAW]",
-    ),
-]
 
-
-def parse_price(text: str) -> float:
-    """Parse `28000` into a price [USD]."""
+def parse_numbers(option: str, text: str, expected: str, *counts: int) -> list[float]:
+    """Parse finite numbers with commas, as many as one of the counts."""
     try:
-        return float(text)
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
-        raise SettingsError(f'--price "{text}": expected a number of USD, such as 28000') from None
+        numbers = []
+    if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
+        raise SettingsError(f'{option} "{text}": expected {expected}')
+    return numbers
 
 
 def parse_prices(texts: Sequence[str]) -> dict[str, float]:
@@ -51,10 +41,6 @@ def parse_base(text: str | None) -> "Mounting | None":
 
     if text is None:
         return None
-    try:
-        x, y, z, *yaw = (float(part) for part in text.split(","))
-        return Mounting.of((x, y, z, *map(math.radians, yaw)))
-    except (ValueError, SettingsError):
-        raise SettingsError(
-            f'--base "{text}": expected three numbers with commas, such as 0,0,0.5 [m], or a fourth, the turn [°]'
-        ) from None
+    expected = "three numbers with commas, such as 0,0,0.5 [m], or a fourth, the turn [°]"
+    x, y, z, *yaw = parse_numbers("--base", text, expected, 3, 4)
+    return Mounting.of((x, y, z, *map(math.radians, yaw)))

@@ -2,58 +2,44 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from armwright.cli.activity import activity
-from armwright.cli.arm_options import BaseLink, BasePose, Tip, parse_base, parse_prices
-from armwright.cli.options import (
-    Csv,
-    Figures,
-    Json,
-    ModelName,
-    ModelOptionsFile,
-    Scheduler,
-    SpaceFile,
-    option,
-    select_workers,
-)
+from armwright.cli.arm_options import parse_base, parse_prices
+from armwright.cli.options import select_workers
 from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_json, print_records, print_text
-from armwright.exceptions import FailureError
+from armwright.exceptions import FailureError, SettingsError
 
 
 def experiment(
-    name: Annotated[
-        str,
-        typer.Argument(help="A built-in experiment (paper, recorded, rules, n-step, samplers, ...), or a YAML file."),
-    ],
-    seeds: Annotated[int | None, option("Number of seeds, from 0, instead of the file's.")] = None,
-    method: Annotated[list[str] | None, option("Only this method of the file (may be repeated).")] = None,
-    task: Annotated[list[str] | None, option("Only this task of the file (may be repeated).")] = None,
-    model: ModelName = None,
-    model_options: ModelOptionsFile = None,
-    replay: Annotated[
-        Path | None,
-        option("Replay the recorded calls of this experiment folder."),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        option(
-            "Local processes that run the cells; 0: this process.",
-            default="one per core with the extra distributed, else 0",
-        ),
-    ] = None,
-    scheduler: Scheduler = None,
-    print_commands: Annotated[bool, option("Print one command per cell to run, and exit.", "--print-commands")] = False,
-    print_: Annotated[bool, option("Print the file of a built-in experiment, and exit.", "--print")] = False,
-    figures: Figures = True,
-    out: Annotated[Path | None, option("Folder.", default="experiments/NAME")] = None,
-    json_: Json = False,
+    name: str,
+    *,
+    seeds: int | None = None,
+    seed: list[int] | None = None,
+    method: list[str] | None = None,
+    task: list[str] | None = None,
+    model: str | None = None,
+    model_options: str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    print_: bool = False,
+    figures: bool = True,
+    out: Path | None = None,
+    json_: bool = False,
 ) -> None:
     """Run methods on tasks with several seeds, and compare them.
 
     The same command resumes; finished runs are kept.
+
+    Parameters:
+        name: A built-in experiment (paper, recorded, rules, n-step, samplers, ...), or a YAML file.
+        seeds: Number of seeds, from 0, instead of the file's.
+        seed: Only this seed (may be repeated).
+        method: Only this method of the file (may be repeated).
+        task: Only this task of the file (may be repeated).
+        workers: Local processes that run the cells; 0: this process. Default: one per core with the extra distributed,
+            else 0.
+        print_: Print the file of a built-in experiment, and exit.
+        out: Folder. Default: experiments/NAME.
     """
     from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_files, show_outcome, show_plan
@@ -66,23 +52,21 @@ def experiment(
     if print_:
         print_text(plan.builtin_text(name), end="")
         return
-    console = open_console(json_ or print_commands)
+    console = open_console(json_)
     whole, folder = plan.load_experiment(name)
-    chosen = plan.with_model(
-        plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds),
-        load_model_options(model_options, model=model),
-    )
+    chosen = plan.with_model(whole, load_model_options(model_options, model=model))
+    if seeds is not None:
+        if not 1 <= seeds <= plan.MAX_SEEDS:
+            raise SettingsError(f"--seeds: expected a whole number from 1 to {plan.MAX_SEEDS}, got {seeds}")
+        chosen = chosen.model_copy(update={"seeds": seeds})
     out = out or Path("experiments") / chosen.name
-    cells, skipped = plan_cells(chosen, folder, out, replay)
+    cells, skipped = plan_cells(chosen, folder, out, methods=method or (), tasks=task or (), seeds=seed or ())
     before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
     finished = {done.cell for done in before}
     due = [cell for cell in cells if cell not in finished]
     is_default = workers is None and scheduler is None
     placed = running.default_workers(len(due)) if is_default else select_workers(workers, scheduler)
     show_plan(console, due, len(before), skipped, placed)
-    if print_commands:
-        print_text("\n".join(cell.command for cell in due))
-        return
     drawing = can_draw(console, figures)
     failed: list[running.CellOutcome] = []
     try:
@@ -116,19 +100,23 @@ def experiment(
 
 
 def compare(
-    folders: Annotated[
-        list[Path] | None, typer.Argument(help="Run folders, or folders that contain them.", show_default="runs")
-    ] = None,
-    list_: Annotated[bool, option("Only list the runs and their progress.", "--list")] = False,
-    baseline: Annotated[
-        str | None, option("The method that the others are compared with.", default="of the first run")
-    ] = None,
-    figures: Figures = True,
-    out: Annotated[Path | None, option("Folder for tables and figures.", default="none are written")] = None,
-    json_: Json = False,
-    csv_: Csv = False,
+    folders: list[Path] | None = None,
+    *,
+    list_: bool = False,
+    baseline: str | None = None,
+    figures: bool = True,
+    out: Path | None = None,
+    json_: bool = False,
+    csv_: bool = False,
 ) -> None:
-    """Compare finished runs by method, task and seed: tables, intervals, tests."""
+    """Compare finished runs by method, task and seed: tables, intervals, tests.
+
+    Parameters:
+        folders: Run folders, or folders that contain them. Default: runs.
+        list_: Only list the runs and their progress.
+        baseline: The method that the others are compared with. Default: of the first run.
+        out: Folder for tables and figures. Default: none are written.
+    """
     from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import show_comparison, show_files
     from armwright.cli.show_results import show_runs
@@ -164,33 +152,29 @@ def compare(
 
 
 def compare_arms(
-    task: Annotated[
-        str, typer.Argument(metavar="TASK", help="A built-in task (see `armwright tasks`), or a YAML file.")
-    ],
-    arms: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="ARM...", help="URDF files, or names such as ur5e or panda (robot_descriptions; extra arms)."
-        ),
-    ],
-    run: Annotated[
-        Path | None,
-        option("A run of the task to compare with; its figures then show the arms."),
-    ] = None,
-    base: BasePose = None,
-    tip: Tip = None,
-    base_link: BaseLink = None,
-    space: SpaceFile = None,
-    figures: Figures = True,
-    seed: Annotated[int, option("Seed of the base search.")] = 0,
-    price: Annotated[
-        list[str] | None,
-        option("Price of an existing arm, such as ur5e=28000 (may be repeated).", metavar="ARM=USD"),
-    ] = None,
-    json_: Json = False,
-    csv_: Csv = False,
+    task: str,
+    arms: list[str],
+    *,
+    run: Path | None = None,
+    base: str | None = None,
+    tip: str | None = None,
+    base_link: str | None = None,
+    space: Path | None = None,
+    figures: bool = True,
+    seed: int = 0,
+    price: list[str] | None = None,
+    json_: bool = False,
+    csv_: bool = False,
 ) -> None:
-    """Evaluate existing arms on TASK, and compare them with the designs of a run."""
+    """Evaluate existing arms on TASK, and compare them with the designs of a run.
+
+    Parameters:
+        task (TASK): A built-in task (see `armwright tasks`), or a YAML file.
+        arms (ARM...): URDF files, or names such as ur5e or panda (robot_descriptions; extra arms).
+        run: A run of the task to compare with; its figures then show the arms.
+        seed: Seed of the base search.
+        price (ARM=USD): Price of an existing arm, such as ur5e=28000 (may be repeated).
+    """
     from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import arm_rows, show_arms
     from armwright.existing.compare_arms import compare_arms, comparison_record

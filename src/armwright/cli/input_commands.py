@@ -6,41 +6,24 @@ import sys
 from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from armwright.cli.options import (
-    Csv,
-    Json,
-    MaxCost,
-    ModelName,
-    ModelOptionsFile,
-    Objectives,
-    SpaceFile,
-    TaskName,
-    load_problem,
-    option,
-)
+from armwright.cli.options import load_problem
 from armwright.cli.signals import INTERRUPTED
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_records, print_text
 from armwright.exceptions import FailureError, TaskError
 
 
 def init(
-    file: Annotated[Path, typer.Argument(help="The task file to write, such as my-task.yaml.")],
-    points: Annotated[
-        Path | None,
-        option("CSV or text file of points, with columns named x, y, z in its header.", "--from"),
-    ] = None,
-    unit: Annotated[str | None, option("Unit of x, y, z: m or mm.", default="as in the header, else m")] = None,
-    offset: Annotated[tuple[float, float, float], option(r"Offset X Y Z added to every point \[m].")] = (
-        0,
-        0,
-        0,
-    ),
+    file: Path, *, from_: Path | None = None, unit: str | None = None, offset: tuple[float, float, float] = (0, 0, 0)
 ) -> None:
-    """Write a commented task file to edit."""
+    """Write a commented task file to edit.
+
+    Parameters:
+        file: The task file to write, such as my-task.yaml.
+        from_: CSV or text file of points, with columns named x, y, z in its header.
+        unit: Unit of x, y, z: m or mm. Default: as in the header, else m.
+        offset: Offset X Y Z added to every point [m].
+    """
     from armwright.files import naming_write_errors
     from armwright.tasks.points_file import read_points
     from armwright.tasks.task import Task
@@ -51,30 +34,28 @@ def init(
         raise TaskError(f"{file}: expected a name that ends in .yaml, such as {file.stem}.yaml")
     if os.path.lexists(file):
         raise TaskError(f"{file} already exists; use another name, or delete it first")
-    found = None if points is None else read_points(points, unit, offset)
+    found = None if from_ is None else read_points(from_, unit, offset)
     text = task_template(file) if found is None else task_template(file, found.targets)
     task = parse_document(text, Task, TaskError, str(file))
     with naming_write_errors(file, error=FailureError), file.open("x", encoding="utf-8") as new:
         new.write(text)
     for note in found.notes if found is not None else ():
-        print_text(f"note: {points}: {note}")
+        print_text(f"note: {from_}: {note}")
     print_text(
         f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
     )
 
 
-def edit(
-    task: Annotated[Path, typer.Argument(metavar="TASK", help="The task file, such as my-task.yaml; it may be new.")],
-    space: Annotated[
-        Path | None,
-        option("The space file.", default="TASK's name with -space"),
-    ] = None,
-    port: Annotated[int, option("Port to listen on; 0: any free port.")] = 0,
-    open_: Annotated[bool, option("Open the page in the browser.", "--open")] = False,
-) -> None:
+def edit(task: Path, *, space: Path | None = None, port: int = 0, open_: bool = False) -> None:
     """Draw TASK and its design space in the browser, check them, and design arms (extra live).
 
     Ctrl-C ends it, with a search that it has started.
+
+    Parameters:
+        task (TASK): The task file, such as my-task.yaml; it may be new.
+        space: The space file. Default: TASK's name with -space.
+        port: Port to listen on; 0: any free port.
+        open_: Open the page in the browser.
     """
     from armwright.editor.edited_files import EditedFiles
     from armwright.editor.server import serve_editor
@@ -83,19 +64,22 @@ def edit(
 
 
 def check(
-    task: TaskName,
-    space: SpaceFile = None,
-    objectives: Objectives = None,
-    deep: Annotated[
-        bool, option("Also look for constraints that none of 1,000 random designs satisfies.", "--deep")
-    ] = False,
-    picture: Annotated[
-        bool, option("Draw targets, bases, obstacles and the cycle's lines.", "--picture/--no-picture")
-    ] = True,
-    out: Annotated[Path | None, option("The picture: a PNG, PDF or SVG file.", default="NAME-check.png")] = None,
-    json_: Json = False,
+    task: str,
+    *,
+    space: Path | None = None,
+    objectives: str | None = None,
+    deep: bool = False,
+    picture: bool = True,
+    out: Path | None = None,
+    json_: bool = False,
 ) -> None:
-    """Check TASK and a design space: what they mean, what cannot work, and what was hardly meant."""
+    """Check TASK and a design space: what they mean, what cannot work, and what was hardly meant.
+
+    Parameters:
+        deep: Also look for constraints that none of 1,000 random designs satisfies.
+        picture: Draw targets, bases, obstacles and the cycle's lines.
+        out: The picture: a PNG, PDF or SVG file. Default: NAME-check.png.
+    """
     from armwright.cli.check import run_check
     from armwright.cli.notes import can_draw
 
@@ -104,12 +88,12 @@ def check(
     run_check(open_console(), problem, deep, drawn, json_)
 
 
-def tasks(
-    names: Annotated[list[str] | None, typer.Argument(help="Describe these tasks (built-in, random-N, files).")] = None,
-    json_: Json = False,
-    csv_: Csv = False,
-) -> None:
-    """List the built-in tasks, or describe the tasks given."""
+def tasks(names: list[str] | None = None, *, json_: bool = False, csv_: bool = False) -> None:
+    """List the built-in tasks, or describe the tasks given.
+
+    Parameters:
+        names: Describe these tasks (built-in, random-N, files).
+    """
     from armwright.cli.show_inputs import show_task, show_tasks, task_rows
     from armwright.experiments.baselines import baselines_of
     from armwright.proof.front_gap import best_known_hypervolume
@@ -138,14 +122,14 @@ def tasks(
 
 
 def actuators(
-    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Actuators to list in full.")] = None,
-    where: Annotated[
-        list[str] | None, option('A condition, such as "peak_torque>=2" or "mass<=80 g" (may be repeated).')
-    ] = None,
-    json_: Json = False,
-    csv_: Csv = False,
+    names: list[str] | None = None, *, where: list[str] | None = None, json_: bool = False, csv_: bool = False
 ) -> None:
-    """List the catalogue of actuators that a space file may name, or the values of some and where they are from."""
+    """List the catalogue of actuators that a space file may name, or the values of some and where they are from.
+
+    Parameters:
+        names ([NAME]...): Actuators to list in full.
+        where: A condition, such as "peak_torque>=2" or "mass<=80 g" (may be repeated).
+    """
     from armwright.cli.actuator_filter import choose, count_unknown, read_conditions
     from armwright.cli.show_inputs import actuator_rows, show_actuator, show_actuators
     from armwright.robot.actuators import catalogue, named_actuator
@@ -167,22 +151,25 @@ def actuators(
 
 
 def draft(
-    description: Annotated[
-        list[str], typer.Argument(metavar="DESCRIPTION...", help="The task of the arm, in any language.")
-    ],
-    model: ModelName = None,
-    max_cost: MaxCost = None,
-    model_options: ModelOptionsFile = None,
-    out: Annotated[Path, option("Folder for the files.")] = Path("."),
-    force: Annotated[bool, option("Replace files of the same name.", "--force")] = False,
-    print_prompt: Annotated[
-        bool, option("Print the prompt and the schema that would be sent, and exit.", "--print-prompt")
-    ] = False,
-    json_: Json = False,
+    description: list[str],
+    *,
+    model: str | None = None,
+    max_cost: float | None = None,
+    model_options: str | None = None,
+    out: Path = Path("."),
+    force: bool = False,
+    print_prompt: bool = False,
+    json_: bool = False,
 ) -> None:
     """Have a language model draft a task file, and a space file if needed, from DESCRIPTION.
 
     Nothing is run.
+
+    Parameters:
+        description (DESCRIPTION...): The task of the arm, in any language.
+        out: Folder for the files.
+        force: Replace files of the same name.
+        print_prompt: Print the prompt and the schema that would be sent, and exit.
     """
     from armwright.cli.show_inputs import show_draft
 

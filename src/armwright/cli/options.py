@@ -1,8 +1,16 @@
-"""Options that several commands share, and the objects that they describe."""
+"""Options of commands, and the objects that they describe.
 
+A command is a plain function: parameters before `*` are its arguments, the others its options. Their help stands in its
+docstring, in a section for each group of `--help`: `name (METAVAR): text. Default: text.` What several commands share
+is stated here.
+"""
+
+import inspect
 import os
+import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_origin
 
 import typer
 
@@ -10,98 +18,83 @@ if TYPE_CHECKING:
     from armwright.problem.problem import Problem
     from armwright.study.workers.cluster import Workers
 
-# Groups of options in `--help`
-TASK, SEARCH, MODEL = "Task", "Search", "Language model"
-EVALUATION, OUTPUT = "Evaluation", "Output"
+SHARED = """
+Parameters:
+    run (RUN): A run folder.
+    source (RUN|ARM): A run folder, a URDF file, or a name such as ur5e (robot_descriptions; extra arms).
+    task (TASK): A built-in task (see `armwright tasks`), a YAML file, or a run folder.
+    base (X,Y,Z[,YAW]): Where base links stand [m], and how far they are turned about the vertical [°].
+        Default: searched.
+    base_link: Link of the URDF at the base. Default: the root.
+    tip: Link of the URDF at the tip. Default: the last one.
+
+Task:
+    objectives: Objectives to minimise instead of the task's: names with commas, see docs/method.md, 3.
+    robust: Count a design by its worst case with the base or a link 1 mm off.
+    space: Design space: a built-in one, or a YAML file. Default: the task's own, else the paper's.
+
+Search:
+    seed: Seed of everything random.
+
+Language model:
+    max_cost: Stop asking the model after so many USD.
+    model: Language model, such as openai-chat:gpt-4o.
+    model_options (FILE): All other settings of the model (base_url, temperature, in_flight, ...): a YAML file, or a
+        mapping in place such as '{temperature: 0}'; see docs/language-models.md.
+
+Evaluation:
+    device: Evaluate arms on: auto, cpu or cuda.
+    scheduler: Use the Dask cluster at this address (tcp://HOST:PORT); --workers then limits tasks in flight.
+
+Output:
+    csv_: Print only CSV to stdout, in SI units.
+    figures: Make the page (report.html) and the figures of a finished run.
+    json_: Print only JSON to stdout.
+"""
+_SECTION = re.compile(r"^([A-Z][\w ]*):\n((?:    .+\n)+)", re.MULTILINE)
+_PARAMETER = re.compile(r"^    (\w+)(?: \(([^)\n]+)\))?: (.+(?:\n     .+)*)", re.MULTILINE)
 
 
-def option(help: str, *names: str, panel: str | None = None, default: str | None = None, **others: Any) -> Any:
-    """Return an option in a group of `--help`; default: in words, if the value itself says too little."""
-    return typer.Option(*names, help=help, rich_help_panel=panel, show_default=default or True, **others)
+def read_declaration(function: Callable[..., None]) -> tuple[str, inspect.Signature]:
+    """Return the help of a command without its parameters, and its signature with these declared for Typer."""
+    text, signature = inspect.cleandoc(function.__doc__ or "") + "\n", inspect.signature(function)
+    known = {**_read_help(SHARED), **_read_help(text)}
+    parameters = [_declare(one, known.get(one.name, {})) for one in signature.parameters.values()]
+    return _SECTION.sub("", text).strip(), signature.replace(parameters=parameters)
 
 
-# Options
-TaskName = Annotated[
-    str, typer.Argument(metavar="TASK", help="A built-in task (see `armwright tasks`), a YAML file, or a run folder.")
-]
-RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
-SpaceFile = Annotated[
-    Path | None,
-    option("Design space: a built-in one, or a YAML file.", panel=TASK, default="the task's own, else the paper's"),
-]
-Objectives = Annotated[
-    str | None,
-    option("Objectives to minimise instead of the task's: names with commas, see docs/method.md, 3.", panel=TASK),
-]
-EvaluatorName = Annotated[
-    str | None,
-    option(
-        "A custom Python function that evaluates arms, FILE.py:FUNCTION or MODULE:FUNCTION; its code is run.",
-        panel=TASK,
-    ),
-]
-EvaluationTimeout = Annotated[
-    float | None,
-    option(
-        "End an evaluation by --evaluator after so many seconds; its design is infeasible then.",
-        panel=EVALUATION,
-        default="no limit",
-    ),
-]
-AllowFailures = Annotated[
-    bool,
-    option(
-        "Go on if the first five evaluations by --evaluator all fail with the same exception.",
-        "--allow-failures",
-        panel=EVALUATION,
-    ),
-]
-Robust = Annotated[
-    bool, option("Count a design by its worst case with the base or a link 1 mm off.", "--robust", panel=TASK)
-]
-Seed = Annotated[int, option("Seed of everything random.", panel=SEARCH)]
-ModelName = Annotated[str | None, option("Language model, such as openai-chat:gpt-4o.", panel=MODEL)]
-PromptName = Annotated[
-    str | None,
-    option(
-        "Prompt: plus (with analysis instructions), minus, or full (whole front, mechanics).",
-        panel=MODEL,
-        default="plus",
-    ),
-]
-MemoryName = Annotated[
-    str | None,
-    option(
-        "What the model remembers of a run: none (every question is new) or chat (the whole conversation).",
-        panel=MODEL,
-        default="none",
-    ),
-]
-MaxCost = Annotated[float | None, option("Stop asking the model after so many USD.", panel=MODEL)]
-ModelOptionsFile = Annotated[
-    str | None,
-    option(
-        "All other settings of the model (base_url, temperature, in_flight, ...): a YAML file, or a mapping in "
-        "place such as '{temperature: 0}'; see docs/language-models.md.",
-        panel=MODEL,
-        metavar="FILE",
-    ),
-]
-DeviceName = Annotated[str, option("Evaluate arms on: auto, cpu or cuda.", panel=EVALUATION)]
-Figures = Annotated[
-    bool,
-    option("Make the page (report.html) and the figures of a finished run.", "--figures/--no-figures", panel=OUTPUT),
-]
-SummaryJson = Annotated[bool, option("Print only summary.json to stdout.", "--json", panel=OUTPUT)]
-Json = Annotated[bool, option("Print only JSON to stdout.", "--json", panel=OUTPUT)]
-Csv = Annotated[bool, option("Print only CSV to stdout, in SI units.", "--csv", panel=OUTPUT)]
-Scheduler = Annotated[
-    str | None,
-    option(
-        "Use the Dask cluster at this address (tcp://HOST:PORT); --workers then limits tasks in flight.",
-        panel=EVALUATION,
-    ),
-]
+def _read_help(text: str) -> dict[str, dict[str, Any]]:
+    """Return the settings of Typer's parameters by name."""
+    found: dict[str, dict[str, Any]] = {}
+    for panel, body in _SECTION.findall(text):
+        for name, metavar, description in _PARAMETER.findall(body):
+            help_, _, default = " ".join(description.split()).partition(" Default: ")
+            found[name] = {
+                "help": help_.replace("[", r"\["),  # which is markup
+                "metavar": metavar or None,
+                "show_default": default.removesuffix(".") or True,
+                "rich_help_panel": None if panel == "Parameters" else panel,
+            }
+    return found
+
+
+def _declare(parameter: inspect.Parameter, settings: dict[str, Any]) -> inspect.Parameter:
+    """Return a parameter with its declaration as Typer has it, unless it has one."""
+    if get_origin(parameter.annotation) is Annotated:
+        return parameter.replace(kind=parameter.KEYWORD_ONLY)
+    name = parameter.name.strip("_").replace("_", "-")
+    option = f"--{name}" if len(name) > 1 else f"-{name}"
+    names = f"{option}/--no-{name}" if parameter.default is True else option
+    is_argument = parameter.kind is parameter.POSITIONAL_OR_KEYWORD
+    declaration = typer.Argument(**settings) if is_argument else typer.Option(names, **settings)
+    return parameter.replace(annotation=Annotated[parameter.annotation, declaration], kind=parameter.KEYWORD_ONLY)
+
+
+def is_run(name: str) -> bool:
+    """Return whether this is a run folder; unlike Path.is_file, also for a name that is too long."""
+    from armwright.runs.folder import CONFIG
+
+    return os.path.isfile(os.path.join(name, CONFIG))
 
 
 def load_problem(
@@ -118,13 +111,12 @@ def load_problem(
     from armwright.problem.evaluators import load_evaluator
     from armwright.problem.objectives import PAPER_OBJECTIVES, named_objectives
     from armwright.problem.problem import Problem
-    from armwright.runs.folder import CONFIG, read_config
+    from armwright.runs.folder import read_config
     from armwright.spaces.design_space import default_space, load_space
     from armwright.spaces.tolerance import TOLERANCE
     from armwright.tasks.catalogue import load_task
 
-    is_run = os.path.isfile(os.path.join(task, CONFIG))  # unlike Path.is_file, False also for a name that is too long
-    run = read_config(Path(task)) if is_run else None
+    run = read_config(Path(task)) if is_run(task) else None
     loaded = load_task(task) if run is None else run.task
     measured = None if evaluator is None else load_evaluator(evaluator)
     names = () if objectives is None else tuple(name.strip() for name in objectives.split(","))

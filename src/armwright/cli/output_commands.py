@@ -8,36 +8,33 @@ from typing import Annotated
 import typer
 
 from armwright.cli.activity import activity
-from armwright.cli.options import (
-    Csv,
-    Json,
-    ModelName,
-    ModelOptionsFile,
-    RunFolder,
-    option,
-)
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 
 def pick(
-    run: RunFolder,
-    where: Annotated[list[str] | None, option('A condition such as "position_error<=0.05" (may be repeated).')] = None,
-    by: Annotated[str | None, option("The quantity to minimise: torque, mass, link_1, …")] = None,
-    weights: Annotated[
-        str | None,
-        option("Weights of objectives relative to the reference point: position_error=2,torque=1."),
-    ] = None,
-    robust: Annotated[
-        bool, option("Only designs that stay good with the base or a link 1 mm off.", "--robust")
-    ] = False,
-    n: Annotated[int, option("Number of designs, the best first.", "-n")] = 1,
-    all_: Annotated[bool, option("All designs that meet the conditions, in a table.", "--all")] = False,
-    json_: Json = False,
-    csv_: Csv = False,
+    run: Path,
+    *,
+    where: list[str] | None = None,
+    by: str | None = None,
+    weights: str | None = None,
+    robust: bool = False,
+    n: int = 1,
+    all_: bool = False,
+    json_: bool = False,
+    csv_: bool = False,
 ) -> None:
-    """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee."""
-    from armwright.cli.show_picked import picked_records, picked_rows, show_picked, show_picked_table
+    """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee.
+
+    Parameters:
+        where: A condition such as "position_error<=0.05" (may be repeated).
+        by: The quantity to minimise: torque, mass, link_1, …
+        weights: Weights of objectives relative to the reference point: position_error=2,torque=1.
+        robust: Only designs that stay good with the base or a link 1 mm off.
+        n: Number of designs, the best first.
+        all_: All designs that meet the conditions, in a table.
+    """
+    from armwright.cli.show_picked import picked_rows, show_picked, show_picked_table, with_parts
     from armwright.problem.conditions import read_condition, read_weights
     from armwright.proof.selection import pick_from, survival_of
 
@@ -50,8 +47,9 @@ def pick(
         history, picked, records = pick_from(run, conditions, by, weighed, robust)
     chosen = picked if all_ else picked[:n]
     names = [*(condition.name for condition in conditions), *([] if by is None else [by])]
+    rows = picked_rows(history, chosen, names, records)
     if csv_:
-        print_csv(picked_rows(history, chosen, names, records))
+        print_csv(rows)
         return
     if all_ and not json_:
         show_picked_table(open_console(), history, chosen, names, records)
@@ -59,25 +57,20 @@ def pick(
     with activity("perturbing the chosen designs"):
         survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
     if json_:
-        print_json(list(picked_records(history, chosen, names, records, survival)))
+        print_json(list(with_parts(rows, records, survival)))
         return
     show_picked(open_console(), run, history, picked, records, survival, n)
 
 
-def export(
-    run: RunFolder,
-    design: Annotated[int | None, option("Number of the design.", default="the knee of the front")] = None,
-    format_: Annotated[
-        str,
-        option("urdf, ros2_control or mjcf; optuna: the whole run as a study.", "--format"),
-    ] = "urdf",
-    out: Annotated[
-        Path | None, option("Output file.", default="stdout; for optuna, study.db in the run folder")
-    ] = None,
-) -> None:
+def export(run: Path, *, design: int | None = None, format_: str = "urdf", out: Path | None = None) -> None:
     """Write a design of RUN for a simulator or a workshop, or all of RUN for Optuna.
 
     Any design of the run can be exported, not only those of the front.
+
+    Parameters:
+        design: Number of the design. Default: the knee of the front.
+        format_: urdf, ros2_control or mjcf; optuna: the whole run as a study.
+        out: Output file. Default: stdout; for optuna, study.db in the run folder.
     """
     from armwright.extras import naming_extras
     from armwright.proof.export import OPTUNA, export_design
@@ -103,15 +96,21 @@ def export(
 
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
-    live: Annotated[bool, option("Serve the live page of RUN until Ctrl-C instead (extra live).", "--live")] = False,
-    host: Annotated[
-        str, option("Address to listen on; any other than the default opens the page to a network.")
-    ] = "127.0.0.1",
-    port: Annotated[int, option("Port to listen on; 0: any free port.")] = 0,
+    runs: list[Path],
+    *,
+    live: bool = False,
+    host: str = "127.0.0.1",
+    port: int = 0,
     follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
 ) -> None:
-    """Write report.html into each RUN: one file for any browser, without a network."""
+    """Write report.html into each RUN: one file for any browser, without a network.
+
+    Parameters:
+        runs (RUN...): Run folders.
+        live: Serve the live page of RUN until Ctrl-C instead (extra live).
+        host: Address to listen on; any other than the default opens the page to a network.
+        port: Port to listen on; 0: any free port.
+    """
     from armwright.page.live_server import serve
     from armwright.page.page import write_report
     from armwright.runs.folder import read_config
@@ -129,25 +128,24 @@ def report(
         print_text(str(written))
 
 
-def doctor(
-    model: ModelName = None,
-    model_options: ModelOptionsFile = None,
-    call: Annotated[bool, option("Make one small call to the configured model.", "--call")] = False,
-) -> None:
+def doctor(*, model: str | None = None, model_options: str | None = None, call: bool = False) -> None:
     """Show what is installed and which models are configured.
 
     Nothing is sent unless --call is given.
+
+    Parameters:
+        call: Make one small call to the configured model.
     """
     from armwright.cli.doctor import WRONG, examine, try_model
     from armwright.llm.configuration import load_model_options
 
     console = open_console()
     options = load_model_options(model_options, model=model)
-    wrong = False
-    for finding in examine(options):
-        console.print(f"{finding.mark} {finding.subject}: {finding.message}")
-        wrong = wrong or finding.mark == WRONG
-    if wrong:
+    marks: set[str] = set()
+    for mark, finding in examine(options):
+        console.print(f"{mark} {finding}")
+        marks.add(mark)
+    if WRONG in marks:
         sys.exit(FailureError.exit_code)
     if call:
         console.print(try_model(options))

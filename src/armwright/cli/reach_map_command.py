@@ -2,85 +2,68 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from armwright.cli.arm_options import Tip
-from armwright.cli.options import Json, option
+from armwright.cli.arm_options import parse_numbers
 from armwright.cli.streams import open_console, print_json
-from armwright.cli.tables import Column, Table, numbers, print_table
+from armwright.cli.tables import number, print_table, text
 from armwright.exceptions import SettingsError
-from armwright.text import decimals, rounded
+from armwright.text import percent, rounded
 
 if TYPE_CHECKING:
-    from armwright.arrays import Array
-    from armwright.kinematics.reach.reach_map import PoseCoverage
     from armwright.pictures.mapped_arm import MappedArm
 
 GRID, CONDITIONS = "Grid and directions", "Conditions"
 
 
 def reach_map(
-    source: Annotated[
-        str,
-        typer.Argument(metavar="RUN|ARM", help="A run folder, a URDF file, or a name such as ur5e (extra arms)."),
-    ],
-    design: Annotated[int | None, option("Number of the design of RUN.", default="the knee of the front")] = None,
-    tip: Tip = None,
-    spacing: Annotated[
-        float | None,
-        option(r"Distance of neighbouring points \[m].", panel=GRID, default="about 2,000 points"),
-    ] = None,
-    box: Annotated[
-        str | None,
-        option(
-            r"Smallest, then largest coordinates x,y,z,x,y,z of the points \[m].",
-            panel=GRID,
-            default="all that the tip reaches",
-        ),
-    ] = None,
-    axis: Annotated[str, option("Middle x,y,z of the cone of tool directions.", panel=GRID)] = "0,0,-1",
-    cone: Annotated[float, option("Half the opening angle of the cone [°]; 180: all directions.", panel=GRID)] = 180.0,
-    directions: Annotated[int, option("Number of directions.", panel=GRID)] = 50,
-    share: Annotated[
-        float,
-        option("Share of directions at a point of the dexterous volume, 0 to 1.", panel=GRID),
-    ] = 1.0,
-    payload: Annotated[
-        float | None,
-        option(r"Payload at the tip that the motors have to hold \[kg].", panel=CONDITIONS),
-    ] = None,
-    clearance: Annotated[
-        float | None,
-        option(r"Least distance from the arm itself and from obstacles \[m].", panel=CONDITIONS),
-    ] = None,
-    obstacles: Annotated[
-        bool,
-        option("Keep clear of the obstacles of the task.", "--obstacles", panel=CONDITIONS),
-    ] = False,
-    task: Annotated[
-        str | None,
-        option("The task with the obstacles and targets, for a URDF.", panel=CONDITIONS, default="none"),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        option("The npz file; the figure is beside it.", default="RUN/reach-maps/, or this folder"),
-    ] = None,
-    json_: Json = False,
+    source: str,
+    *,
+    design: int | None = None,
+    tip: str | None = None,
+    spacing: float | None = None,
+    box: str | None = None,
+    axis: str = "0,0,-1",
+    cone: float = 180.0,
+    directions: int = 50,
+    payload: float | None = None,
+    clearance: float | None = None,
+    obstacles: bool = False,
+    task: str | None = None,
+    out: Path | None = None,
+    json_: bool = False,
 ) -> None:
-    """Map in which directions an arm can hold its tool at each point of a grid."""
+    """Map in which directions an arm can hold its tool at each point of a grid.
+
+    Parameters:
+        source (RUN|ARM): A run folder, a URDF file, or a name such as ur5e (extra arms).
+        design: Number of the design of RUN. Default: the knee of the front.
+        out: The npz file; the figure is beside it. Default: RUN/reach-maps/, or this folder.
+
+    Grid and directions:
+        spacing: Distance of neighbouring points [m]. Default: about 2,000 points.
+        box: Smallest, then largest coordinates x,y,z,x,y,z of the points [m]. Default: all that the tip reaches.
+        axis: Middle x,y,z of the cone of tool directions.
+        cone: Half the opening angle of the cone [°]; 180: all directions.
+        directions: Number of directions.
+
+    Conditions:
+        payload: Payload at the tip that the motors have to hold [kg].
+        clearance: Least distance from the arm itself and from obstacles [m].
+        obstacles: Keep clear of the obstacles of the task.
+        task: The task with the obstacles and targets, for a URDF. Default: none.
+    """
     from armwright.cli.notes import can_draw
     from armwright.kinematics.reach.reach_map import reach_map
     from armwright.page.page import write_report
     from armwright.page.reach_maps import MOST_POINTS
     from armwright.proof.results import read_summary
 
-    if not 0.0 < share <= 1.0:
-        raise SettingsError(f"--share {share}: expected more than 0 and at most 1")
     if out is not None and out.suffix != ".npz":
         raise SettingsError(f"--out {out}: expected a name that ends in .npz")
-    middle = _numbers("--axis", axis, 3)
+    middle = parse_numbers("--axis", axis, "three numbers with commas, such as 0,0,-1", 3)
+    corners = "six numbers with commas, such as -0.5,-0.5,0,0.5,0.5,0.8"
+    numbers = None if box is None else parse_numbers("--box", box, corners, 6)
     mapped, file, run = _subject(source, design, tip, task, _describe_conditions(payload, clearance, obstacles))
     if obstacles and not mapped.obstacles:
         where = "a task; try --task TASK" if mapped.task is None else "obstacles in the task, which has none"
@@ -90,7 +73,7 @@ def reach_map(
         console.print(f"mapping the reach of {mapped.title} ...")
     found = reach_map(
         mapped.arm,
-        box=None if box is None else _numbers("--box", box, 6).reshape(2, 3),
+        box=None if numbers is None else (numbers[:3], numbers[3:]),
         spacing=spacing,
         axis=middle,
         half_angle=math.radians(cone),
@@ -103,19 +86,30 @@ def reach_map(
         file, run = out, None
     file.parent.mkdir(parents=True, exist_ok=True)
     around = "of the whole sphere" if cone >= 180.0 else f"within {cone:g}° of ({axis})"
-    number = f"{len(found.directions)} directions" if len(found.directions) > 1 else "one direction"
-    texts = {"directions_text": f"{number} {around}", "conditions": mapped.conditions}
+    count = f"{len(found.directions)} directions" if len(found.directions) > 1 else "one direction"
+    texts = {"directions_text": f"{count} {around}", "conditions": mapped.conditions}
     found.save(file, design=mapped.design, **texts)
     files = [file]
     if can_draw(open_console(json_)):
         from armwright.pictures.reach_figure import write_reach_figure
 
         files.append(file.with_suffix(".png"))
-        write_reach_figure(found, mapped, share, files[1])
+        write_reach_figure(found, mapped, files[1])
     is_shown = len(found.points) <= MOST_POINTS
     if run is not None and is_shown and read_summary(run) is not None:
         files.append(write_report(run))
-    volumes = [_volumes(coverage, share) for coverage in (found.bare, found.usable)]
+    coverages = {"within joint limits": found.bare}
+    if mapped.conditions:
+        coverages[mapped.conditions] = found.usable
+    volumes = [
+        {
+            "postures": name,
+            "volume": coverage.volume,
+            "dexterous_volume": coverage.dexterous_volume(),
+            "poses": float(coverage.reached.mean()),
+        }
+        for name, coverage in coverages.items()
+    ]
     if json_:
         print_json(
             {
@@ -123,9 +117,8 @@ def reach_map(
                 "points": len(found.points),
                 "spacing": found.spacing,
                 "directions": len(found.directions),
-                "axis": middle.tolist(),
+                "axis": middle,
                 "cone": cone,
-                "share": share,
                 "conditions": mapped.conditions,
                 "within_limits": volumes[0],
                 "usable": volumes[1] if mapped.conditions else None,
@@ -134,14 +127,11 @@ def reach_map(
         )
         return
     console.print(f"{len(found.points):,} points {rounded(found.spacing)} m apart, {len(found.directions)} directions")
-    part = "all directions" if share >= 1.0 else f">= {100 * share:g} % of directions"
-    columns = (Column("postures", least=24), *numbers("reached [m³]", f"in {part} [m³]", "poses [%]"))
-    names = ("within joint limits", *filter(None, [mapped.conditions]))
-    rows = [
-        (name, rounded(values["volume"]), rounded(values["dexterous_volume"]), decimals(100 * values["poses"], 1))
-        for name, values in zip(names, volumes, strict=False)
-    ]
-    print_table(console, Table(columns, rows, "--json prints all"))
+    columns = (
+        text("postures", "postures", least=24), number("reached [m³]", "volume"),
+        number("in all directions [m³]", "dexterous_volume"), number("poses", "poses", lambda share: percent(share, 1)),
+    )  # fmt: skip
+    print_table(console, columns, volumes, "--json prints all")
     for written in files:
         console.print(str(written))
     if run is not None and not is_shown:
@@ -171,27 +161,11 @@ def _subject(
         if value is not None:
             raise SettingsError(f"{name} {value} is for a URDF; the run {source} has its own")
     _, history = read_run(run)
-    if design is not None and not 0 <= design < len(history):
-        raise SettingsError(f"--design {design}: {source} has the designs 0 to {len(history) - 1}")
     member = pick(history)[0] if design is None else history.member(design)
     title = f"design {member.number} of {source}"
     file = run / REACH_MAPS / f"{member.number:04d}.npz"
     params = history.problem.space.matrix([member.design])[0]
     return MappedArm(title, member.arm, history.problem.task, conditions, design_text(params)), file, run
-
-
-def _numbers(option: str, text: str, n: int) -> "Array":
-    """Parse numbers with commas."""
-    import numpy as np
-
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != n:
-        example = "0,0,-1" if n == 3 else "-0.5,-0.5,0,0.5,0.5,0.8"
-        raise SettingsError(f'{option} "{text}": expected {n} numbers with commas, such as {example}')
-    return np.array(values)
 
 
 def _describe_conditions(payload: float | None, clearance: float | None, obstacles: bool) -> str:
@@ -202,11 +176,3 @@ def _describe_conditions(payload: float | None, clearance: float | None, obstacl
         away = f" by {1e3 * clearance:g} mm" if clearance else ""
         parts.append(f"clear of itself{' and obstacles' if obstacles else ''}{away}")
     return ", ".join(parts)
-
-
-def _volumes(coverage: "PoseCoverage", share: float) -> dict[str, float]:
-    return {
-        "volume": coverage.volume,
-        "dexterous_volume": coverage.dexterous_volume(share),
-        "poses": float(coverage.reached.mean()),
-    }

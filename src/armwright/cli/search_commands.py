@@ -3,81 +3,69 @@
 import shlex
 import sys
 import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from armwright.cli.activity import activity
-from armwright.cli.options import (
-    EVALUATION,
-    MODEL,
-    OUTPUT,
-    SEARCH,
-    AllowFailures,
-    DeviceName,
-    EvaluationTimeout,
-    EvaluatorName,
-    Figures,
-    MaxCost,
-    MemoryName,
-    ModelName,
-    ModelOptionsFile,
-    Objectives,
-    PromptName,
-    Robust,
-    Scheduler,
-    Seed,
-    SpaceFile,
-    SummaryJson,
-    TaskName,
-    load_problem,
-    option,
-    select_workers,
-)
+from armwright.cli.options import is_run, load_problem, select_workers
 from armwright.cli.signals import interruptible
-from armwright.cli.streams import exit_interrupted, open_console, print_command, print_json, repeat_command
-from armwright.exceptions import AnswerPendingError, StoppedError
+from armwright.cli.streams import (
+    exit_interrupted,
+    open_console,
+    print_command,
+    print_error,
+    print_json,
+    print_text,
+    repeat_command,
+)  # fmt: skip
+from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from armwright.llm.model_options import ModelOptions
     from armwright.problem.problem import Problem
 
 
 def design(
-    task: TaskName,
-    budget: Annotated[
-        str | None,
-        option(
-            "Wall-clock time of the command: 60s, 5min, 1h, or a number of seconds. Compiling kernels in a first "
-            "run does not count.",
-            default="30s; no limit with --evaluations",
-        ),
-    ] = None,
-    evaluations: Annotated[
-        int | None, option("Evaluations of the search; with --budget, whichever ends first.")
-    ] = None,
-    space: SpaceFile = None,
-    objectives: Objectives = None,
-    from_: Annotated[Path | None, option("Use all designs of this run as initial designs.", "--from")] = None,
-    robust: Robust = False,
-    device: DeviceName = "auto",
-    figures: Figures = True,
-    stall: Annotated[bool, option("Stop early if the hypervolume stalls.", "--stall/--no-stall")] = True,
-    seed: Seed = 0,
-    out: Annotated[Path | None, option("Run folder.", default="runs/TASK-design-seedSEED")] = None,
-    json_: SummaryJson = False,
+    task: str,
+    *,
+    budget: str | None = None,
+    evaluations: int | None = None,
+    space: Path | None = None,
+    objectives: str | None = None,
+    from_: Path | None = None,
+    robust: bool = False,
+    device: str = "auto",
+    figures: bool = True,
+    stall: bool = True,
+    seed: int = 0,
+    out: Path | None = None,
+    json_: bool = False,
 ) -> None:
     """Find the whole Pareto front of TASK by direct search in batches.
 
     The same command with a larger --budget or --evaluations continues the search.
+
+    Parameters:
+        budget: Wall-clock time of the command: 60s, 5min, 1h, or a number of seconds. Compiling kernels in a first run
+            does not count. Default: 30s; no limit with --evaluations.
+        evaluations: Evaluations of the search; with --budget, whichever ends first.
+        from_: Use all designs of this run as initial designs.
+        stall: Stop early if the hypervolume stalls.
+        out: Run folder. Default: runs/TASK-design-seedSEED.
+
+    Output:
+        json_: Print only summary.json to stdout.
     """
     started = time.monotonic()
     from armwright.cli.notes import can_draw
     from armwright.cli.progress import search_progress
-    from armwright.cli.show_results import show_search
+    from armwright.cli.show_results import show_result
     from armwright.study.front.front_run import find_front
     from armwright.study.front.search_budget import SearchBudget
     from armwright.study.front.time_plan import TimePlan
@@ -91,13 +79,7 @@ def design(
     try:
         with interruptible(), search_progress(console) as watch:
             run = find_front(
-                problem,
-                budget=plan,
-                seed=seed,
-                initial_designs=from_,
-                stop_at_stall=stall,
-                out=folder,
-                watch=watch,
+                problem, budget=plan, seed=seed, initial_designs=from_, stop_at_stall=stall, out=folder, watch=watch
             )
         drawn = _draw(folder, drawing) if figures else []
     except KeyboardInterrupt:
@@ -113,76 +95,75 @@ def design(
             if search["evaluations"] > run.resumed
             else f"{folder}/ is finished; nothing was computed again. Use {option} to continue."
         )
-    show_search(console, run, drawn)
+    show_result(console, run, drawn)
 
 
 def optimize(
-    task: TaskName,
-    space: SpaceFile = None,
-    objectives: Objectives = None,
-    evaluator: EvaluatorName = None,
-    robust: Robust = False,
-    proposer: Annotated[
-        str,
-        option(
-            "Proposer of every n-step-th design: auto (a configured model, else rules), none, rules, llm, "
-            "replay:RUN (a recorded run), manual:DIR (a person, by files).",
-            panel=SEARCH,
-        ),
-    ] = "auto",
-    sampler: Annotated[
-        str,
-        option(
-            "Black-box sampler: auto (surrogate with an evaluator, else tpe), surrogate, tpe, tpe-multivariate, "
-            "nsga2, gp (needs the extra gp) or random.",
-            panel=SEARCH,
-        ),
-    ] = "auto",
-    n_total: Annotated[int, option("Counted trials.", panel=SEARCH)] = 200,
-    n_init: Annotated[int, option("Random trials before the counted ones.", panel=SEARCH)] = 10,
-    n_step: Annotated[int, option("Trials in a block; the first is the proposer's.", panel=SEARCH)] = 10,
-    initial_design: Annotated[
-        list[Path] | None,
-        option("An initial design, such as designs/0042/design.json of a run (may be repeated).", panel=SEARCH),
-    ] = None,
-    screen: Annotated[
-        bool,
-        option("Skip proposals of which the sampler surrogate expects little.", "--screen/--no-screen", panel=SEARCH),
-    ] = True,
-    seed: Seed = 0,
-    model: ModelName = None,
-    prompt: PromptName = None,
-    memory: MemoryName = None,
-    max_cost: MaxCost = None,
-    model_options: ModelOptionsFile = None,
-    print_prompt: Annotated[
-        str | None,
-        option(
-            "Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run folder), or "
-            "schema (of the answer).",
-            panel=MODEL,
-            metavar="WHAT",
-        ),
-    ] = None,
-    device: DeviceName = "auto",
-    workers: Annotated[
-        int,
-        option("Local processes that evaluate designs; 0: this process (extra distributed).", panel=EVALUATION),
-    ] = 0,
-    scheduler: Scheduler = None,
-    evaluation_timeout: EvaluationTimeout = None,
-    allow_failures: AllowFailures = False,
-    out: Annotated[Path | None, option("Run folder.", panel=OUTPUT, default="runs/TASK-seedSEED")] = None,
-    figures: Figures = True,
-    live: Annotated[
-        bool,
-        option("Serve the page of the run on 127.0.0.1 while it runs (extra live).", "--live", panel=OUTPUT),
-    ] = False,
-    json_: SummaryJson = False,
+    task: str,
+    *,
+    space: Path | None = None,
+    objectives: str | None = None,
+    evaluator: str | None = None,
+    robust: bool = False,
+    proposer: str = "auto",
+    sampler: str = "auto",
+    n_total: int = 200,
+    n_init: int = 10,
+    n_step: int = 10,
+    initial_design: list[Path] | None = None,
+    screen: bool = True,
+    seed: int = 0,
+    model: str | None = None,
+    prompt: str | None = None,
+    memory: str | None = None,
+    max_cost: float | None = None,
+    model_options: str | None = None,
+    print_prompt: str | None = None,
+    device: str = "auto",
+    workers: int = 0,
+    scheduler: str | None = None,
+    evaluation_timeout: float | None = None,
+    allow_failures: bool = False,
+    out: Path | None = None,
+    figures: bool = True,
+    live: bool = False,
+    json_: bool = False,
 ) -> None:
     """Search designs for TASK by black-box trials and proposals.
 
     The same command resumes or shows the run; a larger --n-total extends it.
+
+    Task:
+        evaluator: A custom Python function that evaluates arms, FILE.py:FUNCTION or MODULE:FUNCTION; its code is run.
+
+    Search:
+        proposer: Proposer of every n-step-th design: auto (a configured model, else rules), none, rules, llm,
+            replay:RUN (a recorded run), manual:DIR (a person, by files).
+        sampler: Black-box sampler: auto (surrogate with an evaluator, else tpe), surrogate, tpe, tpe-multivariate,
+            nsga2, gp (needs the extra gp) or random.
+        n_total: Counted trials.
+        n_init: Random trials before the counted ones.
+        n_step: Trials in a block; the first is the proposer's.
+        initial_design: An initial design, such as designs/0042/design.json of a run (may be repeated).
+        screen: Skip proposals of which the sampler surrogate expects little.
+
+    Language model:
+        prompt: Prompt: plus (with analysis instructions), minus, or full (whole front, mechanics). Default: plus.
+        memory: What the model remembers of a run: none (every question is new) or chat (the whole conversation).
+            Default: none.
+        print_prompt (WHAT): Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run
+            folder), or schema (of the answer).
+
+    Evaluation:
+        workers: Local processes that evaluate designs; 0: this process (extra distributed).
+        evaluation_timeout: End an evaluation by --evaluator after so many seconds; its design is infeasible then.
+            Default: no limit.
+        allow_failures: Go on if the first five evaluations by --evaluator all fail with the same exception.
+
+    Output:
+        out: Run folder. Default: runs/TASK-seedSEED.
+        live: Serve the page of the run on 127.0.0.1 while it runs (extra live).
+        json_: Print only summary.json to stdout.
     """
     from armwright.cli.notes import can_draw, design_note
     from armwright.cli.progress import study_progress
@@ -195,9 +176,9 @@ def optimize(
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
     load = partial(load_problem, task, space, robust, device, objectives=objectives, evaluator=evaluator)
     if print_prompt is not None:
-        from armwright.cli.show_prompt import show_prompt
-
-        show_prompt(print_prompt, task, space, load, given, n_init, n_total, seed)
+        if space is not None and is_run(task):
+            raise SettingsError(f"--space {space} is for a new run; {task} has its own")
+        _show_prompt(print_prompt, task, load, given, n_init=n_init, n_total=n_total, seed=seed)
         return
     problem = load()
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
@@ -209,7 +190,7 @@ def optimize(
     console.print(choice.reason)
     is_method_chosen = proposer != "auto" or model is not None or sampler != "auto"
     if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
-        console.print(note)
+        console.print(note, soft_wrap=True)  # it holds a command
     _begin(console, problem, space, folder)
     if live:
         from armwright.page.live_server import start_server
@@ -260,6 +241,20 @@ def optimize(
         show_result(console, run, drawn)
     if all(trial.failure is not None for trial in run.trials):
         raise typer.Exit(1)
+
+
+def _show_prompt(what: str, task: str, load: Callable[[], "Problem"], options: "ModelOptions", **new_run: int) -> None:
+    """Print the next prompt, or the schema of its answer: of a run if the task is one, else of a new run."""
+    from armwright.study.prompt_preview import preview, preview_after
+
+    if what not in ("next", "schema"):
+        raise SettingsError(f'--print-prompt "{what}": expected next or schema')
+    shown = preview_after(Path(task), options) if is_run(task) else preview(load(), options, **new_run)
+    if what == "schema":
+        print_json(shown.schema)
+        return
+    print_text(shown.prompt, end="")
+    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}")
 
 
 def _begin(console: "Console", problem: "Problem", space: Path | None, folder: Path) -> None:

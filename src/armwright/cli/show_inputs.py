@@ -4,13 +4,15 @@ import math
 import shlex
 import textwrap
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
 
+from armwright.arrays import Array
 from armwright.cli.streams import format_point, print_command, print_named
-from armwright.cli.tables import NO_BREAK, Column, Table, numbers, print_table
+from armwright.cli.tables import NO_BREAK, Column, number, print_table, text
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.problem.checks.reach import distance_to_bases
 from armwright.problem.constraints import implied_constraints
@@ -25,33 +27,30 @@ from armwright.text import percent, rounded
 if TYPE_CHECKING:
     from armwright.llm.draft import Draft
 
-if TYPE_CHECKING:
-    from armwright.llm.draft import Draft
-
 MAX_ROWS = 40  # of a table of targets
+
+
+def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
+    """Yield tasks as rows of tables, with the share of the best known hypervolume that each method reached."""
+    methods = dict.fromkeys(baseline.method for baseline in baselines())
+    for task in tasks:
+        shares = {baseline.method: baseline.share for baseline in baselines_of(task.name)}
+        shown = {method: shares.get(method) for method in methods}
+        yield {"name": task.name, "targets": len(task.targets), **shown, "description": task.description}
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     """Print a table with a line per task."""
     methods = list(dict.fromkeys(baseline.method for baseline in baselines()))
-    columns = (Column("task"), *numbers("targets", *methods), Column("", rank=1, least=24))
-    rows: list[list[str]] = []
-    for task in tasks:
-        shares = {baseline.method: percent(baseline.share) for baseline in baselines_of(task.name)}
-        shown = (shares.get(method, "") for method in methods)
-        rows.append([task.name, str(len(task.targets)), *shown, task.description])
-    print_table(console, Table(columns, rows, "--json and --csv print all"))
+    columns = (
+        text("task", "name"), number("targets", "targets", str), *(number(name, name, percent) for name in methods),
+        text("", "description", rank=1, least=24),
+    )  # fmt: skip
+    print_table(console, columns, task_rows(tasks))
     console.print(
         f"\n{' and '.join(methods)}: share of the best known hypervolume after 200 counted trials (mean of "
         f"{baselines()[0].runs} runs).\narmwright tasks NAME describes one task; random-N is one of a seeded family."
     )
-
-
-def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
-    """Yield tasks as rows of CSV, with the share of the best known hypervolume that each method reached."""
-    for task in tasks:
-        shares = {baseline.method: baseline.share for baseline in baselines_of(task.name)}
-        yield {"name": task.name, "targets": len(task.targets), **shares, "description": task.description}
 
 
 def actuator_rows(records: Sequence[ActuatorRecord]) -> Iterator[dict[str, Any]]:
@@ -63,44 +62,36 @@ def actuator_rows(records: Sequence[ActuatorRecord]) -> Iterator[dict[str, Any]]
 
 def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
     """Print the catalogue."""
+    torque, four = f"N{NO_BREAK}m", partial(rounded, digits=4)
     columns = (
-        Column("actuator"), Column("maker", rank=3, least=8), *numbers("V", "kg"),
-        *numbers(f"stall N{NO_BREAK}m", rank=2), *numbers(f"rated N{NO_BREAK}m", rank=1),
-        *numbers(f"peak N{NO_BREAK}m", "rad/s", "USD"), Column("source", rank=4, least=24),
+        text("actuator", "name"), text("maker", "maker", rank=3, least=8), number("V", "voltage", four),
+        number("kg", "mass", four), number(f"stall {torque}", "stall_torque", four, rank=2),
+        number(f"rated {torque}", "rated_torque", four, rank=1), number(f"peak {torque}", "peak_torque", four),
+        number("rad/s", "speed", four), number("USD", "price", four),
+        text("source", "source", rank=4, least=24),
     )  # fmt: skip
-    rows: list[list[str]] = []
-    for record in records:
-        values = (
-            record.voltage, record.mass, record.stall_torque, record.rated_torque, record.peak_torque,
-            record.speed, record.price,
-        )  # fmt: skip
-        rows.append([record.name, record.maker, *(rounded(value, 4) for value in values), record.source])
-    print_table(console, Table(columns, rows, "--json and --csv print all"))
-    n_values = sum(value_of(record.completed(), name) is not None for record in records for name in UNITS)
-    n_assumed = sum(len(record.assumed) for record in records)
-    console.print(
-        f"\n{n_values} values of {len(records)} actuators, {n_assumed} of them assumed: estimates, or defaults of the "
-        "kind of actuator.\narmwright actuators NAME lists the values of one with their sources."
-    )
+    print_table(console, columns, records)
+    console.print("\narmwright actuators NAME lists the values of one with their sources.")
 
 
 def show_actuator(console: Console, record: ActuatorRecord) -> None:
     """Print the values of an actuator of the catalogue with their sources."""
     completed, sources = record.completed(), catalogue_sources()[record.name]
+
+    def source_of(name: str) -> str:
+        found = sources.get(name)
+        stated = "page, or as the note says" if found is None else f"{found.address} ({found.statement})"
+        if name not in record.assumed:
+            return stated
+        return f"assumed: estimate from {stated}" if found else f"assumed: default of a {record.kind}"
+
     print_named(console, record.name, f": {record.kind} by {record.maker}")
     console.print(f"page: {record.source}\nnote: {record.note}")
-    rows: list[list[str]] = []
-    for name, unit in UNITS.items():
-        value = value_of(completed, name)
-        if value is None:
-            continue
-        found = sources.get(name)
-        shown = "page, or as the note says" if found is None else f"{found.address} ({found.statement})"
-        if name in record.assumed:
-            shown = f"assumed: estimate from {shown}" if found else f"assumed: default of a {record.kind}"
-        rows.append([name, rounded(value, 4), unit, shown])
-    columns = (Column(""), *numbers("value"), Column(""), Column("source", rank=1, least=24))
-    print_table(console, Table(columns, rows, "--json and --csv print all"))
+    columns = (
+        Column("", str), Column("value", lambda name: rounded(value_of(completed, name), 4), is_number=True),
+        Column("", lambda name: UNITS[name]), Column("source", source_of, rank=1, least=24),
+    )  # fmt: skip
+    print_table(console, columns, [name for name in UNITS if value_of(completed, name) is not None])
     if record.body_shape is not None:
         console.print(f"body: {_describe_body(record, record.body_shape)}")
 
@@ -170,21 +161,23 @@ def show_task(
 
 def show_target_table(console: Console, problem: Problem) -> None:
     """Print a table of the targets of a task and their distances from the bases that a space allows."""
-    task, arrays = problem.task, problem.task.target_arrays
-    heads = ("x [m]", "y [m]", "z [m]", "tolerance [mm]", "payload [kg]", f"nearest{NO_BREAK}base [m]")
-    distances = distance_to_bases(problem.space, task.target_positions)
-    rows: list[list[str]] = []
-    for i, point in enumerate(task.target_positions[:MAX_ROWS].tolist()):
-        values = (*point, 1e3 * arrays.tolerance[i], task.payloads[i], distances[i])
-        rows.append([task.target_names[i], *(rounded(value, 4) for value in values), _tool_direction(arrays, i)])
-    console.print(f"  {len(task.targets)} targets:")
+    task, arrays, points = problem.task, problem.task.target_arrays, problem.task.target_positions
+    distances = distance_to_bases(problem.space, points)
+
+    def column(head: str, values: Array, rank: int = 0) -> Column:
+        return Column(head, lambda i: rounded(float(values[i]), 4), is_number=True, rank=rank)
+
     columns = (
-        Column("target", least=12), *numbers(*heads[:4]), *numbers(heads[4], rank=1), *numbers(heads[5]),
-        Column("tool direction", rank=2, least=14),
+        Column("target", task.target_names.__getitem__, least=12),
+        *(column(f"{axis} [m]", points[:, k]) for k, axis in enumerate("xyz")),
+        column("tolerance [mm]", 1e3 * arrays.tolerance), column("payload [kg]", task.payloads, rank=1),
+        column(f"nearest{NO_BREAK}base [m]", distances),
+        Column("tool direction", lambda i: _tool_direction(arrays, i), rank=2, least=14),
     )  # fmt: skip
-    print_table(console, Table(columns, rows, "--json prints all", indent=2))
-    if len(task.targets) > MAX_ROWS:
-        console.print(f"  … and {len(task.targets) - MAX_ROWS} more")
+    console.print(f"{len(points)} targets:")
+    print_table(console, columns, range(min(MAX_ROWS, len(points))), "--json prints all")
+    if len(points) > MAX_ROWS:
+        console.print(f"… and {len(points) - MAX_ROWS} more")
 
 
 def _tool_direction(arrays: TargetArrays, index: int) -> str:

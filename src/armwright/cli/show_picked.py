@@ -1,17 +1,16 @@
 """Print designs that were picked: each with all that is known of it, or many in a table."""
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic_core import to_jsonable_python
 from rich.console import Console
-from rich.text import Text
 
-from armwright.cli.show_results import format_value
-from armwright.cli.streams import format_point, print_named
-from armwright.cli.tables import Column, Table, numbers, print_table
+from armwright.cli.show_results import format_value, links_of
+from armwright.cli.streams import format_point, print_command, print_named
+from armwright.cli.tables import Column, number, print_table
 from armwright.problem.assumptions import assumed_values, count_assumed
 from armwright.problem.facts import describe_supply
 from armwright.problem.objective import Objective
@@ -26,34 +25,10 @@ from armwright.spaces.parameters import CategoricalParameter
 Records = Mapping[int, DesignRecord]
 
 
-def picked_records(
-    history: History,
-    picked: Sequence[FrontMember],
-    names: Sequence[str],
-    records: Records,
-    survival: Mapping[int, Mapping[str, Any]],
-) -> Iterator[dict[str, Any]]:
-    """Yield the chosen designs for JSON.
-
-    Args:
-        history: The trials of the run.
-        picked: The chosen designs.
-        names: Quantities to include beside those that the run evaluated.
-        records: Records of the designs by number.
-        survival: Records of their survival by number.
-    """
-    quantities = quantities_of_front(history, names, facts_by_number(records))
-    for member in picked:
-        record = {"number": member.number, "source": member.source, **quantities[member.number]}
-        path = records[member.number].path
-        record |= {"joints": member.design.joints} | ({} if path is None else {"path": to_jsonable_python(path)})
-        yield record | ({"survival": survival[member.number]} if member.number in survival else {})
-
-
 def picked_rows(
     history: History, picked: Sequence[FrontMember], names: Sequence[str], records: Records
 ) -> Iterator[dict[str, Any]]:
-    """Yield the chosen designs as rows of CSV: parameters and quantities."""
+    """Yield the chosen designs as rows of CSV: parameters, quantities of the run, and those of these names."""
     quantities = quantities_of_front(history, names, facts_by_number(records))
     categorical = [p.name for p in history.problem.space.parameters if isinstance(p, CategoricalParameter)]
     for member in picked:
@@ -62,7 +37,18 @@ def picked_rows(
             "source": member.source,
             **{name: member.design.params.get(name) for name in categorical},
             **quantities[member.number],
+            "joints": member.design.joints,
         }
+
+
+def with_parts(
+    rows: Iterable[dict[str, Any]], records: Records, survival: Mapping[int, Mapping[str, Any]]
+) -> Iterator[dict[str, Any]]:
+    """Yield rows for JSON: with the worst along the cycle, and with what a design survives."""
+    for row in rows:
+        number = row["number"]
+        parts = {"path": to_jsonable_python(records[number].path), "survival": survival.get(number)}
+        yield row | {name: part for name, part in parts.items() if part is not None}
 
 
 def show_picked_table(
@@ -72,30 +58,21 @@ def show_picked_table(
     quantities = quantities_of_front(history, names, facts_by_number(records))
     minimised = [objective.name for objective in history.problem.objectives]
     further = [name for name in dict.fromkeys(names) if name not in minimised]
-    units = {
-        objective.name: objective.unit_in_brackets for objective in (*QUANTITIES.values(), *history.problem.objectives)
-    }
-    heads = [f"{name.replace('_', ' ')}{units[name]}" if name in units else name for name in (*minimised, *further)]
+    units = {one.name: one.unit_in_brackets for one in (*QUANTITIES.values(), *history.problem.objectives)}
+
+    def quantity(name: str, write: Callable[[float], str]) -> Column:
+        head = f"{name.replace('_', ' ')}{units[name]}" if name in units else name
+        return Column(head, lambda member: write(quantities[member.number][name]), is_number=True)
+
+    motors = Column("motors", lambda member: ", ".join(member.design.motors), rank=5, least=12)
     columns = (
-        *numbers("#"), Column("source", rank=3), *numbers(*heads), Column("types", rank=1),
-        Column("links [m]", rank=4), Column("motors", rank=5, least=12),
+        number("#", "number", str), Column("source", lambda member: source_label(member.source), rank=3),
+        *(quantity(name, format_value) for name in minimised), *(quantity(name, "{:.4g}".format) for name in further),
+        Column("types", lambda member: member.design.joints, rank=1), Column("links [m]", links_of, rank=4),
+        *([motors] if any(member.design.motors for member in picked) else []),
     )  # fmt: skip
-    rows = [
-        [
-            str(member.number),
-            source_label(member.source),
-            *(format_value(quantities[member.number][name]) for name in minimised),
-            *(f"{quantities[member.number][name]:.4g}" for name in further),
-            member.design.joints,
-            " ".join(f"{value:.2f}" for value in member.design.links),
-            ", ".join(member.design.motors),
-        ]
-        for member in picked
-    ]
-    if not any(member.design.motors for member in picked):
-        columns, rows = columns[:-1], [row[:-1] for row in rows]
     _show_count(console, history, picked)
-    print_table(console, Table(columns, rows, "--json and --csv print all"))
+    print_table(console, columns, picked)
 
 
 def _show_count(console: Console, history: History, picked: Sequence[FrontMember]) -> None:
@@ -142,10 +119,8 @@ def show_picked(
             console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
         if member.number in survival:
             console.print(f"  perturbed: {survival[member.number]['verdict']}")
-    first = picked[0].number
-    console.print(
-        Text(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | ros2_control")
-    )
+    export = f"armwright export {shlex.quote(str(run))} --design {picked[0].number}"
+    print_command(console, f"{export} --format urdf | mjcf | ros2_control")
 
 
 def _format_objective(objective: Objective, value: float) -> str:

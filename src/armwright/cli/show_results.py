@@ -1,7 +1,7 @@
 """Print the results of runs: fronts, attribution, costs and the paths of the files."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,61 +10,85 @@ from rich.console import Console
 
 from armwright.cli.notes import payload_note, unused_parts
 from armwright.cli.streams import list_files
-from armwright.cli.tables import Column, Table, numbers, print_table
+from armwright.cli.tables import Column, number, print_table, text
 from armwright.problem.assumptions import count_assumed
 from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import TORQUE_SCALE, position_error, torque
 from armwright.proof.infeasibility import describe_infeasibility
 from armwright.proof.results import REPORT
-from armwright.runs.history import History, source_label
+from armwright.runs.history import FrontMember, History, source_label
 from armwright.spaces.custom_parameters import describe_custom
 from armwright.study.front.direct_search import FrontRun
 from armwright.study.front.time_plan import MAX_DESIGNS
 from armwright.study.progress import StudyResult
+from armwright.text import decimals, percent
 
 SHORT_NAMES = {position_error: "error [m]", torque: "torque"}
 MAX_ROWS = 16  # of the front; front.csv has all
+Record = Mapping[str, Any]  # a part of a summary
 
 
-def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> None:
-    """Print the front, the hypervolume and the costs of a run."""
+def show_result(console: Console, run: StudyResult | FrontRun, figures: Sequence[Path]) -> None:
+    """Print the front, the hypervolume, the costs and the files of a run."""
     history, summary, problem = run.history, run.summary, run.history.problem
     show_front(console, history, summary)
-    if summary["proposer"] is not None:
-        print_table(console, _attribution_table(summary["attribution"]))
-    _show_hypervolume(console, history, summary, "more trials")
-    n_infeasible = int((~history.feasible & ~history.failed).sum())
-    infeasible = f", {n_infeasible} infeasible" if problem.constraints else ""
-    sources = ", ".join(f"{count} {source_label(source)}" for source, count in summary["by_source"].items())
-    seconds = summary["seconds"]
-    parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
-    console.print(f"{summary['n_trials']} trials{infeasible}: {sources}; {seconds['total']:.1f} s ({parts})")
-    if any(summary.get("failures", {}).values()):
-        _show_failures(console, history, summary["failures"])
-    if summary["duplicates"]:
-        console.print(
-            f"{summary['duplicates']} trial{'s' * (summary['duplicates'] > 1)} repeated the design of an earlier one, "
-            "without another evaluation"
-        )
-    if summary["proposer"] is not None:
-        _show_proposer(console, summary["proposer"])
-    is_scaled = torque in problem.objectives
-    notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if is_scaled else []
-    notes += [
-        problem.space.mass_note, payload_note(problem.task), describe_ignored_errors(problem), *unused_parts(problem),
-    ]  # fmt: skip
-    console.print("; ".join(filter(None, notes)))
-    _show_assumed(console, summary)
+    search = summary.get("search")
+    if summary.get("proposer"):
+        console.print("Attribution")
+        columns = (
+            text("source", "source"), number("trials", "trials", str), number("on the front", "front", str),
+            number("hypervolume gained", "hypervolume_gained", lambda gained: decimals(gained, 3)),
+        )  # fmt: skip
+        shares = ({"source": source_label(source), **share} for source, share in summary["attribution"].items())
+        print_table(console, columns, shares, "--json prints all")
+    lines = [
+        *_hypervolume_lines(history, summary, "a larger --budget" if search else "more trials"),
+        *(_study_lines(history, summary) if search is None else _search_lines(history, summary, search)),
+    ]
+    for line in lines:
+        console.print(line)
+    notes = [problem.space.mass_note, payload_note(problem.task), describe_ignored_errors(problem)]
+    if torque in problem.objectives:
+        notes.insert(0, f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|")
+    console.print("; ".join(filter(None, [*notes, *unused_parts(problem)])))
+    if assumed := summary.get("assumed"):
+        console.print(f"assumed values of actuators: {count_assumed(assumed)} (listed in summary.json)")
     show_recommended(console, summary.get("recommended", ()))
-    _show_files(console, run.folder, figures)
+    if run.folder is not None:
+        console.print(f"results: {run.folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
+        if figures:
+            console.print(list_files("figures", figures))
+            console.print(f"page: {run.folder / REPORT}")
 
 
-def show_front(console: Console, history: History, summary: dict[str, Any]) -> None:
+def show_front(console: Console, history: History, summary: Record) -> None:
     """Print the front as a table and how much of it is robust; nothing if the front is empty."""
     if not history.front:
         return
-    verified = summary["verification"]
-    print_table(console, _front_table(history, None if verified is None else set(verified["robust_numbers"])))
+    verified, custom = summary["verification"], history.problem.space.custom
+    robust = () if verified is None else verified["robust_numbers"]
+
+    def objective(name: str, index: int) -> Column:
+        return Column(name, lambda member: format_value(member.values[index]), is_number=True)
+
+    names = [SHORT_NAMES.get(one, one.name.replace("_", " ")) for one in history.problem.objectives]
+    verdict = Column("verdict", lambda member: "robust" if member.number in robust else "sensitive", rank=1)
+    parameters = Column("parameters", lambda member: describe_custom(custom, member.design.params), rank=2)
+    columns = (
+        number("#", "number", str), Column("source", lambda member: source_label(member.source), rank=5),
+        *([] if verified is None else [verdict]), *(objective(name, i) for i, name in enumerate(names)),
+        Column("joints", lambda member: member.design.joints), *([parameters] if custom else []),
+        Column("base [m]", lambda member: " ".join(f"{value:5.2f}" for value in member.design.origin), rank=4),
+        Column("links [m]", links_of, rank=3),
+    )  # fmt: skip
+    reference = history.reference_point or (math.inf,) * len(names)
+    inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front
+    shown = np.unique(np.linspace(0, len(inside) - 1, MAX_ROWS).round().astype(int)).tolist()
+    console.print(f"Pareto front of {history.problem.task.name}")
+    print_table(console, columns, [inside[i] for i in shown], "front.csv has all", gap=1)
+    if left_out := len(history.front) - len(shown):
+        beyond = len(history.front) - len(inside)
+        console.print(f"and {left_out} more" + (f", {beyond} of them beyond the reference point" if beyond else ""))
     if verified is not None:
         console.print(
             f"recomputed in float64 and with the base or a link 1 mm off: {verified['robust']} robust, "
@@ -74,41 +98,57 @@ def show_front(console: Console, history: History, summary: dict[str, Any]) -> N
         )
 
 
-def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> None:
-    """Print the result of a front search."""
-    summary = run.summary
-    show_front(console, run.history, summary)
-    _show_hypervolume(console, run.history, summary, "a larger --budget")
-    search = summary["search"]
-    reason = {"budget": "budget spent", "stall": "hypervolume stalled"}[search["ended_by"]]
-    infeasible = f", {search['infeasible']:,} infeasible," if run.history.problem.constraints else ""
-    console.print(f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}")
-    if summary["n_trials"] < min(search["found"], MAX_DESIGNS):
-        console.print(
-            f"{summary['n_trials']} of {search['found']} distinct designs are kept: there was no time to verify more"
+def links_of(member: FrontMember) -> str:
+    """Return the lengths of the links of a design [m]."""
+    return " ".join(f"{value:.2f}" for value in member.design.links)
+
+
+def _study_lines(history: History, summary: Record) -> Iterator[str]:
+    """Yield what the trials of a study were, and what they cost."""
+    n_infeasible = int((~history.feasible & ~history.failed).sum())
+    infeasible = f", {n_infeasible} infeasible" if history.problem.constraints else ""
+    sources = ", ".join(f"{count} {source_label(source)}" for source, count in summary["by_source"].items())
+    seconds, repeated = summary["seconds"], summary["duplicates"]
+    parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
+    yield f"{summary['n_trials']} trials{infeasible}: {sources}; {seconds['total']:.1f} s ({parts})"
+    latest = {trial.failure.kind: trial for trial in history if trial.failure is not None}
+    for kind, trial in latest.items():
+        assert trial.failure is not None
+        yield (
+            f"{summary['failures'][kind]} of {len(history)} evaluations failed ({kind.replace('_', ' ')}); the last, "
+            f"trial {trial.number}: {trial.failure.description}"
         )
+    if repeated:
+        trials = "trial" if repeated == 1 else "trials"
+        yield f"{repeated} {trials} repeated the design of an earlier one, without another evaluation"
+    if surrogate := summary.get("surrogate"):
+        errors = ", ".join(
+            f"{name} {'constant' if error is None else f'{error:.2g}'}" for name, error in surrogate["errors"].items()
+        )
+        designs = f"{surrogate['designs']} designs"
+        yield f"leave-one-out error of the surrogate over {designs}, in standard deviations: {errors}"
+    if summary["proposer"] is not None:
+        yield from _proposer_lines(summary["proposer"])
+
+
+def _search_lines(history: History, summary: Record, search: Record) -> Iterator[str]:
+    """Yield what a front search evaluated, and why it ended."""
+    reason = {"budget": "budget spent", "stall": "hypervolume stalled"}[search["ended_by"]]
+    infeasible = f", {search['infeasible']:,} infeasible," if history.problem.constraints else ""
+    yield f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}"
+    if summary["n_trials"] < min(search["found"], MAX_DESIGNS):
+        yield f"{summary['n_trials']} of {search['found']} distinct designs are kept: there was no time to verify more"
     if tried := search["reduced"]["evaluations"]:
         kept = search["reduced"]["designs"]
-        console.print(f"{tried} arms without a joint that never moved were evaluated; {kept} are on the front")
+        yield f"{tried} arms without a joint that never moved were evaluated; {kept} are on the front"
     if screening := search.get("screening"):
-        console.print(
+        yield (
             f"considered {screening['considered']:,} designs: bounds discarded {screening['discarded_by_bounds']:,}, "
             f"estimates ranked the rest; {screening['evaluated_though_rejected']:,} evaluated though rejected"
         )
-    problem = run.history.problem
-    console.print("; ".join(filter(None, (problem.space.mass_note, describe_ignored_errors(problem)))))
-    _show_assumed(console, summary)
-    show_recommended(console, summary.get("recommended", ()))
-    _show_files(console, run.folder, figures)
 
 
-def _show_assumed(console: Console, summary: dict[str, Any]) -> None:
-    """Print how many values of actuators are assumed, if any."""
-    if assumed := summary.get("assumed"):
-        console.print(f"assumed values of actuators: {count_assumed(assumed)} (listed in summary.json)")
-
-
-def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) -> None:
+def show_recommended(console: Console, recommended: Sequence[Record]) -> None:
     """Print the recommended designs, whether they are verified in the simulator, and what they survive."""
     roles: dict[str, list[str]] = {}
     for one in recommended:
@@ -119,162 +159,64 @@ def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) ->
         console.print(f"recommended, {', '.join(names)}: {described}")
 
 
-def _show_failures(console: Console, history: History, failures: dict[str, int]) -> None:
-    """Print how many evaluations failed, and the last reason of each kind."""
-    latest = {trial.failure.kind: trial for trial in history if trial.failure is not None}
-    for kind, count in failures.items():
-        if count:
-            trial = latest[kind]
-            assert trial.failure is not None
-            console.print(
-                f"{count} of {len(history)} evaluations failed ({kind.replace('_', ' ')}); the last, trial "
-                f"{trial.number}: {trial.failure.description}"
-            )
-
-
-def _show_hypervolume(console: Console, history: History, summary: dict[str, Any], remedy: str) -> None:
-    """Print the hypervolume and how it compares; remedy: what may help if the front is empty."""
-    volume = summary["hypervolume"]
+def _hypervolume_lines(history: History, summary: Record, remedy: str) -> Iterator[str]:
+    """Yield the hypervolume and how it compares; remedy: what may help if the front is empty."""
+    volume, gap = summary["hypervolume"], summary["front_gap"]
     mean = f"mean over iterations {volume['mean']:.3f}; " if volume.get("mean") is not None else ""
-    origins = [
-        f" ({origin})" for origin in summary.get("search", {}).get("reference_point_from", ()) if origin != "task"
-    ]
     point = volume["reference_point"]
-    parts = zip(point, origins or [""] * len(point), strict=True)
-    reference = ", ".join(f"{value:.4g}{origin}" for value, origin in parts)
+    origins = summary.get("search", {}).get("reference_point_from") or ["task"] * len(point)
+    parts = (f"{value:.4g}" + (f" ({o})" if o != "task" else "") for value, o in zip(point, origins, strict=True))
     if volume["final"] is not None:
-        console.print(f"hypervolume {volume['final']:.3f} ({mean}reference point {reference})")
+        yield f"hypervolume {volume['final']:.3f} ({mean}reference point {', '.join(parts)})"
     if len(history) and not history.feasible.any():
         reason = describe_infeasibility(history, summary.get("feasibility"))
         advice = "" if history.failed.all() else f" Use {remedy} or looser constraints."
-        console.print(f"{reason[0].upper()}{reason[1:]}.{advice}")
+        yield f"{reason[0].upper()}{reason[1:]}.{advice}"
     elif volume["final"] == 0.0:
-        console.print(
-            f"All designs lie beyond the reference point, so none counts. Use {remedy} or another reference point."
-        )
-    _show_front_gap(console, summary["front_gap"])
+        yield f"All designs lie beyond the reference point, so none counts. Use {remedy} or another reference point."
+    if gap is not None:
+        yield f"{gap['share']:.1%} of the best known hypervolume ({gap['hypervolume']:.3f})"
+        if gap["gain"]:
+            yield f"NEW: the front adds at least {gap['gain']:.4%} to the best known hypervolume"
 
 
-def _show_front_gap(console: Console, gap: dict[str, Any] | None) -> None:
-    if gap is None:
-        return
-    console.print(f"{gap['share']:.1%} of the best known hypervolume ({gap['hypervolume']:.3f})")
-    if gap["gain"]:
-        console.print(f"NEW: the front adds at least {gap['gain']:.4%} to the best known hypervolume")
-
-
-def _show_files(console: Console, folder: Path | None, figures: Sequence[Path]) -> None:
-    if folder is None:
-        return
-    console.print(f"results: {folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
-    if figures:
-        console.print(list_files("figures", figures))
-        console.print(f"page: {folder / REPORT}")
-
-
-def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
+def show_runs(console: Console, listed: Sequence[Record]) -> None:
     """Print a table with a line per run."""
     if not listed:
         console.print("no runs found")
         return
     columns = (
-        Column("run"), Column("task", rank=3, least=10), Column("method", rank=1, least=8),
-        *numbers("seed", rank=4), *numbers("trials", rank=2), *numbers("hypervolume", "share"),
-        Column("state", least=10),
+        text("run", "folder"), text("task", "task", rank=3, least=10), text("method", "method", rank=1, least=8),
+        number("seed", "seed", str, rank=4), number("trials", "trials", str, rank=2),
+        number("hypervolume", "hypervolume", lambda volume: decimals(volume, 3)),
+        number("share", "share_of_best_known", lambda share: percent(share, 1)), text("state", "state", least=10),
     )  # fmt: skip
-    rows = [
-        [
-            *(str(run[name]) for name in ("folder", "task", "method", "seed", "trials")),
-            "" if run["hypervolume"] is None else f"{run['hypervolume']:.3f}",
-            "" if run["share_of_best_known"] is None else f"{run['share_of_best_known']:.1%}",
-            str(run["state"]),
-        ]
-        for run in listed
-    ]
-    print_table(console, Table(columns, rows, "--json and --csv print all"))
+    print_table(console, columns, listed)
 
 
-def _front_table(history: History, robust: set[int] | None) -> Table:
-    objectives = [SHORT_NAMES.get(o, o.name.replace("_", " ")) for o in history.problem.objectives]
-    custom = history.problem.space.custom
-    columns = (
-        *numbers("#"), Column("source", rank=5), *([] if robust is None else [Column("verdict", rank=1)]),
-        *numbers(*objectives), Column("joints"), *([Column("parameters", rank=2)] if custom else []),
-        Column("base [m]", rank=4), Column("links [m]", rank=3),
-    )  # fmt: skip
-    reference = history.reference_point or (math.inf,) * len(objectives)
-    inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front
-    shown: list[int] = np.unique(np.linspace(0, len(inside) - 1, MAX_ROWS).round().astype(int)).tolist()
-    rows = [
-        [
-            str(member.number),
-            source_label(member.source),
-            *(() if robust is None else ("robust" if member.number in robust else "sensitive",)),
-            *map(format_value, member.values),
-            member.design.joints,
-            *([describe_custom(custom, member.design.params)] if custom else []),
-            " ".join(f"{value:5.2f}" for value in member.design.origin),
-            " ".join(f"{value:.2f}" for value in member.design.links),
-        ]
-        for member in (inside[i] for i in shown)
-    ]
-    return Table(
-        columns,
-        rows,
-        "front.csv has all",
-        title=f"Pareto front of {history.problem.task.name}",
-        caption=_describe_left_out(len(history.front) - len(shown), len(history.front) - len(inside)),
-        gap=1,
-    )
-
-
-def _describe_left_out(left_out: int, beyond: int) -> str:
-    """Return how many designs of the front the table lacks; empty if none."""
-    note = f", {beyond} of them beyond the reference point" if beyond else ""
-    return f"and {left_out} more{note}" if left_out else ""
-
-
-def _attribution_table(attribution: dict[str, dict[str, Any]]) -> Table:
-    """Return a table of trials and gained hypervolume by source; useful only with a proposer."""
-    rows = [
-        [
-            source_label(source),
-            str(share["trials"]),
-            str(share["front"]),
-            "-" if share["hypervolume_gained"] is None else f"{share['hypervolume_gained']:.3f}",
-        ]
-        for source, share in attribution.items()
-    ]
-    columns = (Column("source"), *numbers("trials", "on the front", "hypervolume gained"))
-    return Table(columns, rows, "--json prints all", title="Attribution")
-
-
-def _show_proposer(console: Console, proposer: dict[str, Any]) -> None:
+def _proposer_lines(proposer: Record) -> Iterator[str]:
+    """Yield what a proposer cost, and how many of its proposals failed."""
     if proposer["model"] is not None:
         cost = "cost unknown" if proposer["cost_usd"] is None else f"{proposer['cost_usd']:.4f} USD"
         by = "" if proposer["origin"] == "model" else f" (origin: {proposer['origin']})"
         tokens = f"{proposer['input_tokens']:,} tokens in, {proposer['output_tokens']:,} out"
-        console.print(
-            f"{proposer['model']}{by}: {proposer['calls']} calls, {tokens}, {cost}, {proposer['call_seconds']:.1f} s"
-        )
-    failures = proposer["failures"]
-    if failures:
+        yield f"{proposer['model']}{by}: {proposer['calls']} calls, {tokens}, {cost}, {proposer['call_seconds']:.1f} s"
+    if failures := proposer["failures"]:
         kinds = ", ".join(f"{count} {kind}" for kind, count in failures.items())
-        console.print(f"{sum(failures.values())} proposals failed and became black-box trials ({kinds})")
+        yield f"{sum(failures.values())} proposals failed and became black-box trials ({kinds})"
     if proposer["flagged"]:
-        console.print(
+        yield (
             f"FLAGGED: {proposer['fallback_share']:.0%} of the proposals failed; this run does not represent its "
             "proposer and is left out of its row in tables"
         )
     if proposer.get("differing_prompts"):
-        console.print(f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones")
-    overlap = proposer["overlap"]
-    if overlap is not None:
+        yield f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones"
+    if (overlap := proposer["overlap"]) is not None:
         age = overlap["feedback_age"]
         feedback = "" if age is None else f"; feedback {age['mean']:.1f} trials old on average, {age['max']} at most"
-        console.print(
-            f"overlap: {overlap['ratio']:.1%} of the trials were proposals (planned: "
-            f"{overlap['ratio_planned']:.1%}){feedback}"
+        yield (
+            f"overlap: {overlap['ratio']:.1%} of the trials were proposals (planned: {overlap['ratio_planned']:.1%})"
+            f"{feedback}"
         )
 
 

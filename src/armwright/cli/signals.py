@@ -6,28 +6,16 @@ import select
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Generator
 from contextlib import contextmanager
 from functools import cache
-from types import FrameType
 
 INTERRUPTED = 130  # exit code of a shell for Ctrl-C
 REPORT_SECONDS = 2.0  # after which a command that has not ended says what it waits for
 END_SECONDS = 10.0  # after which it ends
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _SHOW_CURSOR = "\x1b[?25h"  # progress lines hide it
-
-# What a command may wait for, by the module that waits.
-_WAITS = {
-    "armwright.problem.evaluators": "the evaluator",
-    "armwright.study.workers.cluster": "the workers",
-    "armwright.study.workers.evaluation_process": "the process of the evaluator",
-    "armwright.llm": "the language model",
-    "warp": "the kernels",
-    "optuna": "the sampler",
-    "matplotlib": "the figures",
-}
-
 
 _installed = 0  # how often handlers were installed in this process: once, but in tests
 
@@ -108,23 +96,12 @@ def _is_ending(installed: int) -> bool:
 
 
 def _what_is_awaited() -> str:
-    """Return what the main thread is doing, in words."""
+    """Return the module outside the standard library that the main thread is in, such as an evaluator's."""
     frames = sys._current_frames()  # pyright: ignore[reportPrivateUsage] (documented)
     frame = frames.get(threading.main_thread().ident or 0)
-    modules: list[str] = []
-    while frame is not None:
-        modules.append(_module(frame))
-        frame = frame.f_back
-    waits = (words for module in reversed(modules) for name, words in _WAITS.items() if _is_in(module, name))
-    return next(waits, modules[0] if modules else "the end of the program")
-
-
-def _module(frame: FrameType) -> str:
-    return str(frame.f_globals.get("__name__", frame.f_code.co_filename))
-
-
-def _is_in(module: str, package: str) -> bool:
-    return module == package or module.startswith(f"{package}.")
+    modules = (str(at.f_globals.get("__name__")) for at, _ in traceback.walk_stack(frame))
+    found = next((name for name in modules if name.partition(".")[0] not in sys.stdlib_module_names), "Python")
+    return found.replace("armwright_evaluator_", "the evaluator ")  # a file that --evaluator names
 
 
 def _write(stream: int, text: str) -> None:

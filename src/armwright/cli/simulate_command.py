@@ -2,14 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from armwright.cli.activity import activity
-from armwright.cli.options import Csv, Json, RunFolder
 from armwright.cli.streams import check_formats, open_console, print_csv, print_json
-from armwright.cli.tables import Column, Table, numbers, print_table
+from armwright.cli.tables import number, print_table, text
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
@@ -20,16 +17,22 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    run: RunFolder,
-    design: Annotated[int | None, typer.Option(help="Number of the design.")] = None,
-    recommended: Annotated[bool, typer.Option("--recommended", help="The recommended designs (the default).")] = False,
-    all_: Annotated[bool, typer.Option("--all", help="All designs of the front.")] = False,
-    json_: Json = False,
-    csv_: Csv = False,
+    run: Path,
+    *,
+    design: int | None = None,
+    recommended: bool = False,
+    all_: bool = False,
+    json_: bool = False,
+    csv_: bool = False,
 ) -> None:
     """Drive designs of RUN through their cycle in MuJoCo, and say which pass.
 
     If a recommended design fails, the next one is tried.
+
+    Parameters:
+        design: Number of the design.
+        recommended: The recommended designs (the default).
+        all_: All designs of the front.
     """
     import json
 
@@ -81,8 +84,8 @@ def _simulate_chosen(simulator: "Simulator", design: int | None, every: bool) ->
 
     if design is None and not every:
         return to_jsonable_python(recommend(simulator.history, simulator))
-    for number in [member.number for member in simulator.history.front] if design is None else [design]:
-        simulator(number)
+    for one in [member.number for member in simulator.history.front] if design is None else [design]:
+        simulator(one)
     return []
 
 
@@ -111,14 +114,13 @@ def _show(
     if not results:
         console.print(f"nothing to simulate: {run} has no feasible design")
         return
-    heads = ("cycle [s]", "energy [J]", "tip error [mm]", "without feed-forward", "peak torque / claimed")
-    rows: list[list[str]] = []
-    for row in map(_row, results):
-        off = (f"{1e3 * row[name]:.2f}" for name in ("tip_error", "droop"))
-        cells = (f"{row['cycle_time']:.2f}", f"{row['energy']:.1f}", *off, f"{row['torque_over_claimed']:.3f}")
-        rows.append([str(row["design"]), row["verdict"], *cells])
-    columns = (*numbers("#"), Column("verdict"), *numbers(*heads))
-    print_table(console, Table(columns, rows, "--json and --csv print all"))
+    columns = (
+        number("#", "design", str), text("verdict", "verdict"), number("cycle [s]", "cycle_time", "{:.2f}".format),
+        number("energy [J]", "energy", "{:.1f}".format), number("tip error [m]", "tip_error", "{:.2g}".format),
+        number("without feed-forward", "droop", "{:.2g}".format),
+        number("peak torque / claimed", "torque_over_claimed", "{:.3f}".format),
+    )  # fmt: skip
+    print_table(console, columns, map(_row, results))
     for one in results:
         for reason in one.reasons:
             console.print(f"#{one.design}: {reason}")

@@ -2,10 +2,8 @@
 
 import json
 import os
-import re
 import shlex
 import sys
-import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
@@ -14,13 +12,10 @@ from rich.console import Console
 from rich.text import Text
 
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.tables import NO_BREAK
 from armwright.exceptions import SettingsError
 from armwright.files import to_csv
 
 WIDE = 1000  # [characters]
-_UNBROKEN = re.compile(r"`[^`]*`|\d (?=(?:%|[A-Za-zµ]{1,3})(?:\W|$))")  # commands, and numbers with their units
-
 _own: dict[int, TextIO] = {}  # our copies of stdout (1) and stderr (2)
 
 
@@ -62,27 +57,18 @@ def _print(text: str, end: str, stream: TextIO | None) -> None:
 
 
 class _Console(Console):
-    """A console that breaks sentences between words, and reports a closed pipe as any stream does.
-
-    Rich would end the process silently if the pipe is closed.
-    """
+    """A console that reports a closed pipe as any stream does, where Rich would end the process silently."""
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError
-
-    def print(self, *objects: Any, **options: Any) -> None:
-        """Print objects; sentences that are wider than a terminal are broken between words."""
-        if self.is_terminal and len(objects) == 1 and isinstance(objects[0], str):
-            objects = (wrap_sentences(objects[0], self.width),)
-        super().print(*objects, **options)
 
 
 def open_console(is_json: bool = False) -> Console:
     """Return a console on stdout, or on stderr if another program reads stdout; plain text unless it is a terminal."""
     file = _own.get(2 if is_json else 1)
-    console = _Console(file=file, stderr=is_json, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    console = _Console(file=file, stderr=is_json, highlight=False, markup=False, emoji=False)
     if not console.is_terminal:
-        console.width = WIDE  # tables in files and pipes are whole
+        console.soft_wrap, console.width = True, WIDE  # lines and tables in files and pipes are whole
     return console
 
 
@@ -114,29 +100,14 @@ def check_formats(is_json: bool, is_csv: bool) -> bool:
     return is_json or is_csv
 
 
-def wrap_sentences(text: str, width: int) -> str:
-    """Return text with line breaks between words; commands in backticks stay whole, for copying."""
-    lines: list[str] = []
-    for line in text.split("\n"):
-        whole = _UNBROKEN.sub(lambda found: found[0].replace(" ", NO_BREAK), line)
-        indent = line[: len(line) - len(line.lstrip())] + "  "
-        lines += textwrap.wrap(
-            whole, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-        ) or [""]
-    return "\n".join(lines).replace(NO_BREAK, " ")
-
-
 def print_named(console: Console, name: str, text: str) -> None:
     """Print text that begins with a name in bold."""
-    whole = wrap_sentences(name + text, console.width) if console.is_terminal else name + text
-    shown = Text(whole)
-    shown.stylize("bold", 0, len(name))
-    console.print(shown)
+    console.print(Text.assemble((name, "bold"), text))
 
 
 def print_command(console: Console, command: str) -> None:
     """Print a command on a line of its own, whole, for copying."""
-    console.print(Text(f"  {command}"))
+    console.print(f"  {command}", soft_wrap=True)
 
 
 def exit_interrupted(console: Console, kept: str) -> NoReturn:

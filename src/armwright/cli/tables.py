@@ -1,101 +1,119 @@
 """Tables that fit a terminal: heads are stacked, texts shortened and columns dropped; no number is ever cut."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter, itemgetter
+from typing import Any
 
 from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
+from armwright.text import rounded
+
 ELLIPSIS = "…"
 NO_BREAK = "\N{NO-BREAK SPACE}"  # in heads, between words that stay on one line
+COMPLETE = "--json and --csv print all"
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table."""
+    """A column of a table: its head, and the text of its cell for each record."""
 
     head: str
+    cell: Callable[[Any], str]
     is_number: bool = False  # aligned to the right
     rank: int = 0  # of a table that is too wide, the highest rank is dropped first, rank 0 never
     least: int | None = None  # characters to which its texts may be shortened; None if they are shown whole
 
 
+def text(head: str, key: str, rank: int = 0, least: int | None = None) -> Column:
+    """Return a column of texts: a key or an attribute of the records."""
+    return Column(head, lambda record: str(_value(record, key)), rank=rank, least=least)
+
+
+def number(head: str, key: str, write: Callable[[Any], str] = rounded, rank: int = 0) -> Column:
+    """Return a column of numbers: a key or an attribute of the records."""
+    return Column(head, lambda record: write(_value(record, key)), is_number=True, rank=rank)
+
+
+def _value(record: Any, key: str) -> Any:
+    get: Any = itemgetter(key) if isinstance(record, Mapping) else attrgetter(key)
+    return get(record)
+
+
 @dataclass(frozen=True)
-class Table:
-    """A table of texts without lines."""
+class _Cells:
+    """The texts of a column."""
 
-    columns: Sequence[Column]
-    rows: Sequence[Sequence[str]]
-    complete: str  # where dropped columns are found, such as an option
-    title: str = ""  # the line above the table
-    caption: str = ""  # the line below the table
-    gap: int = 2  # spaces between two columns
-    indent: int = 0  # spaces before each line
+    column: Column
+    head: str
+    cells: Sequence[str]
 
+    @property
+    def head_width(self) -> int:
+        return max(map(cell_len, self.head.split("\n")))
 
-def numbers(*heads: str, rank: int = 0) -> tuple[Column, ...]:
-    """Return columns of numbers."""
-    return tuple(Column(head, is_number=True, rank=rank) for head in heads)
+    @property
+    def width(self) -> int:
+        return max([self.head_width, *map(cell_len, self.cells)])
 
-
-def print_table(console: Console, table: Table) -> None:
-    """Print a table that is at most as wide as the console, and name the columns that it leaves out."""
-    fitted, dropped = fit_table(table, console.width)
-    widths = _widths(fitted)
-    if table.title:
-        console.print(Text(table.title, style="italic"))
-    for line in _head_lines(fitted, widths):
-        console.print(Text(line.replace(NO_BREAK, " "), style="bold"))
-    for row in fitted.rows:
-        console.print(Text(_line(fitted, row, widths)))
-    if table.caption:
-        console.print(table.caption)
-    if dropped:
-        console.print(f"left out at this width: {', '.join(dropped)}; {table.complete}")
+    def aligned(self, line: str) -> str:
+        """Return a line of the column in its width."""
+        space = " " * (self.width - cell_len(line))
+        return space + line if self.column.is_number else line + space
 
 
-def fit_table(table: Table, width: int) -> tuple[Table, list[str]]:
-    """Return a table that fits, if columns of rank 0 leave room for it, and the heads of its dropped columns.
+def print_table(
+    console: Console, columns: Sequence[Column], records: Iterable[Any], complete: str = COMPLETE, gap: int = 2
+) -> None:
+    """Print records as a table that is at most as wide as the console, and name the columns that it leaves out.
 
     Args:
-        table: The table.
-        width: Characters in a line.
+        console: The console.
+        columns: The columns.
+        records: The records, one a line.
+        complete: Where columns are found that are left out, such as an option.
+        gap: Spaces between two columns.
     """
-    shown, dropped = table, list[str]()
-    while _total(shown) > width:
-        shortened = _shorten(_stack_heads(shown), width)
-        droppable = [i for i, column in enumerate(shown.columns) if column.rank]
-        if _total(shortened) <= width or not droppable or len(shown.columns) == 1:
-            return shortened, dropped
-        last = max(droppable, key=lambda i: (shown.columns[i].rank, i))
-        dropped.insert(0, shown.columns[last].head.replace("\n", " ").replace(NO_BREAK, " "))
-        shown = _without(shown, last)
+    records = list(records)
+    whole = [_Cells(column, column.head, [column.cell(record) for record in records]) for column in columns]
+    fitted, dropped = _fitted(whole, console.width, gap)
+    heads = [each.head.split("\n") for each in fitted]
+    height = max(map(len, heads))
+    lines = zip(*([""] * (height - len(head)) + head for head in heads), strict=True)
+    for number, line in enumerate((*lines, *zip(*(each.cells for each in fitted), strict=True))):
+        aligned = (" " * gap).join(each.aligned(part) for each, part in zip(fitted, line, strict=True))
+        console.print(Text(aligned.rstrip().replace(NO_BREAK, " "), style="bold" if number < height else ""))
+    if dropped:
+        console.print(f"left out at this width: {', '.join(dropped)}; {complete}")
+
+
+def _fitted(columns: Sequence[_Cells], width: int, gap: int) -> tuple[Sequence[_Cells], list[str]]:
+    """Return columns that fit, if those of rank 0 leave room for it, and the heads of those that were dropped."""
+    shown, dropped = list(columns), list[str]()
+    while _total(shown, gap) > width:
+        narrow = _shortened([replace(each, head=each.head.replace(" ", "\n")) for each in shown], width, gap)
+        droppable = [each for each in shown if each.column.rank]
+        if _total(narrow, gap) <= width or not droppable or len(shown) == 1:
+            return narrow, dropped
+        last = max(reversed(droppable), key=lambda each: each.column.rank)
+        dropped.insert(0, last.head.replace("\n", " ").replace(NO_BREAK, " "))
+        shown.remove(last)
     return shown, dropped
 
 
-def _without(table: Table, index: int) -> Table:
-    kept = [i for i in range(len(table.columns)) if i != index]
-    rows = [[row[i] for i in kept] for row in table.rows]
-    return replace(table, columns=[table.columns[i] for i in kept], rows=rows)
-
-
-def _stack_heads(table: Table) -> Table:
-    """Return a table whose heads are broken at spaces."""
-    return replace(table, columns=[replace(c, head=c.head.replace(" ", "\n")) for c in table.columns])
-
-
-def _shorten(table: Table, width: int) -> Table:
-    """Return a table with shorter texts, as far as the width demands and its columns allow."""
-    widths = _widths(table)
-    excess = _total(table) - width
-    limits: dict[int, int] = {}
-    for i, column in enumerate(table.columns):
-        if column.least is not None and excess > 0:
-            limits[i] = max(column.least, _head_width(column), widths[i] - excess)
-            excess -= max(0, widths[i] - limits[i])
-    rows = [[shorten(text, limits.get(i, widths[i])) for i, text in enumerate(row)] for row in table.rows]
-    return replace(table, rows=rows)
+def _shortened(columns: Sequence[_Cells], width: int, gap: int) -> list[_Cells]:
+    """Return columns with shorter texts, as far as the width demands and they allow."""
+    excess = _total(columns, gap) - width
+    shown: list[_Cells] = []
+    for each in columns:
+        if each.column.least is not None and excess > 0:
+            limit = max(each.column.least, each.head_width, each.width - excess)
+            excess -= max(0, each.width - limit)
+            each = replace(each, cells=[shorten(cell, limit) for cell in each.cells])
+        shown.append(each)
+    return shown
 
 
 def shorten(text: str, width: int) -> str:
@@ -105,33 +123,5 @@ def shorten(text: str, width: int) -> str:
     return text
 
 
-def _head_width(column: Column) -> int:
-    return max(map(cell_len, column.head.split("\n")))
-
-
-def _widths(table: Table) -> list[int]:
-    return [
-        max([_head_width(column), *(cell_len(row[i]) for row in table.rows)]) for i, column in enumerate(table.columns)
-    ]
-
-
-def _total(table: Table) -> int:
-    widths = _widths(table)
-    return table.indent + sum(widths) + table.gap * (len(widths) - 1)
-
-
-def _head_lines(table: Table, widths: Sequence[int]) -> Iterable[str]:
-    """Yield the lines of the heads, aligned at the bottom."""
-    heads = [column.head.split("\n") for column in table.columns]
-    n_lines = max(map(len, heads))
-    padded = [[""] * (n_lines - len(head)) + head for head in heads]
-    for line in zip(*padded, strict=True):
-        yield _line(table, line, widths)
-
-
-def _line(table: Table, row: Sequence[str], widths: Sequence[int]) -> str:
-    cells = (
-        " " * (width - cell_len(text)) + text if column.is_number else text + " " * (width - cell_len(text))
-        for column, text, width in zip(table.columns, row, widths, strict=True)
-    )
-    return (" " * table.indent + (" " * table.gap).join(cells)).rstrip()
+def _total(columns: Sequence[_Cells], gap: int) -> int:
+    return sum(each.width for each in columns) + gap * (len(columns) - 1)

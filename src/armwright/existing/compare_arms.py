@@ -6,8 +6,8 @@ values are those of the data sheets.
 """
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,12 +15,12 @@ import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 
 from armwright.exceptions import RunFolderError, SettingsError, TaskError, did_you_mean
-from armwright.existing.base_placement import placed
+from armwright.existing.base_placement import Placement, placed
 from armwright.existing.existing_arm import ExistingArm
 from armwright.files import MAX_DERIVED, read_bytes
 from armwright.kinematics.arms.arm_arrays import FIXED, stack_arms
 from armwright.pareto import front_indices, knee_index, paper_solution_indices
-from armwright.problem.facts import Fact, reach_facts
+from armwright.problem.facts import Fact, Facts, reach_facts
 from armwright.problem.over_reach import reach_lines
 from armwright.problem.problem import Problem
 from armwright.proof.design_record import compute_facts
@@ -29,7 +29,7 @@ from armwright.robot.mounting import Mounting
 from armwright.robot.robot_descriptions import find_urdf
 from armwright.robot.urdf_reader import UrdfArm, read_urdf
 from armwright.runs.folder import RunFolder, read_run
-from armwright.runs.history import FrontMember, History
+from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace, default_space
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
@@ -129,11 +129,7 @@ def compare_arms(
     stated = _check_prices(prices or {}, names)
     places = [placed(problem, arm, seed, mounting) for arm in described]
     compared = [
-        replace(
-            _compared(problem, history, name, place.described.arm, arm.notes, stated.get(name)),
-            base=place.mounting.position,
-            yaw=place.mounting.yaw,
-        )
+        _compared(problem, history, name, place, arm.notes, stated.get(name))
         for name, arm, place in zip(names, described, places, strict=True)
     ]
     result = ArmComparison(
@@ -196,21 +192,17 @@ def comparison_record(comparison: ArmComparison) -> dict[str, Any]:
 
 
 def _history(run: Path, task: Task, space: DesignSpace | None) -> History:
-    """Read a run of the same task."""
+    """Read a run of the same task: with the same targets, and the same that an arm carries there."""
     if space is not None:
         raise SettingsError("expected a run or a space, got both; the run has its own space")
     _, history = read_run(run)
     own = history.problem.task
     if not len(history):
         raise RunFolderError(f"{run} has no finished trial yet, so there is nothing to compare with")
-    if _carried(task) != _carried(own):
+    asked, stored = ((one.targets, one.tool, one.payloads.tolist(), one.load_shape) for one in (task, own))
+    if asked != stored:
         raise TaskError(f"{run} is a run of the task {own.name}, with other targets, another tool or other payloads")
     return history
-
-
-def _carried(task: Task) -> tuple[object, ...]:
-    """Return the targets of a task, and what an arm carries there."""
-    return task.targets, task.tool, task.payloads.tolist(), task.load_shape
 
 
 def _names(arms: Sequence[str | Path | UrdfArm], described: Sequence[UrdfArm]) -> list[str]:
@@ -236,11 +228,12 @@ def _compared(
     problem: Problem,
     history: History | None,
     name: str,
-    arm: Arm,
+    place: Placement,
     notes: Sequence[str],
     price: float | None,
 ) -> ComparedArm:
     """Evaluate an existing arm in its place; price: as stated [USD], in place of that of its parts."""
+    arm = place.described.arm
     existing = ExistingArm(problem, problem.physics(stack_arms([arm])), price)
     values, violated = existing.objectives, existing.violated
     unknown = [o.name for o, one in zip(problem.objectives, values, strict=True) if one is None]
@@ -248,38 +241,39 @@ def _compared(
     notes += [f"unknown whether it meets {description}" for description in existing.undecided]
     counts = None if history is None else dominance_counts(values, violated, history)
     dominates, dominated_by = counts or (None, None)
-    farthest = reach_lines(arm, float(problem.task.payloads.max()))[-1]
     return ComparedArm(
         name=name,
         joints=int((existing.evaluation.arms.motion < FIXED).sum()),
-        base=arm.base,
+        base=place.mounting.position,
         values=values,
-        facts={**reach_facts(farthest), **existing.facts(arm)},
+        facts={**_reach(problem, arm), **existing.facts(arm)},
         dominates=dominates,
         dominated_by=dominated_by,
         violated=violated,
         notes=tuple(notes),
+        yaw=place.mounting.yaw,
     )
 
 
-def _chosen_designs(history: History) -> list[ComparedArm]:
-    """Return the most precise design of the front, its knee, and the one with the smallest last objective."""
+def _reach(problem: Problem, arm: Arm) -> Facts:
+    return reach_facts(reach_lines(arm, float(problem.task.payloads.max()))[-1])
+
+
+def _chosen_designs(history: History) -> Iterator[ComparedArm]:
+    """Yield the most precise design of the front, its knee, and the one with the smallest last objective."""
     reference = history.reference_point or (np.inf,) * len(history.problem.objectives)
     indices = front_indices(history.masked_objectives)
     if not indices:
-        return []
+        return
     first, last = paper_solution_indices(history.masked_objectives, reference) or (indices[0], indices[-1])
     knee = knee_index(history.masked_objectives, reference)
-    chosen = [index for index in dict.fromkeys((first, knee, last)) if index is not None]
-    return [_compared_design(history, history.member(index)) for index in chosen]
-
-
-def _compared_design(history: History, member: FrontMember) -> ComparedArm:
-    farthest = reach_lines(member.arm, float(history.problem.task.payloads.max()))[-1]
-    return ComparedArm(
-        name=f"#{member.number} {member.design.joints}",
-        joints=sum(joint.kind != "fixed" for joint in member.arm.joints),
-        base=member.arm.base,
-        values=member.values,
-        facts={**reach_facts(farthest), **compute_facts(history, [member.number])[member.number]},
-    )
+    for index in dict.fromkeys((first, knee, last)):
+        if index is not None:
+            member = history.member(index)
+            yield ComparedArm(
+                name=f"#{index} {member.design.joints}",
+                joints=sum(joint.kind != "fixed" for joint in member.arm.joints),
+                base=member.arm.base,
+                values=member.values,
+                facts={**_reach(history.problem, member.arm), **compute_facts(history, [index])[index]},
+            )

@@ -1,23 +1,20 @@
 """The cells of an experiment: one run per seed, task and method."""
 
 import itertools
-import shlex
-import sys
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
-from armwright.exceptions import SettingsError, TaskError
+from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.experiments.plan import ExperimentPlan, MethodPlan
-from armwright.llm.model_options import ModelOptions
 from armwright.llm.recording_file import shipped_recordings
-from armwright.llm.servers import SERVER_KEY
-from armwright.llm.transcript import TRANSCRIPTS
 from armwright.tasks.catalogue import load_task
 
 RUNS = "runs"  # in an experiment's folder
 MAX_CELLS = 100_000
+
+T = TypeVar("T", int, str)
 
 
 @dataclass(frozen=True)
@@ -38,81 +35,52 @@ class Cell:
     robust: bool
     folder: Path
     replay: str | None = None
+    reason: str = ""  # why it cannot be run; empty if it can
 
     @property
     def description(self) -> str:
         """Method, task and seed, for messages."""
         return f"{self.plan.label}, {self.task_name}, seed {self.seed}"
 
-    @property
-    def command(self) -> str:
-        """The shell command of the same run."""
-        without_key = ["env", "-u", SERVER_KEY] if self.plan.model_options.keyless else []
-        options = self._design_options() if self.plan.design else self._study_options()
-        return shlex.join([*without_key, *_program(), *options])
-
-    def _study_options(self) -> list[str]:
-        plan, options = self.plan, self.plan.model_options
-        if self.replay:
-            options = ModelOptions(in_flight=options.in_flight) if options.in_flight else ModelOptions()
-        arguments: dict[str, Any] = {
-            "proposer": f"replay:{self.replay}" if self.replay else plan.proposer,
-            **options.command_options(),
-            "sampler": plan.sampler,
-            "n-init": self.n_init,
-            "n-step": plan.n_step,
-            "n-total": self.n_total,
-        }
-        return ["optimize", self.task, *self._arguments(arguments), "--no-figures"]
-
-    def _design_options(self) -> list[str]:
-        return ["design", self.task, *self._arguments({"evaluations": self.plan.design}), "--no-figures"]
-
-    def _arguments(self, options: Mapping[str, Any]) -> list[str]:
-        options = {**options, "space": self.space, "seed": self.seed, "out": self.folder}
-        given = [f"--{name.replace('_', '-')}={value}" for name, value in options.items() if value is not None]
-        return given + ["--robust"] * self.robust
-
-
-@dataclass(frozen=True)
-class Skipped:
-    """A cell that cannot be run, and the reason."""
-
-    cell: Cell
-    reason: str
-
 
 def plan_cells(
-    plan: ExperimentPlan, folder: Path, out: Path, replay: Path | None = None
-) -> tuple[list[Cell], list[Skipped]]:
+    plan: ExperimentPlan,
+    folder: Path,
+    out: Path,
+    *,
+    methods: Sequence[str] = (),
+    tasks: Sequence[str] = (),
+    seeds: Sequence[int] = (),
+) -> tuple[list[Cell], list[Cell]]:
     """Return the cells that can be run, by seed, task and method, and those that cannot.
 
     Args:
         plan: The experiment.
         folder: Folder of the files that the experiment names.
         out: Folder of the experiment's results.
-        replay: Folder of an earlier experiment, whose recorded runs replace the model.
+        methods: The only methods; empty for all.
+        tasks: The only tasks; empty for all.
+        seeds: The only seeds; empty for all.
     """
-    if replay is not None and not replay.is_dir():
-        raise SettingsError(f"--replay: expected the folder of an earlier experiment, got {replay}")
-    n_cells = len(plan.task_list) * len(plan.seed_list) * len(plan.methods)
+    chosen_methods = _chosen("method", methods, list(plan.methods), plan.name)
+    chosen_tasks = _chosen("task", tasks, plan.task_list, plan.name)
+    chosen_seeds = _chosen("seed", seeds, plan.seed_list, plan.name)
+    n_cells = len(chosen_tasks) * len(chosen_seeds) * len(chosen_methods)
     if n_cells > MAX_CELLS:
         raise SettingsError(f"the experiment has {n_cells:,} cells; expected at most {MAX_CELLS:,}")
     space = None if plan.space is None else str((folder / plan.space).resolve())
-    tasks = [_task(name, folder) for name in plan.task_list]
-    names = [name for _, name in tasks]
+    found = [_task(name, folder) for name in chosen_tasks]
+    names = [name for _, name in found]
     if len(set(names)) < len(names):
         raise SettingsError(f"expected tasks with different names, got {', '.join(sorted(names))}")
-    ready: list[Cell] = []
-    skipped: list[Skipped] = []
+    cells: list[Cell] = []
     # By seed first: an experiment that is stopped early then has results of every method.
-    for seed, (task, task_name), (key, method) in itertools.product(plan.seed_list, tasks, plan.methods.items()):
-        seeds = plan.seeds_of(key)
-        if seed not in seeds:
+    for seed, (task, task_name), key in itertools.product(chosen_seeds, found, chosen_methods):
+        if seed not in plan.seeds_of(key):
             continue
         cell = Cell(
             method=key,
-            plan=method,
+            plan=plan.methods[key],
             task=task,
             task_name=task_name,
             space=space,
@@ -122,35 +90,33 @@ def plan_cells(
             robust=plan.robust,
             folder=out.resolve() / RUNS / key / task_name / f"seed{seed}",
         )
-        if seed == seeds[0] and not cell.command.isprintable():
-            raise SettingsError(f"{cell.command}: a name in it has a character that is not printable")
-        cell, reason = _with_model_source(cell, folder, replay)
-        if reason:
-            skipped.append(Skipped(cell, reason))
-        else:
-            ready.append(cell)
-    return ready, skipped
+        cells.append(_with_model_source(cell, folder))
+    return [cell for cell in cells if not cell.reason], [cell for cell in cells if cell.reason]
 
 
-def _with_model_source(cell: Cell, folder: Path, replay: Path | None) -> tuple[Cell, str]:
-    """Return the cell with its model or replay; or the reason why it has neither."""
+def _chosen(what: str, chosen: Sequence[T], available: Sequence[T], experiment: str) -> Sequence[T]:
+    """Return what is chosen, all if nothing is; SettingsError for what there is not."""
+    for one in chosen:
+        if one not in available:
+            names = list(map(str, available))
+            raise SettingsError(
+                f'{experiment} has no {what} "{one}".{did_you_mean(str(one), names)} Available: {", ".join(names)}'
+            )
+    return [one for one in available if one in chosen] if chosen else available
+
+
+def _with_model_source(cell: Cell, folder: Path) -> Cell:
+    """Return the cell with its recording, if it replays one, or with the reason why it has no answers of a model."""
     recording = cell.plan.recording(cell.task_name, cell.seed)
     if recording is not None:
         if recording not in shipped_recordings():
             recording = str((folder / recording).resolve())
             if not Path(recording).exists():
-                return cell, f"there is no {cell.plan.proposer.removeprefix('replay:')}"
-        return replace(cell, replay=recording), ""
-    if not cell.plan.needs_a_model:
-        return cell, ""
-    if replay is not None:
-        recorded = replay.resolve() / RUNS / cell.method / cell.task_name / f"seed{cell.seed}"
-        if (recorded / TRANSCRIPTS).is_file():
-            return replace(cell, replay=str(recorded)), ""
-        return cell, f"{replay} has no recorded run of it"
-    if cell.plan.model_options.model is None:
-        return cell, "no language model is configured; use --model, or --replay DIR for recorded runs"
-    return cell, ""
+                return replace(cell, reason=f"there is no {cell.plan.proposer.removeprefix('replay:')}")
+        return replace(cell, replay=recording)
+    if cell.plan.needs_a_model and cell.plan.model_options.model is None:
+        return replace(cell, reason="no language model is configured; name one by --model")
+    return cell
 
 
 def _task(name: str, folder: Path) -> tuple[str, str]:
@@ -161,9 +127,3 @@ def _task(name: str, folder: Path) -> tuple[str, str]:
             raise TaskError(f"there is no file {file}, which the experiment names as a task")
         return str(file.resolve()), load_task(file).name
     return name, load_task(name).name
-
-
-def _program() -> list[str]:
-    """Return the command that started this program, for a shell on the same machine."""
-    called = Path(sys.argv[0])
-    return [str(called.resolve())] if called.name == "armwright" and called.is_file() else ["armwright"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, finite_or_none
 from armwright.exceptions import SettingsError
 from armwright.experiments.run_list import read_finished_runs
 from armwright.experiments.run_record import RunSummary
@@ -56,17 +56,6 @@ class TimeToTarget:
     median_trials: float | None  # over the runs; None if fewer than half of them did
 
 
-@dataclass(frozen=True)
-class Published:
-    """Published results."""
-
-    values: Mapping[tuple[str, str], tuple[float, float]]  # E_hv and σ_hv by the method's label and the task
-    source: str  # the publication
-
-
-NOTHING_PUBLISHED = Published({}, "")
-
-
 class Comparison:
     """Runs of several methods on the same tasks.
 
@@ -74,7 +63,7 @@ class Comparison:
         methods that they are compared with.
     excluded: flagged runs, which do not count.
     widened: tasks whose runs had different reference points; their componentwise maximum is used for all.
-    published: published results, shown next to these.
+    published: E_hv and σ_hv of a publication by method and task, shown next to these. published_in: the publication.
     """
 
     def __init__(
@@ -84,26 +73,27 @@ class Comparison:
         tasks: Sequence[str],
         baseline: str,
         against: Mapping[str, Sequence[str]] | None = None,
-        published: Published = NOTHING_PUBLISHED,
+        published: Mapping[tuple[str, str], tuple[float, float]] | None = None,
+        published_in: str = "",
     ) -> None:
         runs = list(runs)
         points: dict[str, tuple[float, ...]] = {}
         self.widened: list[str] = []
-        for task in tasks:
+        for task in dict.fromkeys(run.task for run in runs):
             of_task = [run for run in runs if run.task == task]
-            if of_task:
-                _check_same_problem(task, of_task)
-                points[task] = tuple(np.max([run.reference_point for run in of_task], axis=0).tolist())
-                if any(run.reference_point != points[task] for run in of_task):
-                    self.widened.append(task)
+            _check_same_problem(task, of_task)
+            points[task] = tuple(np.max([run.reference_point for run in of_task], axis=0).tolist())
+            if any(run.reference_point != points[task] for run in of_task):
+                self.widened.append(task)
         runs = [replace(run, reference_point=points[run.task]) for run in runs]
         self.excluded = [run for run in runs if run.is_flagged]
         self.runs = [run for run in runs if not run.is_flagged]
         self.methods = [method for method in methods if any(run.method == method for run in self.runs)]
         self.tasks = [task for task in tasks if any(run.task == task for run in self.runs)]
-        self.baseline = baseline
+        self.baseline = baseline if baseline in self.methods or not self.methods else self.methods[0]
         self.against = against or {}
-        self.published = published
+        self.published = published or {}
+        self.published_in = published_in
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
@@ -186,32 +176,22 @@ class Comparison:
     @cached_property
     def times(self) -> list[TimeToTarget]:
         """Times to shares of the best known hypervolume, or of the best of these runs if none is known."""
-        return [
-            self._time_to_target(method, task, level)
-            for task in self.tasks
-            for method in self.methods
-            if len(self.curves(method, task))
-            for level in LEVELS
-        ]
-
-    def trials_to(self, method: str, task: str, level: float) -> list[float]:
-        """Return after how many counted trials each run of a method reached a level; infinite if it never did."""
-        target = self._target(task, level)
-        curves = self.curves(method, task)
-        return [float(np.argmax(curve >= target)) + 1 if curve[-1] >= target else math.inf for curve in curves]
-
-    def _target(self, task: str, level: float) -> float:
-        """Return a share of the best known hypervolume, or of the best of these runs if none is known."""
-        return level * (self.best_known(task) or max(run.final for run in self.runs if run.task == task))
+        times: list[TimeToTarget] = []
+        for task in self.tasks:
+            best = self.best_known(task) or max(run.final for run in self.runs if run.task == task)
+            for method in self.methods:
+                curves = self.curves(method, task)
+                for level in LEVELS if len(curves) else ():
+                    trials = [
+                        float(np.argmax(curve >= level * best)) + 1 if curve[-1] >= level * best else math.inf
+                        for curve in curves
+                    ]
+                    reached, median = sum(map(math.isfinite, trials)), finite_or_none(np.median(trials))
+                    times.append(TimeToTarget(task, method, level, level * best, reached, len(trials), median))
+        return times
 
     def _e_hv_by_seed(self, method: str, task: str) -> dict[int, float]:
         return {run.seed: float(run.curve.mean()) for run in self.runs_of(method, task) if len(run.curve)}
-
-    def _time_to_target(self, method: str, task: str, level: float) -> TimeToTarget:
-        trials, target = self.trials_to(method, task, level), self._target(task, level)
-        reached, median = sum(map(math.isfinite, trials)), float(np.median(trials))
-        known_median = median if math.isfinite(median) else None
-        return TimeToTarget(task, method, level, target, reached, len(trials), known_median)
 
     def _result(self, method: str, task: str) -> MethodResult:
         runs, curves = self.runs_of(method, task), self.curves(method, task)

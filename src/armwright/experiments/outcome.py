@@ -7,7 +7,7 @@ import yaml
 
 from armwright.exceptions import FailureError
 from armwright.experiments.cells import Cell
-from armwright.experiments.compare_runs import Comparison, Published
+from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.run_record import read_run_summary
 from armwright.files import check_no_links, naming_write_errors, replace_file
@@ -32,7 +32,7 @@ def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
         for task, numbers in by_task.items()
     }
     baseline = plan.methods[plan.baseline_key].label
-    return Comparison(records, labels, tasks, baseline, against, Published(published, plan.published_in))
+    return Comparison(records, labels, tasks, baseline, against, published, plan.published_in)
 
 
 def write_plan(plan: ExperimentPlan, out: Path) -> None:

@@ -1,7 +1,7 @@
 """Experiment files: tasks, seeds and methods, and their selection."""
 
-from collections.abc import Sequence
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -11,7 +11,7 @@ from armwright.exceptions import SettingsError, did_you_mean
 from armwright.files import check_name
 from armwright.llm.configuration import configured_model, own_addresses
 from armwright.llm.model_options import ModelOptions
-from armwright.proposers.factory import PROPOSERS, Choice, choose_proposer
+from armwright.proposers.factory import Choice, choose_proposer
 from armwright.spaces.design_space import builtin_spaces
 from armwright.tasks.catalogue import builtin_names
 from armwright.yaml_documents import parse_document, read_document
@@ -45,7 +45,7 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """
 
     label: str = Field(min_length=1, max_length=40)
-    proposer: str = "none"
+    proposer: Literal["none", "rules", "llm"] | Annotated[str, Field(pattern="^replay:.+")] = "none"
     design: Count | None = None  # evaluations of `armwright design`, which then runs instead of a study
     sampler: str = "tpe"
     n_step: Count = 10
@@ -69,16 +69,6 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             return choose_proposer(f"replay:{replay}")
         return choose_proposer(self.proposer, self.model_options)
 
-    @model_validator(mode="after")
-    def _check_proposer(self) -> Self:
-        allowed = tuple(name for name in PROPOSERS if name != "auto")
-        if not self.proposer.startswith("replay:") and self.proposer not in allowed:
-            raise ValueError(
-                f'unknown proposer "{self.proposer}"; available: {", ".join(allowed)}, replay:NAME.'
-                f"{did_you_mean(self.proposer, allowed)}"
-            )
-        return self
-
 
 class FigurePlan(BaseModel, frozen=True, extra="forbid"):
     """A figure of hypervolume curves, with a panel for each task."""
@@ -100,7 +90,7 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
     name: Key  # also of its folder
     description: str = ""
-    tasks: tuple[str, ...] | Literal["all"]
+    tasks: Annotated[tuple[str, ...], Field(min_length=1)] | Literal["all"]
     seeds: Seeds = 5
     n_init: Count = 10
     n_total: Count = 200
@@ -115,8 +105,6 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
     @model_validator(mode="after")
     def _check_names(self) -> Self:
-        if not self.tasks:
-            raise ValueError("tasks is empty; name at least one, or all")
         used = {"baseline": () if self.baseline is None else (self.baseline,), "published": tuple(self.published)}
         used |= {f"figures.{name}": figure.methods for name, figure in self.figures.items()}
         used |= {f"methods.{key}.against": method.against for key, method in self.methods.items()}
@@ -171,44 +159,39 @@ def suite_tasks() -> tuple[str, ...]:
     return tuple(name for name in builtin_names() if name not in builtin_spaces())
 
 
-def builtin_experiments() -> dict[str, ExperimentPlan]:
-    """Return the built-in experiments by name."""
+def _builtin_files() -> dict[str, Traversable]:
+    """Return the files of the built-in experiments by name."""
     folder = resources.files("armwright.experiments") / "builtin"
-    files = sorted((f for f in folder.iterdir() if f.name.endswith(".yaml")), key=lambda f: f.name)
-    plans = [parse_document(f.read_text(encoding="utf-8"), ExperimentPlan, SettingsError, f.name) for f in files]
-    return {plan.name: plan for plan in plans}
+    return {file.name.removesuffix(".yaml"): file for file in sorted(folder.iterdir(), key=lambda file: file.name)}
 
 
 def builtin_text(name: str) -> str:
     """Return the file of a built-in experiment, as a template."""
-    file = resources.files("armwright.experiments") / "builtin" / f"{name}.yaml"
-    if name not in builtin_experiments():
-        raise SettingsError(_unknown(name))
-    return file.read_text(encoding="utf-8")
+    files = _builtin_files()
+    if name not in files:
+        raise SettingsError(
+            f'unknown experiment "{name}".{did_you_mean(name, files)} Built-in experiments: {", ".join(files)}; '
+            "or give a YAML file"
+        )
+    return files[name].read_text(encoding="utf-8")
+
+
+def builtin_experiments() -> dict[str, ExperimentPlan]:
+    """Return the built-in experiments by name."""
+    return {name: parse_document(builtin_text(name), ExperimentPlan, SettingsError, name) for name in _builtin_files()}
 
 
 def load_experiment(name_or_path: str) -> tuple[ExperimentPlan, Path]:
     """Return an experiment by its name or YAML file, and the folder of its other files."""
-    known = builtin_experiments()
-    if name_or_path in known:
-        return known[name_or_path], Path.cwd()
     path = Path(name_or_path)
-    if not path.is_file():
-        raise SettingsError(_unknown(name_or_path))
+    if name_or_path in _builtin_files() or not path.is_file():
+        return parse_document(builtin_text(name_or_path), ExperimentPlan, SettingsError, name_or_path), Path.cwd()
     plan = read_document(path, ExperimentPlan, SettingsError)
     methods = {
         key: method.model_copy(update={"model_options": method.model_options.named_in(path.name)})
         for key, method in plan.methods.items()
     }
     return plan.model_copy(update={"methods": methods}), path.resolve().parent
-
-
-def _unknown(name: str) -> str:
-    known = builtin_experiments()
-    return (
-        f'unknown experiment "{name}".{did_you_mean(name, known)} Built-in experiments: {", ".join(known)}; '
-        "or give a YAML file"
-    )
 
 
 def with_model(plan: ExperimentPlan, options: ModelOptions) -> ExperimentPlan:
@@ -226,42 +209,3 @@ def with_model(plan: ExperimentPlan, options: ModelOptions) -> ExperimentPlan:
                 method = method.model_copy(update={"model_options": configured.options})
         methods[key] = method
     return plan.model_copy(update={"methods": methods})
-
-
-def with_seeds(plan: ExperimentPlan, seeds: int | None) -> ExperimentPlan:
-    """Return the plan with this number of seeds from 0 on."""
-    if seeds is None:
-        return plan
-    if not 1 <= seeds <= MAX_SEEDS:
-        raise SettingsError(f"--seeds: expected a whole number from 1 to {MAX_SEEDS}, got {seeds}")
-    return plan.model_copy(update={"seeds": seeds})
-
-
-def with_only(plan: ExperimentPlan, methods: Sequence[str], tasks: Sequence[str]) -> ExperimentPlan:
-    """Return the plan with only these methods and tasks; an empty selection keeps all."""
-    for names, available, what in ((methods, plan.methods, "method"), (tasks, plan.task_list, "task")):
-        for name in names:
-            if name not in available:
-                raise SettingsError(
-                    f'{plan.name} has no {what} "{name}".{did_you_mean(name, available)} '
-                    f"Available: {', '.join(available)}"
-                )
-    kept = {
-        key: method.model_copy(update={"against": tuple(k for k in method.against if not methods or k in methods)})
-        for key, method in plan.methods.items()
-        if not methods or key in methods
-    }
-    return plan.model_copy(
-        update={
-            "methods": kept,
-            "tasks": tuple(name for name in plan.task_list if not tasks or name in tasks),
-            "baseline": plan.baseline_key if plan.baseline_key in kept else None,
-            "published": {key: numbers for key, numbers in plan.published.items() if key in kept},
-            "figures": {
-                name: figure.model_copy(update={"methods": tuple(key for key in figure.methods if key in kept)})
-                for name, figure in plan.figures.items()
-                if any(key in kept for key in figure.methods)
-            },
-            "samples": tuple(key for key in plan.samples if key in kept),
-        }
-    )

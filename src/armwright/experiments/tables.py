@@ -1,38 +1,64 @@
-"""Tables of a comparison: Markdown to read, CSV and JSON for programs, and the paper's table in LaTeX."""
+"""Tables of a comparison: records with all digits for programs, and columns of text in Markdown to read."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from armwright.experiments.compare_runs import LEVELS, Comparison, Contrast, MethodResult
-from armwright.experiments.latex import latex_table
+from armwright.experiments.compare_runs import Comparison, Contrast, MethodResult
 from armwright.experiments.run_record import RunSummary, shares_by_source
-from armwright.experiments.statistics import Interval, PairedTest, can_reject, least_p
+from armwright.experiments.statistics import can_reject, least_p
 from armwright.files import naming_write_errors, replace_file, to_csv
 from armwright.runs.history import source_label
 from armwright.text import decimals, percent
 
 WIDE = 4  # up to this many tasks, each has a column, as in the paper
-BIASES = {
+BIASES = "lengths_5_cm lengths_1_cm base_on_symmetry_plane equal_neighbours"
+INTERVALS = ("e_hv", "final", "share_of_best_known", "difference", "ratio")  # fields, each with its two ends
+HEADS = {  # if they are not the keys in words
+    "final": "hypervolume at the end",
+    "share_of_best_known": "share",
+    "baseline": "against",
+    "n": "pairs",
+    "p_holm": "p (Holm)",
+    "level": "share",
+    "gained": "hypervolume",
     "lengths_5_cm": "5 cm",
     "lengths_1_cm": "1 cm",
     "base_on_symmetry_plane": "in plane",
-    "equal_neighbours": "equal neighbours",
+    "cost_usd": "USD",
 }
-TEST_COLUMNS = ("better", "effect", "p", "p (Holm)")
-_INTERVALS = ("e_hv", "final", "share_of_best_known", "difference", "ratio")  # fields
+Record = dict[str, Any]
+
+
+def _p(p: float | None) -> str:
+    return "–" if p is None else f"{p:.4f}" if p >= 1e-4 else f"{p:.1e}"
+
+
+WRITE: Mapping[str, Callable[[Any], str]] = {  # texts of values, by key
+    **dict.fromkeys(("final", "best_known", "hypervolume"), decimals),
+    **dict.fromkeys(("trials", "median_trials", "proposals", "calls"), partial(decimals, places=0)),
+    **dict.fromkeys(("level", "front", "gained", *BIASES.split()), percent),
+    **dict.fromkeys(("difference", "effect"), "{:+.2f}".format),
+    **dict.fromkeys(("p", "p_holm"), _p),
+    "share_of_best_known": partial(percent, places=1),
+    "ratio": "{:.3f}".format,
+    "cost_usd": partial(decimals, places=4),
+    "source": source_label,
+}
+TESTED = "n better effect p p_holm"
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a comparison, to read and as records."""
+    """A table of a comparison, as records and to read."""
 
     name: str  # of its CSV file, and its key in JSON; empty if another table has the same records
-    records: Sequence[dict[str, Any]]  # with the same keys and all digits
+    records: Sequence[Record]  # with the same keys and all digits
     title: str = ""
     caption: str = ""  # the meaning of its numbers
     head: Sequence[str] = ()
@@ -40,13 +66,13 @@ class Table:
 
 
 def write_tables(place: Path, comparison: Comparison, title: str, notes: Sequence[str] = ()) -> list[Path]:
-    """Write table.md, table.tex and a CSV file of each table; return the paths, table.md first.
+    """Write table.md and a CSV file of each table; return the paths, table.md first.
 
     Only runs.csv holds measured times and folders: equal runs give equal bytes in all other files.
 
     notes: further remarks, such as missing cells.
     """
-    files = {"table.md": markdown(comparison, title, notes), "table.tex": latex(comparison)}
+    files = {"table.md": markdown(comparison, title, notes)}
     files |= {f"{table.name}.csv": to_csv(table.records) for table in tables(comparison) if table.name}
     for name, text in files.items():
         with naming_write_errors(place / name, "; the runs are safe"):
@@ -66,30 +92,46 @@ def markdown(comparison: Comparison, title: str, notes: Sequence[str] = ()) -> s
     return "\n\n".join(parts) + "\n"
 
 
-def latex(comparison: Comparison) -> str:
-    """Return the paper's table, E_hv (σ_hv) of each method and task, in LaTeX (booktabs)."""
-    published = comparison.published
-    remarks = [f"published: {published.source}"] if published.values and published.source else []
-    return latex_table(*_paper_table(comparison), [*remarks, *remarks_on(comparison)])
-
-
 def sections(comparison: Comparison) -> list[Table]:
     """Return the tables that have rows to read."""
     return [table for table in tables(comparison) if table.rows]
 
 
 def tables(comparison: Comparison) -> list[Table]:
-    """Return all tables of a comparison."""
+    """Return the tables of a comparison."""
+    results = [_result_record(comparison, row) for row in comparison.rows]
+    overall, contrasts = (_contrast_records(comparison, of) for of in (comparison.overall, comparison.contrasts))
+    times = [asdict(time) | {"method": comparison.label(time.method)} for time in comparison.times]
+    sources, proposals = list(_source_records(comparison)), list(_proposer_records(comparison))
+    differences = _contrast_caption(comparison)
     return [
-        _methods(comparison),
-        _finals(comparison),
-        _overall(comparison),
-        _contrasts(comparison),
-        _times(comparison),
-        _sources(comparison),
-        _proposers(comparison),
+        _paper_table(comparison, results),
+        _table("", "At the end", FINAL, results, "task method runs final share_of_best_known best_known"),
+        _table("overall", "Over all tasks", OVERALL, overall, f"method baseline ratio {TESTED}"),
+        _table("contrasts", "Differences", differences, contrasts, f"task method baseline difference {TESTED}"),
+        _table("time-to", TO_LEVELS, TIMES, times, "task method level hypervolume median_trials reached runs"),
+        _table("sources", "Front by source", SOURCES, sources, "task method source trials front gained"),
+        _table("proposers", "Proposals", PROPOSALS, proposals, f"task method proposals {BIASES} calls cost_usd"),
         Table("runs", [_run_record(comparison, run) for run in (*comparison.runs, *comparison.excluded)]),
     ]
+
+
+def _table(name: str, title: str, caption: str, records: Sequence[Record], shown: str) -> Table:
+    """Return a table with a row for each record; shown: its keys with spaces."""
+    keys = shown.split()
+    head = [HEADS.get(key, key.replace("_", " ")) for key in keys]
+    return Table(name, records, title, caption, head, [[_text(record, key) for key in keys] for record in records])
+
+
+def _text(record: Record, key: str) -> str:
+    """Return the text of a value; of a mean with its interval, if that is wider; with that of the black box, if any."""
+    write = WRITE.get(key, str)
+    text = write(record[key])
+    low, high = record.get(f"{key}_low"), record.get(f"{key}_high")
+    if low != high:
+        unit = " %" if text.endswith(" %") else ""
+        return f"{text} [{write(low).removesuffix(unit)}, {write(high).removesuffix(unit)}]"
+    return f"{text} ({write(record[f'black_box_{key}'])})" if f"black_box_{key}" in record else text
 
 
 def remarks_on(comparison: Comparison) -> list[str]:
@@ -115,211 +157,146 @@ def remarks_on(comparison: Comparison) -> list[str]:
     return notes + [f"{method} used {', '.join(sorted(names))}" for method, names in models.items()]
 
 
-def _methods(comparison: Comparison) -> Table:
-    """Return the paper's table, with published values if there are any."""
-    caption = (
-        "Mean hypervolume E_hv over the counted trials and the runs. In brackets σ_hv: the mean over the trials of the "
-        "standard deviation over the runs (ddof = 0). Bold: the largest E_hv of the methods with most runs on a task."
-    )
-    published = comparison.published
-    if published.source and published.values:
-        caption += f" Published: {published.source}."
-    records: list[dict[str, Any]] = []
-    for row in comparison.rows:
-        e_hv, sigma_hv = published.values.get((row.method, row.task), (None, None))
-        records.append(
-            {"task": row.task, "method": row.method, "runs": len(row.seeds)}
-            | _record(row)
-            | {
-                "best_known": comparison.best_known(row.task),
-                "published_e_hv": e_hv,
-                "published_sigma_hv": sigma_hv,
-                "scripted": any(run.is_scripted for run in comparison.runs_of(row.method, row.task)),
-            }
-        )
-    return Table("table", records, "Hypervolume over the trials", caption, *_paper_table(comparison))
+FINAL = "Mean over the runs, with 95 % bootstrap intervals. Share: relative to the best known hypervolume of the task."
+OVERALL = (
+    "Ratio of a method's E_hv to that of another one; every task counts once. Mean with its 95 % bootstrap "
+    "interval over the tasks. Two-sided Wilcoxon signed-rank test of the logarithms over the tasks, corrected for "
+    "the number of comparisons (Holm)."
+)
+TO_LEVELS = "Trials to a hypervolume"
+TIMES = (
+    "Counted trials needed to reach a share of the best known hypervolume (if none is known, of the best of these "
+    "runs): median over the runs."
+)
+SOURCES = (
+    "Share of the final front that was found by each source, and share of the final hypervolume that its designs "
+    "added when they were evaluated. Means over the runs."
+)
+PROPOSALS = (
+    "Means over the runs. 5 cm, 1 cm: designs whose link lengths are all multiples of it. In plane: bases on a "
+    "symmetry plane of the targets. Equal neighbours: pairs of consecutive joints with one type. In brackets: the "
+    "black box."
+)
 
 
-def _paper_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
-    """Return head and rows of E_hv (σ_hv): a row for each method, and one for its published values."""
-    rows: list[list[str]] = []
-    for method in comparison.methods:
-        own = [row for row in comparison.rows if row.method == method and row.e_hv is not None]
-        if own:
-            cells = [_paper_cell(comparison, method, task) for task in comparison.tasks]
-            rows.append([comparison.label(method), _seeds_of(own), *cells])
-        stated = [comparison.published.values.get((method, task)) for task in comparison.tasks]
-        if any(stated):
-            cells = ["–" if pair is None else f"{pair[0]:.2f} ({pair[1]:.2f})" for pair in stated]
-            rows.append([f"{method}, published", "–", *cells])
-    if len(comparison.tasks) <= WIDE or not rows:
-        return ["method", "seeds", *comparison.tasks], rows
-    head, *turned = map(list, zip(["task", "seeds", *comparison.tasks], *rows, strict=True))
-    return head, turned
-
-
-def _paper_cell(comparison: Comparison, method: str, task: str) -> str:
-    """Return E_hv (σ_hv), bold if it is the largest E_hv of several methods with as many runs as any."""
-    of_task = {row.method: row for row in comparison.rows if row.task == task and row.e_hv is not None}
-    if method not in of_task:
-        return "–"
-    most = max(len(row.seeds) for row in of_task.values())
-    rivals = {name: row.e_hv.mean for name, row in of_task.items() if row.e_hv and len(row.seeds) == most}
-    e_hv, sigma_hv = of_task[method].e_hv, of_task[method].sigma_hv
-    text = decimals(e_hv and e_hv.mean) + ("" if sigma_hv is None else f" ({sigma_hv:.2f})")
-    is_best = len(rivals) > 1 and rivals.get(method) == max(rivals.values())
-    return f"**{text}**" if is_best else text
-
-
-def _seeds_of(results: Sequence[MethodResult]) -> str:
-    """Return the seeds of a method's results on several tasks."""
-    text = _format_seeds(sorted({seed for row in results for seed in row.seeds}))
-    return text if len({row.seeds for row in results}) == 1 else f"{text}; fewer on some tasks"
-
-
-def _finals(comparison: Comparison) -> Table:
-    """Return the table of final hypervolumes."""
-    caption = (
-        "Mean over the runs, with 95 % bootstrap intervals. Share: relative to the best known hypervolume of the task."
-    )
-    rows: list[list[str]] = []
-    for task, results in groupby(comparison.rows, lambda row: row.task):
-        for row in results:
-            share = _format(row.share_of_best_known, lambda value: percent(value, 1))
-            rows.append([task, comparison.label(row.method), str(len(row.seeds)), _format(row.final), share])
-        if (known := comparison.best_known(task)) is not None:
-            rows.append([task, "best known front", "", decimals(known), "100 %"])
-    head = ["task", "method", "runs", "hypervolume at the end", "share"]
-    return Table("", [], "At the end", caption, head, rows)
-
-
-def _overall(comparison: Comparison) -> Table:
-    """Return the table over all tasks; empty if there are too few."""
-    caption = (
-        "Ratio of a method's E_hv to that of another one; every task counts once. Mean with its 95 % bootstrap "
-        "interval over the tasks. Two-sided Wilcoxon signed-rank test of the logarithms over the tasks, corrected for "
-        "the number of comparisons (Holm)."
-    )
-    found = comparison.overall
-    rows = [_contrast_cells(comparison, over, _format(over.ratio, lambda value: f"{value:.3f}"))[1:] for over in found]
-    head = ["method", "against", "ratio", *TEST_COLUMNS]
-    return Table("overall", list(map(_record, found)), "Over all tasks", caption, head, rows)
-
-
-def _contrasts(comparison: Comparison) -> Table:
-    """Return the table of paired tests."""
+def _contrast_caption(comparison: Comparison) -> str:
     caption = (
         "E_hv of a method minus that of another one, paired by seed: mean difference with its 95 % bootstrap interval. "
         "Two-sided Wilcoxon signed-rank test, corrected for the number of comparisons (Holm). "
         "Effect: matched-pairs rank-biserial correlation."
     )
-    if comparison.is_undecidable:
-        most = max(contrast.test.n for contrast in comparison.contrasts if not can_reject(contrast.test.n))
+    few = [contrast.test.n for contrast in comparison.contrasts if not can_reject(contrast.test.n)]
+    if few:
         caption += (
             "\n\n**With fewer than six seeds, no test can reject at 5 %**, so no p is shown for them (the smallest p "
-            f"of {most} {'pair' if most == 1 else 'pairs'} is {least_p(most):.4g})."
+            f"of {max(few)} {'pair' if max(few) == 1 else 'pairs'} is {least_p(max(few)):.4g})."
         )
-    found = comparison.contrasts
-    rows = [
-        _contrast_cells(comparison, one, _format(one.test.difference, lambda value: f"{value:+.2f}")) for one in found
-    ]
-    head = ["task", "method", "against", "difference", *TEST_COLUMNS]
-    return Table("contrasts", list(map(_record, found)), "Differences", caption, head, rows)
+    return caption
 
 
-def _contrast_cells(comparison: Comparison, one: Contrast, size: str) -> list[str]:
-    test, p_holm = one.test, one.p_holm
-    ps = ("–", "–") if p_holm is None else (f"{p:.4f}" if p >= 1e-4 else f"{p:.1e}" for p in (test.p, p_holm))
-    names = [one.task, comparison.label(one.method), comparison.label(one.baseline)]
-    return [*names, size, f"{test.better} of {test.n}", f"{test.effect:+.2f}", *ps]
-
-
-def _times(comparison: Comparison) -> Table:
-    """Return the table of trials needed to reach shares of the best known hypervolume."""
+def _paper_table(comparison: Comparison, records: Sequence[Record]) -> Table:
+    """Return the paper's table: a row for each method, E_hv (σ_hv) by task, and one for its published values."""
     caption = (
-        "Counted trials needed to reach a share of the best known hypervolume (if none is known, of the best of these "
-        "runs): median over the runs. In brackets: the number of runs that reached it."
+        "Mean hypervolume E_hv over the counted trials and the runs. In brackets σ_hv: the mean over the trials of the "
+        "standard deviation over the runs (ddof = 0). Bold: the largest E_hv of the methods with most runs on a task."
     )
-    rows = [
-        [
-            task,
-            comparison.label(method),
-            *(f"{decimals(time.median_trials, 0)} ({time.reached} of {time.runs})" for time in times),
-        ]
-        for (task, method), times in groupby(comparison.times, lambda time: (time.task, time.method))
-    ]
-    head = ["task", "method", *(f"{level:.0%}" for level in LEVELS)]
-    return Table("time-to", list(map(_record, comparison.times)), "Trials to a hypervolume", caption, head, rows)
-
-
-def _sources(comparison: Comparison) -> Table:
-    """Return the table of who found the front and the hypervolume."""
-    caption = (
-        "Share of the final front that was found by each source. In brackets: the share of the final hypervolume that "
-        "its designs added when they were evaluated. Means over the runs."
-    )
-    found = [(task, method, shares_by_source(runs)) for task, method, runs in _groups(comparison)]
-    records: list[dict[str, Any]] = [
-        {"task": task, "method": method, "source": source, **share}
-        for task, method, shares in found
-        for source, share in shares.items()
-    ]
-    sources = list(dict.fromkeys(record["source"] for record in records))
+    if comparison.published and comparison.published_in:
+        caption += f" Published: {comparison.published_in}."
     rows: list[list[str]] = []
-    for task, method, shares in found:
-        cells = (shares.get(source) for source in sources)
-        texts = ("–" if cell is None else f"{percent(cell['front'])} ({percent(cell['gained'])})" for cell in cells)
-        if shares:
-            rows.append([task, comparison.label(method), *texts])
-    return Table("sources", records, "Front by source", caption, ["task", "method", *map(source_label, sources)], rows)
+    for method in comparison.methods:
+        label = comparison.label(method)
+        own = {row["task"]: row for row in records if row["method"] == label and row["e_hv"] is not None}
+        if own:
+            cells = [_paper_cell(records, own[task]) if task in own else "–" for task in comparison.tasks]
+            seeds = list(dict.fromkeys(row["seeds"] for row in own.values()))
+            rows.append([label, seeds[0] if len(seeds) == 1 else "differ by task", *cells])
+        stated = [comparison.published.get((method, task)) for task in comparison.tasks]
+        if any(stated):
+            cells = ["–" if pair is None else f"{pair[0]:.2f} ({pair[1]:.2f})" for pair in stated]
+            rows.append([f"{method}, published", "–", *cells])
+    head = ["method", "seeds", *comparison.tasks]
+    if len(comparison.tasks) > WIDE and rows:
+        head, *rows = map(list, zip(["task", "seeds", *comparison.tasks], *rows, strict=True))
+    return Table("table", records, "Hypervolume over the trials", caption, head, rows)
 
 
-def _proposers(comparison: Comparison) -> Table:
-    """Return the table of the proposals and their biases."""
-    caption = (
-        "Means over the runs. 5 cm, 1 cm: designs whose link lengths are all multiples of it. In plane: bases on a "
-        "symmetry plane of the targets. Equal neighbours: pairs of consecutive joints with one type. In brackets: the "
-        "black box."
-    )
-    records: list[dict[str, Any]] = [
-        {"task": task, "method": method, **_proposer_means(proposing)}
-        for task, method, runs in _groups(comparison)
-        if (proposing := [run for run in runs if run.proposer])
+def _paper_cell(records: Sequence[Record], own: Record) -> str:
+    """Return E_hv (σ_hv), bold if it is the largest E_hv of several methods with as many runs as any."""
+    of_task = [row for row in records if row["task"] == own["task"] and row["e_hv"] is not None]
+    most = max(row["runs"] for row in of_task)
+    rivals = [row["e_hv"] for row in of_task if row["runs"] == most]
+    text = decimals(own["e_hv"]) + ("" if own["sigma_hv"] is None else f" ({own['sigma_hv']:.2f})")
+    is_best = len(rivals) > 1 and own["runs"] == most and own["e_hv"] == max(rivals)
+    return f"**{text}**" if is_best else text
+
+
+def _flat(result: MethodResult | Contrast) -> Record:
+    """Return a result without parts: of an interval its mean and its two ends."""
+    record: Record = {}
+    values = asdict(result)
+    for name, value in (values | values.pop("test", {})).items():
+        if name in INTERVALS:
+            ends = value or {"mean": None, "low": None, "high": None}
+            record |= {name: ends["mean"], f"{name}_low": ends["low"], f"{name}_high": ends["high"]}
+        else:
+            record[name] = value
+    return record
+
+
+def _result_record(comparison: Comparison, row: MethodResult) -> Record:
+    e_hv, sigma_hv = comparison.published.get((row.method, row.task), (None, None))
+    return _flat(row) | {
+        "method": comparison.label(row.method),
+        "runs": len(row.seeds),
+        "seeds": _format_seeds(row.seeds),
+        "best_known": comparison.best_known(row.task),
+        "published_e_hv": e_hv,
+        "published_sigma_hv": sigma_hv,
+    }
+
+
+def _contrast_records(comparison: Comparison, contrasts: Sequence[Contrast]) -> list[Record]:
+    """Return paired tests; p is None with too few pairs."""
+    return [
+        _flat(one)
+        | {"method": comparison.label(one.method), "baseline": comparison.label(one.baseline)}
+        | ({"p": None} if one.p_holm is None else {})
+        for one in contrasts
     ]
-    rows = [
-        [
-            record["task"],
-            comparison.label(record["method"]),
-            decimals(record["proposals"], 0),
-            *(f"{percent(record[bias])} ({percent(record[f'black_box_{bias}'])})" for bias in BIASES),
-            decimals(record["calls"], 0),
-            decimals(record["cost_usd"], 4),
-        ]
-        for record in records
-    ]
-    head = ["task", "method", "proposals", *BIASES.values(), "calls", "USD"]
-    return Table("proposers", records, "Proposals", caption, head, rows)
 
 
-def _proposer_means(runs: Sequence[RunSummary]) -> dict[str, Any]:
-    each: list[dict[str, Any]] = []
-    for run in runs:
-        summary, proposer = run.summary, run.proposer
-        found: dict[str, Any] = {
-            "proposals": summary["attribution"].get(proposer["name"], {"trials": 0})["trials"],
-            "calls": proposer["calls"],
-            "failures": sum(proposer["failures"].values()),
-            "tokens": proposer["tokens"],
-            "cost_usd": proposer["cost_usd"],
-        }
-        for prefix, who in (("", "proposer"), ("black_box_", "black_box")):
-            found |= {f"{prefix}{bias}": (summary["proposer_bias"][who] or {}).get(bias) for bias in BIASES}
-        each.append(found)
-    known = {key: [found[key] for found in each if found[key] is not None] for key in each[0]}
-    return {"runs": len(runs)} | {key: float(np.mean(values)) if values else None for key, values in known.items()}
+def _source_records(comparison: Comparison) -> Iterator[Record]:
+    """Yield who found the front and the hypervolume."""
+    for task, method, runs in _groups(comparison):
+        for source, share in shares_by_source(runs).items():
+            yield {"task": task, "method": comparison.label(method), "source": source, **share}
 
 
-def _run_record(comparison: Comparison, run: RunSummary) -> dict[str, Any]:
+def _proposer_records(comparison: Comparison) -> Iterator[Record]:
+    """Yield the proposals and their biases, as means over the runs in which they are known."""
+    for task, method, runs in _groups(comparison):
+        each = [_proposals(run) for run in runs if run.proposer]
+        if each:
+            known = {name: [one[name] for one in each if one[name] is not None] for name in each[0]}
+            means = {name: float(np.mean(values)) if values else None for name, values in known.items()}
+            yield {"task": task, "method": comparison.label(method), "runs": len(each), **means}
+
+
+def _proposals(run: RunSummary) -> Record:
+    proposer = run.proposer
+    found: Record = {
+        "proposals": run.summary["attribution"].get(proposer["name"], {"trials": 0})["trials"],
+        "calls": proposer["calls"],
+        "failures": sum(proposer["failures"].values()),
+        "tokens": proposer["tokens"],
+        "cost_usd": proposer["cost_usd"],
+    }
+    for prefix, who in (("", "proposer"), ("black_box_", "black_box")):
+        found |= {f"{prefix}{bias}": (run.summary["proposer_bias"][who] or {}).get(bias) for bias in BIASES.split()}
+    return found
+
+
+def _run_record(comparison: Comparison, run: RunSummary) -> Record:
     known = comparison.best_known(run.task) if run.task in comparison.tasks else None
     return {
         "task": run.task,
@@ -340,33 +317,6 @@ def _groups(comparison: Comparison) -> Iterator[tuple[str, str, list[RunSummary]
     for task in comparison.tasks:
         for method in comparison.methods:
             yield task, method, comparison.runs_of(method, task)
-
-
-def _record(result: object) -> dict[str, Any]:
-    """Return a result as a flat record: intervals and tests become several fields, seeds a text."""
-    record: dict[str, Any] = {}
-    for name, value in vars(result).items():
-        if isinstance(value, PairedTest):
-            record |= _record(value)
-        elif isinstance(value, tuple):
-            record[name] = _format_seeds(cast("tuple[int, ...]", value))
-        elif name in _INTERVALS:
-            low, high = (value.low, value.high) if value else (None, None)
-            record |= {name: value and value.mean, f"{name}_low": low, f"{name}_high": high}
-        else:
-            record[name] = value
-    if isinstance(result, Contrast) and result.p_holm is None:
-        record["p"] = None  # too few pairs
-    return record
-
-
-def _format(value: Interval | None, write: Callable[[float], str] = decimals) -> str:
-    """Return a mean and its interval; of a single value, the value alone."""
-    if value is None:
-        return "–"
-    unit = " %" if write(value.mean).endswith(" %") else ""
-    low, high = (write(end).removesuffix(unit) for end in (value.low, value.high))
-    return write(value.mean) if value.low == value.high else f"{write(value.mean)} [{low}, {high}]"
 
 
 def _format_seeds(seeds: Sequence[int]) -> str:

@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from armwright.exceptions import SettingsError, UsageError
-from armwright.extras import requires_extra
+from armwright.extras import naming_extras
 from armwright.files import replace_surrogates
 from armwright.llm.backend import (
     CHECK,
@@ -30,7 +30,7 @@ from armwright.llm.redaction import WithoutKeys, redacted, redacted_line
 from armwright.llm.servers import server_of
 from armwright.text import map_text
 
-with requires_extra("llm", "a language model"):
+with naming_extras("a language model", "llm"):
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
     from pydantic_ai.messages import ModelMessage, ModelRequest, ModelResponse, TextPart, UserPromptPart

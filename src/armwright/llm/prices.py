@@ -1,10 +1,10 @@
 """Expected cost of calls, by public prices."""
 
-from armwright.extras import requires_extra
+from armwright.extras import naming_extras
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.servers import server_of
 
-with requires_extra("llm", "a language model"):
+with naming_extras("a language model", "llm"):
     from genai_prices import Usage, calc_price
 
 

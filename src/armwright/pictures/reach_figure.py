@@ -46,20 +46,19 @@ class _Slice:
         return float(found.coordinates(self.across)[self.index])
 
 
-def write_reach_figure(found: ReachMap, around: MappedArm, share: float, file: Path) -> None:
+def write_reach_figure(found: ReachMap, around: MappedArm, file: Path) -> None:
     """Write the slices of a reach map.
 
     Args:
         found: The map.
         around: The arm and its surroundings.
-        share: Least share of directions of the dexterous volume that the figure states.
         file: The figure, by its ending.
     """
     with matplotlib.rc_context(RC), naming_write_errors(file):
-        save_figure(_draw(found, around, share), file)
+        save_figure(_draw(found, around), file)
 
 
-def _draw(found: ReachMap, around: MappedArm, share: float) -> Figure:
+def _draw(found: ReachMap, around: MappedArm) -> Figure:
     """Draw two slices, twice if there are conditions."""
     rows = [("within joint limits", found.bare)]
     if found.usable is not found.bare:
@@ -75,7 +74,7 @@ def _draw(found: ReachMap, around: MappedArm, share: float) -> Figure:
             axes[row, column].set_title(f"{across} = {plane.place(found):.3f} m, {name}")
     bar = figure.colorbar(image, ax=axes, shrink=0.8)
     bar.set_label(f"share of {len(found.directions)} directions reached [%]")
-    lines = [f"{around.title}", *(f"{name}: {describe_volumes(coverage, share)}" for name, coverage in rows)]
+    lines = [f"{around.title}", *(f"{name}: {describe_volumes(coverage)}" for name, coverage in rows)]
     figure.suptitle("\n".join(lines), fontsize=10)
     handles: list[Any] = [Patch(facecolor=POSITION_ONLY, label="reached, in none of the directions")]
     handles.append(legend_mark("base", "s", FRONT))
@@ -87,11 +86,9 @@ def _draw(found: ReachMap, around: MappedArm, share: float) -> Figure:
     return figure
 
 
-def describe_volumes(coverage: PoseCoverage, share: float) -> str:
+def describe_volumes(coverage: PoseCoverage) -> str:
     """Return the volumes of a coverage on one line."""
-    directions = "all directions" if share >= 1.0 else f"{100 * share:g} % of the directions"
-    dexterous = coverage.dexterous_volume(share)
-    return f"{coverage.volume:.3g} m³ reached, {dexterous:.3g} m³ in {directions}"
+    return f"{coverage.volume:.3g} m³ reached, {coverage.dexterous_volume():.3g} m³ in all directions"
 
 
 def _vertical(found: ReachMap, arm: Arm) -> _Slice:

@@ -20,8 +20,6 @@ def export_design(run: Path, number: int | None, kind: str) -> str:
         kinds = (*FORMATS, OPTUNA)
         raise SettingsError(f'unknown format "{kind}".{did_you_mean(kind, kinds)} Formats: {", ".join(kinds)}')
     _, history = read_run(run)
-    if number is not None and not 0 <= number < len(history):
-        raise SettingsError(f"--design {number}: {run} has the designs 0 to {len(history) - 1}")
     member = pick(history)[0] if number is None else history.member(number)
     return FORMATS[kind](history, member)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import ArmError, FailureError, did_you_mean
-from armwright.extras import requires_extra
+from armwright.extras import naming_extras
 
 ALIASES = {"so100": "soarm100", "so101": "soarm101"}
 _SUFFIX = "_description"
@@ -31,7 +31,7 @@ def find_urdf(name_or_path: str | Path) -> Path:
 
 
 def _download(name: str) -> Path:
-    with requires_extra("arms", f"there is no file {name}, and an arm by its name"):
+    with naming_extras(f"there is no file {name}, and an arm by its name", "arms"):
         robots: Any = import_module("robot_descriptions")
     known: dict[str, str] = {}
     for module, description in robots.DESCRIPTIONS.items():

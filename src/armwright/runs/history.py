@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
+from armwright.exceptions import SettingsError
 from armwright.pareto import (
     FrontTracker,
     default_reference_point,
@@ -175,6 +176,8 @@ class History:
 
     def member(self, number: int) -> FrontMember:
         """Return the design of one trial and its arm."""
+        if not 0 <= number < len(self):
+            raise SettingsError(f"--design {number}: the run has the designs 0 to {len(self) - 1}")
         trial = self.trials[number]
         return FrontMember(number, trial.source, trial.design, self.problem.arm(trial.design), trial.values)
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from armwright.arrays import finite_or_none
-from armwright.exceptions import SettingsError
 from armwright.files import MAX_DERIVED, read_text
 from armwright.problem.assumptions import assumed_values, describe_assumed
 from armwright.problem.facts import Facts, reach_facts
@@ -38,11 +37,10 @@ def design_sheet(run: Path, number: int | None = None) -> DataSheet:
     recommended = (read_summary(run) or {}).get("recommended", ())
     if number is None:
         number = int(recommended[0]["design"]) if recommended else pick(history)[0].number
-    if not 0 <= number < len(history):
-        raise SettingsError(f"--design {number}: {run} has the designs 0 to {len(history) - 1}")
+    member = history.member(number)
     roles = [one for one in recommended if one["design"] == number]
     facts = read_records(run, history, [number])[number].facts
-    return sheet_of(history, history.member(number), facts, _verdict(run, number, roles))
+    return sheet_of(history, member, facts, _verdict(run, number, roles))
 
 
 def sheet_of(history: History, member: FrontMember, facts: Facts, verdict: Mapping[str, str]) -> DataSheet:

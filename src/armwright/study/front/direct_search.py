@@ -173,8 +173,6 @@ class DirectSearch:
                 front_size=self._n_feasible,
                 budget=plan.budget,
                 seconds_left=max(0.0, plan.search_left),
-                new_evaluations=search.evaluations + evaluated - self.resumed,
-                new_seconds=plan.search_seconds,
                 is_ended=is_ended,
             )
         )

@@ -57,8 +57,6 @@ class SearchProgress:
     front_size: int  # designs on the front
     budget: SearchBudget
     seconds_left: float = math.inf  # search time that the budget leaves [s]; infinite without a limit
-    new_evaluations: int = 0  # designs evaluated in this session
-    new_seconds: float = 0.0  # search time of this session [s]
     is_ended: bool = False  # whether the search has ended, and its front is verified now
 
     @property
