@@ -1,4 +1,4 @@
-"""Where designs are worst along their cycles."""
+"""Where designs are worst along their cycles, and via points around collisions."""
 
 import json
 import re
@@ -12,8 +12,9 @@ import pytest
 import armwright as aw
 from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.evaluation import Evaluation
-from armwright.proof.cycle_faults import describe_faults, describe_path, path_extremes, path_record
+from armwright.proof.cycle_faults import describe_faults, describe_path, path_extremes, path_record, via_point
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.tasks.task import Task
 from tests.support.command_line import armwright
@@ -102,12 +103,27 @@ def test_line_out_of_reach_is_reported_with_its_place() -> None:
     assert re.search(r"path error \d+ mm \(step 2, at 100 %\)", faults)
 
 
-def test_colliding_step_is_reported_with_its_place() -> None:
+def test_colliding_step_gets_a_via_point_that_avoids_the_obstacle() -> None:
     evaluation = driven(SWEEP, obstacles=[POST], limit=1.5)  # too little to pass the post backwards
     extreme = path_extremes(evaluation.paths, 0)["clearance"]
     assert extreme.value < 0.0
+    arm, (path,) = evaluation.paths.of_arm(0)
+    point = via_point(arm, path, extreme.share, evaluation.obstacles)
+    assert point is not None
+    found = solve_postures(arm, point[None], initial_q=path.at(np.array([extreme.share])))
+    assert found.reached[0, 0] == pytest.approx(point, abs=1e-3)
+    ends, via, share = path.at(np.array([0.0, 1.0]))[0], found.q[0, 0], np.linspace(0.0, 1.0, 301)[:, None]
+    ways = np.concatenate([(1 - share) * ends[0] + share * via, (1 - share) * via + share * ends[1]])
+    assert np.min(clearances(arm, ways[None], evaluation.obstacles)) > -1e-3
     text = describe_faults(evaluation, 0)
-    assert f"mm deep (step 2, at {100 * extreme.share:.0f} %): try a via point" in text
+    assert f"mm deep (step 2, at {100 * extreme.share:.0f} %)" in text
+    assert str([round(float(c), 3) for c in point]) in text
+
+
+def test_via_point_is_not_made_up() -> None:
+    wall = {"kind": "box", "center": [0.5, 0.0, 0.5], "size": [0.9, 0.1, 4.0]}
+    evaluation = driven(SWEEP, obstacles=[wall], limit=1.5)  # too little to go round the back
+    assert "try a via point, a target on a way around it" in describe_faults(evaluation, 0)
 
 
 def test_jumps_are_reported_by_step() -> None:

@@ -1,7 +1,7 @@
-"""Where along its cycle a design is worst, and where it fails to follow it."""
+"""Where along its cycle a design is worst, and a via point for a step that collides."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
@@ -10,12 +10,20 @@ from pydantic import ConfigDict
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.arms.jacobian import jacobians
+from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_path import CyclePaths
+from armwright.kinematics.cycle.motion_path import MotionPath
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.evaluation import CYCLE_GAP, Evaluation
 from armwright.tasks.motions import CyclePlan
+from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.targets import REACHED
 
+VIA_DISTANCES = (0.05, 0.1, 0.2, 0.3)  # [m] of a via point from the tip where a step collides
 NEGLIGIBLE = 1e-3  # [mm], [°] of an error in texts
+VIA_SHARES = np.linspace(0.0, 1.0, 17)  # of the joint motions to and from a via point, at which it is checked
 
 # Label and unit of each extreme in texts, and the number of these units in a metre, radian or cubic metre.
 _SHOWN: Mapping[str, tuple[str, str, float]] = {
@@ -89,7 +97,10 @@ def describe_path(path: Mapping[str, Extreme | list[int]] | None) -> str:
 
 
 def describe_faults(evaluation: Evaluation, row: int) -> str:
-    """Describe where an arm fails to follow its cycle; empty if it follows it or the task has none."""
+    """Describe where an arm fails to follow its cycle, with a via point for a collision.
+
+    The text is empty if the arm follows the cycle or the task has none.
+    """
     paths = evaluation.cycle_paths
     if paths is None:
         return ""
@@ -100,10 +111,47 @@ def describe_faults(evaluation: Evaluation, row: int) -> str:
             faults.append(_describe(name, extremes[name]))
     clearance = extremes.get("clearance")
     if clearance is not None and clearance.value < CYCLE_GAP:
-        depth = -1e3 * clearance.value
+        via, depth = _avoid(paths, row, evaluation.obstacles), -1e3 * clearance.value
         where = f"collision, {depth:.3g} mm deep" if depth > 0.0 else f"only {-depth:.2g} mm apart"
-        faults.append(f"{where} ({clearance.place}): try a via point, a target on a way around it")
+        faults.append(f"{where} ({clearance.place}): {via}")
     return "; ".join(faults)
+
+
+def via_point(arm: ArmArrays, path: MotionPath, share: float, obstacles: Sequence[Obstacle]) -> Array | None:
+    """Return a point through which an arm avoids a collision, None if none was found.
+
+    Points to all sides of the tip are tried. The arm must reach the point, and be free along the joint motions from the
+    start of the motion to the point and from there to its end. The point with the largest clearance is returned.
+
+    Args:
+        arm: One arm.
+        path: Its path along the motion.
+        share: The share of the motion at which it collides.
+        obstacles: The obstacles.
+    """
+    q = path.at(np.array([0.0, share, 1.0]))  # (1, 3, D)
+    sides = np.concatenate([np.eye(3), -np.eye(3)])
+    shifts = np.array(VIA_DISTANCES)[:, None, None] * sides  # (distances, 6, 3)
+    points = forward_kinematics(arm, q).tip[0, 1] + shifts.reshape(-1, 3)
+    found = solve_postures(arm, points, initial_q=q[:, 1:2], precision=arm.precision)
+    via = found.q.astype(np.float64)[0, :, None]  # (P, 1, D)
+    start, end, along = q[0, 0], q[0, 2], VIA_SHARES[:, None]
+    ways = np.concatenate([start + along * (via - start), via + along * (end - via)], axis=1)  # (P, 34, D)
+    clearance = np.minimum(*clearances(arm, ways.reshape(1, -1, arm.dof), obstacles)).reshape(len(points), -1)
+    reached = np.linalg.norm(found.reached[0] - points, axis=1) < REACHED
+    least = np.where(reached, clearance.min(axis=1), -np.inf)
+    return points[least.argmax()] if least.max() > 0.0 else None
+
+
+def _avoid(paths: CyclePaths, row: int, obstacles: Sequence[Obstacle]) -> str:
+    """Propose a via point for the motion in which an arm collides most."""
+    clearance = np.minimum(paths.self_clearance[row], paths.obstacle_clearance[row])
+    worst = int(clearance.argmin())
+    arm, of_motions = paths.of_arm(row)
+    point = via_point(arm, of_motions[worst], float(paths.worst[row, worst, 2]), obstacles)
+    if point is None:
+        return "try a via point, a target on a way around it"
+    return f"try a via point, a target at {[round(float(c), 3) for c in point]} m, through which this arm moves freely"
 
 
 def _extreme(plan: CyclePlan, values: Array, shares: Array, smallest: bool = False) -> Extreme:

@@ -80,7 +80,7 @@ def rewrite_results(
     if isinstance(config.method, FrontMethod):
         new = {**summary, "verification": _verification_record(history, verification)}
     else:
-        known = {key: summary[key] for key in ("proposer", "proposer_bias") if key in summary}
+        known = {key: summary[key] for key in ("proposer", "proposer_bias", "surrogate") if key in summary}
         new = summarize(history, config, None, verification) | known
     write_results(folder, history, config, new, verification)
     return new
@@ -128,6 +128,7 @@ def summarize(
     config: RunConfig,
     proposer: ProposerSummary | None,
     verification: Verification | None = None,
+    surrogate: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a study."""
     curve = history.hypervolume
@@ -143,6 +144,7 @@ def summarize(
         **_common_record(history, config, history.masked_objectives, volume, verification),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **_failure_record(history, config),
+        **({} if surrogate is None else {"surrogate": surrogate}),
         **_screening_record(history, config),
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
