@@ -89,7 +89,8 @@ class Command:
             workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
             if workers:
                 random.choice(workers).kill()
-                self.ends_well()  # it gives the cell to another worker
+                has_begun = self.process.wait() == 0  # and then gives the cell to another worker
+                assert has_begun or "2 local workers could not be started" in self.words.read_text(encoding="utf-8")
                 return True
         return False
 

@@ -23,7 +23,10 @@ def main() -> None:
     answer = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what evaluators print must not fill the pipe
     logging.disable()  # news of connections that end; workers have a setting of their own
-    cluster, credentials = _start(n_workers, folder)
+    try:
+        cluster, credentials = _start(n_workers, folder)
+    except RuntimeError:  # a worker ended while it began, which the process that started this one reports
+        sys.exit(1)
     with answer:
         print(json.dumps({"address": cluster.scheduler_address, "credentials": credentials}), file=answer)
     threading.Event().wait()
