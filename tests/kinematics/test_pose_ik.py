@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.problem.evaluation import evaluate
+from armwright.problem.evaluation import evaluate_arrays
+from armwright.problem.scene import Scene
 from armwright.robot.arm import Arm, Joint, MountedTool, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
@@ -133,7 +134,7 @@ def test_whole_solves_agree_with_scikit_robot(dof: int, rows: int) -> None:
         np.random.default_rng(3).uniform((-0.35, -0.35, -0.05), (0.35, 0.35, 0.65), (4, 3)),
         target_arrays([rows] * 4, 4),
     )
-    ours = evaluate(arms, points, target_arrays=asked)
+    ours = evaluate_arrays(stack_arms(arms), Scene(points, np.zeros(4), asked))
     theirs = np.array([scikit_robot_errors(arm, points, asked) for arm in arms])
     distance, angle = theirs[..., 0], theirs[..., 1]
     reached = (distance < asked.tolerance) & (angle < asked.angle_tolerance)

@@ -7,7 +7,9 @@ import pinocchio
 import pytest
 
 import armwright as aw
-from armwright.problem.evaluation import evaluate
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.problem.evaluation import evaluate_arrays
+from armwright.problem.scene import Scene
 from armwright.robot.arm import Arm
 from armwright.tasks.targets import ALIGNED, AXIS, ORIENTATION, position_targets
 from tests.support.arms import general_arms, paper_arms
@@ -111,7 +113,7 @@ def test_results_are_those_of_evaluate() -> None:
         (ORIENTATION, {"orientations": orientations}),
     ):
         arrays = replace(position_targets(9), n_angular=np.full(9, n_angular), rotation=orientations)
-        evaluation = evaluate(arms, positions, target_arrays=arrays)
+        evaluation = evaluate_arrays(stack_arms(arms), Scene(positions, np.zeros(9), arrays))
         solutions = aw.solve(arms, positions, angle_tolerance=ALIGNED, **directions)
         assert np.array_equal(solutions.q, evaluation.q)
         assert np.array_equal(solutions.position_error, evaluation.position_error)

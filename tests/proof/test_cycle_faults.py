@@ -39,13 +39,7 @@ def turntable(limit: float = 2.8) -> Arm:
 def driven(cycle: Any, targets: Any = SIDES, limit: float = 2.8, **more: Any) -> Evaluation:
     """Return the evaluation of the turntable in a cycle."""
     task = Task.model_validate({"name": "driven", "targets": targets, "cycle": cycle, **more})
-    return aw.evaluate(
-        [turntable(limit)],
-        task.target_positions,
-        obstacles=task.obstacles,
-        target_arrays=task.target_arrays,
-        plan=task.plan(task.target_positions),
-    )
+    return aw.evaluate(turntable(limit), task)
 
 
 def manipulability(shoulder: np.ndarray, elbow: np.ndarray) -> np.ndarray:

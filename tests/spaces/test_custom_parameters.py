@@ -58,27 +58,6 @@ def test_space_file_declares_parameters_after_the_built_in_ones(tmp_path: Path) 
     assert aw.DesignSpace.model_validate(space.model_dump(mode="json")) == space
 
 
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"link_3": {"range": [1, 2]}}, '"link_3" is the name of a built-in parameter; try "my_link"'),
-        ({"motor": {"choices": ["a", "b"]}}, "built-in parameter"),
-        ({"gear_1": {"range": [1, 2]}}, "without a number at its end, got \"gear_1\"; try per: joint"),
-        ({"Kp": {"range": [1, 2]}}, "lowercase letters"),
-        ({"kp": {"range": [1, 2], "choices": ["a"]}}, "kp: expected a range or choices"),
-        ({"kp": {"range": [2, 1], "unit": "N m"}}, r"kp: range: \[2, 1\] is reversed"),
-        ({"kp": {"range": [0, 1], "scale": "log"}}, "expected values above 0 with scale: log"),
-        ({"kp": {"range": [0.5, 1], "integer": True}}, "expected whole numbers"),
-        ({"belt": {"choices": ["a", "A"]}}, "expected different names"),
-        ({"belt": {"choices": ["a b"]}}, r"choices\[0\]: expected text of the form"),
-        ({"belt": {"choices": ["a"], "unit": "m"}}, "expected no scale, integer or unit"),
-    ],
-)  # fmt: skip
-def test_space_refuses_names_and_values(parameters: dict[str, Any], message: str) -> None:
-    with pytest.raises(SpaceError, match=message):
-        space_of(parameters)
-
-
 def test_values_are_checked_in_their_own_types() -> None:
     space = space_of()
     params = dict(space.sample(1, 0)[0].params)

@@ -50,25 +50,6 @@ def test_valid_obstacles_are_accepted() -> None:
     assert yawed.describe() == "box of 1 x 1 x 1 m (along x, y, z) about (0, 0, 0), turned by yaw 0.5 rad"
 
 
-GROUND, SHELF, _, POLE = RECORDS
-
-
-@pytest.mark.parametrize(
-    ("record", "words"),
-    [
-        (SHELF | {"yaw": 1.0}, "expected yaw or rpy, got both"),
-        (POLE | {"axis": [0, 0, 0]}, "axis: expected a direction, got [0.0, 0.0, 0.0]"),
-        (GROUND | {"name": "a\nb"}, "name"),
-        (GROUND | {"name": "{{ evil }}"}, "name"),
-    ],
-)
-def test_invalid_obstacles_are_refused_in_one_line(record: object, words: str) -> None:
-    with pytest.raises(TaskError) as refusal:
-        task_of([GROUND, record])
-    assert words in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-
-
 def test_objectives_of_clearance() -> None:
     task = task_of(RECORDS, objectives=["collision", "clearance_shortfall"])
     problem = Problem(task)

@@ -59,6 +59,9 @@ def test_minimal_task_file_is_accepted(tmp_path: Path) -> None:
 
 
 POINT = "name: a\ntargets: [[0, 0, 0]]\n"
+TARGET = "name: a\ntargets:\n  - [0, 0, 1]\n  - "
+SOLID = POINT + "obstacles: [{center: [0, 0, 0], "
+CUBE = "name: a\nworkspace: [{low: [0, 0, 0.5], high: [1, 1, 1]"
 
 
 @pytest.mark.parametrize(
@@ -88,6 +91,21 @@ POINT = "name: a\ntargets: [[0, 0, 0]]\n"
             POINT + "payload: {mass: 0.5, inertia: [1, 1, 3]}",
             "payload.inertia: no body has moments of [1.0, 1.0, 3.0] kg m²",
         ),
+        (TARGET + "{position: [0, 0, 1], axis: [0, 0, 0]}", "targets[1].axis: expected a direction"),
+        (TARGET + "{position: [0, 0, 1], axis: [0, 0, 1], orientation: [0, 0, 1]}", "expected axis or orientation"),
+        (TARGET + "{position: [0, 0, 1], orientation: [0, 0, 90]}", "targets[1]: orientation: expected roll, pitch"),
+        (TARGET + "{position: [0, 0, 1], angle_tolerance: 0.1}", "targets[1]: angle_tolerance needs an axis"),
+        (TARGET + "{position: [0, 0,4, 1]}", "targets[1].position: expected three numbers x, y, z [m], got 4"),
+        (POINT + "obstacles: [{kind: ground, name: '{{ evil }}'}]", "obstacles[0].name"),
+        (SOLID + "kind: box, size: [1, 1, 1], yaw: 1, rpy: [0, 0, 1]}]", "obstacles[0]: expected yaw or rpy, got both"),
+        (SOLID + "kind: cylinder, radius: 1, height: 1, axis: [0, 0, 0]}]", "obstacles[0].axis: expected a direction"),
+        ("name: a\nworkspace: everything", "workspace: expected {low: [x, y, z], high"),
+        ("name: a\nworkspace: []", "targets"),
+        (CUBE + ", directions: {axis: [0, 0, 0]}}]", "workspace[0].directions.axis: expected a direction"),
+        (CUBE + ", directions: {half_angle: 45}}]", "directions.half_angle: expected a number of at most 3.14159 rad"),
+        (CUBE + ", points: 600, directions: {count: 100}}]", "at most 50000 points x directions"),
+        (CUBE + ", points: 6000}, {low: [0, 0, 0], high: [1, 1, 1], points: 6000}]", "at most 10000 points"),
+        (CUBE.replace("0.5", "2") + "}]", "workspace: expected low z <= high z, got 2 m and 1 m"),
     ],
 )
 def test_invalid_task_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:

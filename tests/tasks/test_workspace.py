@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.exceptions import TaskError
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import dexterous_volume, uncovered_fraction
 from armwright.problem.problem import Problem
@@ -14,7 +13,6 @@ from armwright.spaces.design_space import paper_space
 from armwright.tasks.obstacles import Box
 from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region, sample_regions
-from armwright.yaml_documents import parse_document
 
 CUBE = {"low": (0.0, 0.0, 0.0), "high": (1.0, 1.0, 1.0)}
 
@@ -51,7 +49,7 @@ def test_two_link_arm_reaches_a_spherical_shell() -> None:
     cube = region(low=(-0.8, -0.8, -0.8), high=(0.8, 0.8, 0.8), points=2000)
     points = sample_regions((cube,))
     far = np.linalg.norm(points, axis=1)
-    evaluation = evaluate([Arm((0.0, 0.0, 0.0), joints, links)], [[0.3, 0.2, 0.1]], workspace=[cube])
+    evaluation = evaluate(Arm((0.0, 0.0, 0.0), joints, links), task(workspace=[cube]))
     inside = (far < a + b - 2e-4) & (far > a - b + 2e-4)
     reached = evaluation.workspace_error[0] < 1e-3
     assert not np.any(reached[(far > a + b + 2e-3) | (far < a - b - 2e-3)])
@@ -77,25 +75,6 @@ def test_default_targets_are_the_workspace_corners() -> None:
     assert task(targets=[(0.5, 0.0, 0.3)]).targets == ((0.5, 0.0, 0.3),)
 
 
-FAULTS = {
-    "{low: [0, 0, 0.5], high: [1, 1, 0.4]}": "workspace: expected low z <= high z, got 0.5 m and 0.4 m",
-    "everything": r"workspace: expected \{low: \[x, y, z\], high",
-    "[]": "targets",
-    "{low: [0, 0, 0], high: [1, 1, 1], directions: {axis: [0, 0, 0]}}": "directions.axis: expected a direction",
-    "{low: [0, 0, 0], high: [1, 1, 1], directions: {half_angle: 45}}": "directions.half_angle: .* at most 3.14159 rad",
-    "{low: [0, 0, 0], high: [1, 1, 1], points: 600, directions: {count: 100}}": "at most 50000 points x directions",
-    "[{low: [0, 0, 0], high: [1, 1, 1], points: 6000}, {low: [0, 0, 0], high: [1, 1, 1], points: 6000}]": "10000",
-}
-
-
-@pytest.mark.parametrize("written", FAULTS)
-def test_invalid_workspaces_are_refused_in_one_line(written: str) -> None:
-    text = f"name: x\nworkspace: {written}"
-    with pytest.raises(TaskError, match=FAULTS[written]) as refused:
-        parse_document(text, Task, TaskError, "it.yaml")
-    assert "\n" not in str(refused.value)
-
-
 CONE: dict[str, Any] = {"axis": (0, 0, 1), "half_angle": 0.6, "count": 9, "share": 0.5}
 
 
@@ -110,11 +89,11 @@ def test_points_behind_an_obstacle_are_not_dexterous() -> None:
     points = sample_regions((box,))
     gap = np.hypot(np.maximum(-points[:, 0], 0.0), np.maximum(0.4 - points[:, 2], 0.0)) - rod.radius
     assert 0.2 < (gap > 0.0).mean() < 0.8
-    assert dexterous_volume(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box]))[0] == 1.0
-    behind = evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[plate])
+    assert dexterous_volume(evaluate(gantry, task(workspace=[box])))[0] == 1.0
+    behind = evaluate(gantry, task(workspace=[box], obstacles=[plate]))
     assert (gap > 1e-3).mean() <= dexterous_volume(behind)[0] <= (gap > -1e-3).mean()  # reached within 1 mm
     around = Box(kind="box", center=(0.0, 0.0, 0.45), size=(1.0, 1.0, 0.4))
-    assert dexterous_volume(evaluate(gantry, [[0.0, 0.0, 0.3]], workspace=[box], obstacles=[around]))[0] == 0.0
+    assert dexterous_volume(evaluate(gantry, task(workspace=[box], obstacles=[around])))[0] == 0.0
 
 
 def test_tasks_bound_and_minimise_directions_of_the_tool() -> None:

@@ -26,11 +26,9 @@ from armwright.problem.dexterous_volume import dexterous_volumes
 from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
 from armwright.spaces.tool_mount import carrying_tool
-from armwright.tasks.motions import CyclePlan
-from armwright.tasks.obstacles import Obstacle
-from armwright.tasks.targets import TargetArrays, position_targets
+from armwright.tasks.targets import position_targets
 from armwright.tasks.task import Task
-from armwright.tasks.workspace import Region, sample_regions
+from armwright.tasks.workspace import sample_regions
 
 CYCLE_GAP = 1e-4  # [m] that bodies keep along a cycle, because drives and samples are a little off its path
 
@@ -240,23 +238,15 @@ def evaluate(
     targets: ArrayLike | Task,
     device: Device = "cpu",
     payload: ArrayLike | None = None,
-    obstacles: Sequence[Obstacle] = (),
-    target_arrays: TargetArrays | None = None,
-    plan: CyclePlan | None = None,
-    workspace: Sequence[Region] = (),
 ) -> Evaluation:
     """Evaluate every arm at every target. An unreached target is a result, never an exception.
 
     Args:
         arms: One arm, or N arms.
-        targets: (T, 3) positions [m], or a task. A task brings everything below and its tool, which is mounted on arms
-            that carry none.
+        targets: (T, 3) positions [m], or a task, which brings directions, payloads, obstacles, cycle and workspace,
+            and a tool, which is mounted on arms that carry none.
         device: Where the arms are evaluated.
-        payload: (T,) mass carried by the tip at each target, or one for all [kg]; 0 by default.
-        obstacles: The solids that clearances are measured from; the inverse kinematics ignores them.
-        target_arrays: How the targets are to be reached (`Task.target_arrays`); by default as points.
-        plan: The motions of a cycle (`Task.plan`).
-        workspace: Boxes to cover.
+        payload: (T,) mass carried by the tip at each position, or one for all [kg]; 0 by default.
 
     Examples:
         >>> import armwright as aw
@@ -269,11 +259,8 @@ def evaluate(
     """
     arms = [arms] if isinstance(arms, Arm) else arms
     if isinstance(targets, Task):
-        if payload is not None or target_arrays is not None or plan is not None or obstacles or workspace:
-            raise SettingsError(
-                "expected a task alone, got a payload, obstacles, target_arrays, plan or workspace beside it; change "
-                "the task, or give positions"
-            )
+        if payload is not None:
+            raise SettingsError("expected a task alone, got a payload beside it; change the task, or give positions")
         scene = task_scene(targets, *targets.cases[0])
         return evaluate_arrays(stack_arms([carrying_tool(arm, targets.tool) for arm in arms]), scene, device)
     positions = np.asarray(targets, dtype=np.float64)
@@ -283,10 +270,7 @@ def evaluate(
     loads = np.asarray(0.0 if payload is None else payload, dtype=np.float64)
     if loads.shape not in ((), (t,)) or not np.all((loads >= 0.0) & np.isfinite(loads)):
         raise TaskError(f"payload: expected 1 or {t} values >= 0 kg, got {payload}")
-    arrays = position_targets(t) if target_arrays is None else target_arrays
-    if len(arrays) != t:
-        raise TaskError(f"target_arrays: expected {t} targets, got {len(arrays)}")
-    scene = Scene(positions, np.broadcast_to(loads, (t,)).copy(), arrays, tuple(obstacles), plan, tuple(workspace))
+    scene = Scene(positions, np.broadcast_to(loads, (t,)).copy(), position_targets(t))
     return evaluate_arrays(stack_arms(arms), scene, device)
 
 
