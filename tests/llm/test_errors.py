@@ -1,7 +1,8 @@
 """Model faults over HTTP, against a local server that produces each of them."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+import random
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from armwright.llm import client as chat
 from armwright.llm.backend import FINAL, CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.study.progress import Progress, StudyResult
+from tests.fuzz.mutation import changed
 from tests.support.chat_server import (
     GOOD_DESIGN,
     Answer,
@@ -199,39 +201,6 @@ def test_key_invalid_in_a_header_is_reported(
 
 # Servers that say anything at all.
 
-SCALARS = (
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats()
-    | st.text(max_size=8)
-    | st.sampled_from([10**400, "\ud800", "tool_use", "text", "error"])
-)
-KEYS = st.sampled_from(["type", "error", "message", "content", "choices", "text"]) | st.text(max_size=6)
-ANY_JSON = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3))
-
-
-def places(content: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """The paths of all that a document holds."""
-    yield above
-    items = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
-    for key, inner in items:
-        yield from places(inner, (*above, key))
-
-
-def with_other(content: Any, place: Sequence[Any], other: Any) -> Any:
-    """The document with something else at a place."""
-    if not place:
-        return other
-    changed = content.copy()
-    changed[place[0]] = with_other(content[place[0]], place[1:], other)
-    return changed
-
-
-def almost(*documents: Any) -> st.SearchStrategy[Any]:
-    """Documents with anything at all at one of their places."""
-    return st.one_of(st.builds(with_other, st.just(d), st.sampled_from(list(places(d))), ANY_JSON) for d in documents)
-
 
 def stream(events: Any) -> str:
     if not isinstance(events, list):
@@ -241,15 +210,29 @@ def stream(events: Any) -> str:
 
 TOOL_CALL = {"model": "m", "tools": [{"name": "final_result", "function": {"name": "final_result"}}]}
 TEXT = json.dumps(GOOD_DESIGN)
-BODIES = st.one_of(
-    st.binary(max_size=60),
-    ANY_JSON.map(json.dumps),
-    almost(completion(TEXT, TOOL_CALL), completion(TEXT, {}), message(TEXT, TOOL_CALL)).map(json.dumps),
-    almost(streamed_events(message(TEXT, TOOL_CALL)), streamed_events(message(TEXT, {}))).map(stream),
-    almost(*(json.loads(error.body) for error in (openai_error(429, "a", "b"), anthropic_error(400, "a", "b")))).map(
-        json.dumps
-    ),
-    st.sampled_from(["[" * 9000, '{"a":' * 9000]),
+DOCUMENTS = (
+    completion(TEXT, TOOL_CALL),
+    completion(TEXT, {}),
+    message(TEXT, TOOL_CALL),
+    streamed_events(message(TEXT, TOOL_CALL)),
+    streamed_events(message(TEXT, {})),
+    *(json.loads(error.body) for error in (openai_error(429, "a", "b"), anthropic_error(400, "a", "b"))),
+)
+
+
+def damaged(document: Any, seed: int) -> bytes | str:
+    """A document with a part changed, or its bytes; a list of events as a stream."""
+    data = changed(json.dumps(document).encode(), "json", random.Random(seed))
+    if isinstance(document, list):
+        with suppress(ValueError, RecursionError):
+            return stream(json.loads(data))
+    return data
+
+
+BODIES = (
+    st.builds(damaged, st.sampled_from(DOCUMENTS), st.integers(0, 2**32))
+    | st.binary(max_size=60)
+    | st.sampled_from(["[" * 9000, '{"a":' * 9000])
 )
 STATUSES = st.just(200) | st.sampled_from([100, 204, 206, 302, 307, 400, 401, 404, 408, 413, 422, 429, 500, 529, 999])
 HEADERS = st.dictionaries(

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from armwright import DesignSpace, History, Problem, Task, load_task, paper_space
 from armwright.llm.answer import answer_schema
 from armwright.llm.feedback import Feedback
-from armwright.llm.model_options import ANSWERS, PromptOptions
+from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import MAX_TOKENS, design_prompt, estimated_tokens, parameters_prompt
 from armwright.llm.prompt_values import spread
 from armwright.runs.config import Method
@@ -38,7 +38,7 @@ from tests.support.fixed_problem import (
     proposal,
 )
 
-PROMPTS = ("plus", "minus", "full")
+PROMPTS, ANSWERS = ("plus", "minus", "full"), ("two-step", "one-step", "text")
 GOLDEN = Path(__file__).parent / "golden"
 PAPER = FixedProblem(load_task("target-1"))
 OPEN = load_task("target-1").model_copy(update={"reference_point": None})  # for other objectives than the paper's
@@ -277,7 +277,7 @@ def test_prompt_of_any_problem_is_complete_and_bounded(data: st.DataObject, spac
     task = Task(name="any", targets=targets, reference_point=reference, description=data.draw(words))  # type: ignore[arg-type]
     told = [proposal(design) for design in space.sample(data.draw(st.integers(0, 5)), 2)]
     history = fixed_history(FixedProblem(task, space), data.draw(st.integers(0, 30)), proposals=told)
-    prompt, answer = data.draw(st.sampled_from(PROMPTS)), data.draw(st.sampled_from(list(ANSWERS)))
+    prompt, answer = data.draw(st.sampled_from(PROMPTS)), data.draw(st.sampled_from(ANSWERS))
     options = PromptOptions(prompt=prompt, answer=answer)
     seed = data.draw(st.integers(0, 2**31))
     hints = data.draw(st.lists(words, max_size=2))

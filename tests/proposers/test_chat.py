@@ -18,7 +18,7 @@ from armwright import (
     optimize,
 )
 from armwright.exceptions import AnswerPendingError
-from armwright.llm.backend import Turn
+from armwright.llm.backend import CallError, Question, Turn
 from armwright.llm.conversation import RESULTS, conversation, new_part
 from armwright.llm.model_options import ModelOptions, PromptOptions
 from armwright.llm.prompt import design_prompt
@@ -155,8 +155,15 @@ def limited(turns: int, refusal: Answer) -> Callable[[Request], Answer]:
 
 
 @pytest.mark.parametrize("refusal", TOO_LONG)
-def test_oldest_turns_are_dropped_beyond_the_context(server: ChatServer, tmp_path: Path, refusal: str) -> None:
-    server.answer = limited(4, TOO_LONG[refusal])
+def test_refusal_of_a_long_prompt_is_recognised(server: ChatServer, refusal: str) -> None:
+    server.answer = lambda request: TOO_LONG[refusal]
+    with pytest.raises(CallError) as fault:
+        chat(server).backend.ask(Question("llm-0004", "reasoning", "Which?"))
+    assert fault.value.kind == "context"
+
+
+def test_oldest_turns_are_dropped_beyond_the_context(server: ChatServer, tmp_path: Path) -> None:
+    server.answer = limited(4, TOO_LONG["openai"])
     result = run(chat(server), tmp_path / "run", n_total=10, n_step=1)
     assert [trial.source for trial in result.trials[4:]] == ["llm"] * 10
     sent = conversations(server, free)
@@ -224,15 +231,14 @@ def test_manual_questions_of_a_chat_contain_what_is_new(tmp_path: Path) -> None:
     assert second.startswith(RESULTS)
 
 
-@pytest.mark.parametrize("name", ["plus", "minus", "full"])
-def test_built_in_prompts_change_below_their_results_only(name: str) -> None:
+def test_built_in_prompts_change_below_their_results_only() -> None:
     history = optimize(PROBLEM, proposer="rules", n_init=5, n_total=20, seed=0).history
-    early, late = (design_prompt(history.before(n), n, PromptOptions(prompt=name)) for n in (5, 25))
-    turns = (Turn(early, "so be it"),)
-    assert early.count(f"\n{RESULTS}\n") == late.count(f"\n{RESULTS}\n") == 1
-    part = new_part(late, turns)
-    assert part.startswith(f"{RESULTS}\n\n25 designs")
-    assert late.endswith(part)
+    for name in ("plus", "minus", "full"):
+        early, late = (design_prompt(history.before(n), n, PromptOptions(prompt=name)) for n in (5, 25))
+        assert early.count(f"\n{RESULTS}\n") == late.count(f"\n{RESULTS}\n") == 1
+        part = new_part(late, (Turn(early, "so be it"),))
+        assert part.startswith(f"{RESULTS}\n\n25 designs")
+        assert late.endswith(part)
 
 
 def test_prompt_that_describes_another_problem_is_sent_whole() -> None:

@@ -114,15 +114,6 @@ def test_waiting_and_resuming_give_the_same_run(tmp_path: Path, answering: Answe
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
-def test_refused_manual_answer_is_requested_again(tmp_path: Path, answering: Answering) -> None:
-    folder = tmp_path / "ask"
-    answering({"004-prompt.md": ("004-answer.md", "I do not know."), "004-refused.md": ("004-answer.md", LINES)})
-    result = run(ManualProposer(folder), None, n_total=1)
-    assert result.trials[4].source == "manual"
-    assert (folder / "004-refused-1.md").read_text(encoding="utf-8") == "I do not know."
-    assert "no design found" in (folder / "004-refused.md").read_text(encoding="utf-8")
-
-
 def test_refused_manual_answers_are_recorded(tmp_path: Path) -> None:
     pending(tmp_path / "ask", tmp_path / "run")
     for n in (1, 2):

@@ -119,7 +119,7 @@ def response_schema(title: str, fields: Mapping[str, Any], of: str, options: Pro
     """
     reason = {"type": "string", "description": f"the main reason for {of}, in one sentence"}
     fields = {**fields, "reason": reason}
-    if options.form == "schema":
+    if options.answer == "one-step":
         fields = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **fields}
     return {"title": title, "description": "What to evaluate next.", **object_schema(fields)}
 

@@ -89,8 +89,8 @@ CHECK_FORMAT = OutputFormat(_READY, json.dumps)
 class CallError(ProposalError):
     """A call without a usable answer; `reply` holds its cost."""
 
-    def __init__(self, kind: str, message: str, reply: Reply, final: bool | None = None) -> None:
-        super().__init__(kind, message, final=kind in FINAL if final is None else final)
+    def __init__(self, kind: str, message: str, reply: Reply) -> None:
+        super().__init__(kind, message, final=kind in FINAL)
         self.reply = reply
 
 

@@ -9,8 +9,6 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, Field, PrivateAttr
 
-# Form of the answer in the prompt: free text and a second call, JSON only, or free text alone.
-ANSWERS = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
 MODEL_SECONDS = 120.0  # default timeout
 DIRECT = ("model", "prompt", "memory", "max_cost")  # fields with a command-line option of their own
 
@@ -23,13 +21,8 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     prompt: Literal["plus", "minus", "full"] = "plus"
     # "none" (every call is new), or "chat" (all proposals of a run are one conversation)
     memory: Literal["none", "chat"] = "none"
-    # free reasoning, then a second call into the schema; "one-step"; "text" (manual answers)
+    # "two-step" (free reasoning, then a second call into the schema), "one-step" (JSON), or "text" (manual answers)
     answer: Literal["two-step", "one-step", "text"] = "two-step"
-
-    @property
-    def form(self) -> str:
-        """Form of the answer in the prompt."""
-        return ANSWERS[self.answer]
 
     @property
     def given(self) -> dict[str, Any]:

@@ -65,7 +65,7 @@ def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
         "reference_point": history.reference_point,
         "n_finished": len(history),
         "n_front": len(history.front),
-        "form": options.form,
+        "form": options.answer,
     }
 
 

@@ -23,11 +23,9 @@ from armwright.llm.backend import (
 from armwright.llm.budget import CallBudget
 from armwright.llm.conversation import conversation, new_part
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, output_mode_of, total_cost
+from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, total_cost
 from armwright.proof.summary_file import ProposerSummary
 from armwright.runs.control import Hint
-
-UNBILLED = ("missing", "cancelled")  # faults of calls that cost nothing unless a request was answered
 
 
 class LlmSession:
@@ -59,6 +57,7 @@ class LlmSession:
     def summary(self) -> ProposerSummary:
         """Return calls, tokens and cost of the whole run, earlier sessions included."""
         calls = self._calls()
+        modes = [call.output_mode for call in calls if call.output_mode]
         return ProposerSummary(
             name=self.name,
             model=self.backend.model,
@@ -69,7 +68,7 @@ class LlmSession:
             output_tokens=sum(call.output_tokens for call in calls),
             cost_usd=total_cost(calls) if any(call.requests for call in calls) else None,
             call_seconds=round(sum(call.seconds for call in calls), 3),
-            notes={"output_mode": mode} if (mode := output_mode_of(calls)) else {},
+            notes={"output_mode": modes[0]} if modes else {},
         )
 
     def cancel(self) -> None:
@@ -113,7 +112,7 @@ class LlmSession:
 
     def _question(self, number: int, prompt: str, known: int, hints: tuple[Hint, ...] = ()) -> Question:
         """Return the question for trial `number`, to be followed by a second one if the answer is in two steps."""
-        step = "reasoning" if self.options.form == "then-schema" else "answer"
+        step = "reasoning" if self.options.answer == "two-step" else "answer"
         return Question(self.identity(number), step, prompt, known, hints)
 
     def _ask(self, question: Question, output: OutputFormat, extraction: Callable[[str], str] = str) -> str:
@@ -158,7 +157,7 @@ class LlmSession:
                 try:
                     reply = ask(left)
                 except (CallError, Interrupted) as fault:
-                    if fault.kind not in UNBILLED or fault.reply.requests:
+                    if fault.kind != "cancelled" or fault.reply.requests:
                         self._keep(question, fault.reply, fault)
                     left = (MAX_REQUESTS if left is None else left) - max(1, fault.reply.requests)
                     if left < 1 or fault.kind != "context" or self._earlier(question) == earlier:

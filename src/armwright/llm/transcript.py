@@ -88,11 +88,6 @@ def total_cost(calls: Iterable[Call]) -> float | None:
     return None if None in costs else sum(cost for cost in costs if cost is not None)
 
 
-def output_mode_of(calls: Iterable[Call]) -> str:
-    """Return the mode of the structured answers of a run; empty before the first one."""
-    return next((call.output_mode for call in calls if call.output_mode), "")
-
-
 def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:
     """Return the hints in the latest prompt for a proposal."""
     call = last_call(calls, proposal, *FIRST_STEPS)

@@ -40,7 +40,7 @@ class LlmProposer(PromptedProposer):
         """Estimate the calls, tokens and cost of `n` proposals."""
         from armwright.llm.prices import describe_cost
 
-        requests = (2 if self.options.form == "then-schema" else 1) * n
+        requests = (2 if self.options.answer == "two-step" else 1) * n
         given, written = self._expected_tokens(problem, n)
         cost = describe_cost(self.options, requests, given, written)
         return (
@@ -53,7 +53,7 @@ class LlmProposer(PromptedProposer):
         written = ANALYSIS_TOKENS + PARAMETER_TOKENS
         prompt = self.prompt_for(History(problem, (), 0), 0, 0)
         whole = min(MAX_TOKENS, estimated_tokens(prompt) + self._feedback_tokens(problem))
-        in_steps = self.options.form == "then-schema"
+        in_steps = self.options.answer == "two-step"
         second = estimated_tokens(parameters_prompt(problem, "")) + ANALYSIS_TOKENS if in_steps else 0
         if not self.chat:
             return n * (whole + second), n * written

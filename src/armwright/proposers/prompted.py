@@ -83,16 +83,16 @@ class PromptedProposer(LlmSession, Proposer):
         if thoughts is not None:
             prompt = parameters_prompt(history.problem, thoughts.answer)
             return Question(self.identity(number), "parameters", prompt, thoughts.known)
-        hints = self.next_hints(number)
+        hints = self.next_hints()
         prompt = self.prompt_for(history, seed, number, hints)
         return self._question(number, prompt, len(history), hints)
 
-    def next_hints(self, number: int) -> tuple[Hint, ...]:
-        """Return the unused hints, which go with a question about trial `number` that is asked now, and no other one.
+    def next_hints(self) -> tuple[Hint, ...]:
+        """Return the unused hints, which go with a question that is asked now, and no other one.
 
         Manual answers get none: their question has to stay the same until it is answered.
         """
-        if self.options.form == "text":
+        if self.options.answer == "text":
             return ()
         with self._lock:
             used = self._hints_under_way | used_hints(self._transcript.calls).keys()

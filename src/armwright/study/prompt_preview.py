@@ -56,7 +56,7 @@ def preview_after(run: Path, options: PromptOptions | None = None) -> Preview:
     number = request_schedule(requests).upcoming(len(history))
     # With other options the new prompt is shown, even if the run waits for the second call of an answer.
     if given:
-        text = proposer.prompt_for(history, proposal_seed(config.seed, number), number, proposer.next_hints(number))
+        text = proposer.prompt_for(history, proposal_seed(config.seed, number), number, proposer.next_hints())
     else:
         text = proposer.question(history, proposal_seed(config.seed, number), number).prompt
     return _preview(proposer, history.problem, number, text)

@@ -121,18 +121,6 @@ def test_prompt_names_objectives_and_constraints(chat_server: ChatServer) -> Non
     assert study.trials[9].params == {"x": 0.25}
 
 
-def test_refused_answer_is_returned_with_the_reason(chat_server: ChatServer) -> None:
-    right, refused = answering(), answering({**GOOD, "degree": 3})
-    chat_server.answer = lambda request: (refused if len(request["messages"]) == 1 else right)(request)
-    callback = ProposalCallback(proposer(chat_server), every=10)
-    study = study_of()
-    study.enqueue_trial({"kernel": "poly"})  # the degree is known only once a trial had it
-    study.optimize(objective, n_trials=10, callbacks=[callback])
-    assert study.trials[9].user_attrs["source"] == "scripted"
-    assert "degree = 3 is between the steps of 2 <= degree <= 6 in steps of 2" in chat_server.prompts()[-1]
-    assert callback.faults == {}
-
-
 def test_repeatedly_refused_answer_is_a_fault(chat_server: ChatServer) -> None:
     chat_server.answer = answering({**GOOD, "C": 0})
     callback = ProposalCallback(proposer(chat_server), every=10)

@@ -8,7 +8,7 @@ from typing import Any
 
 import optuna
 
-from armwright.exceptions import ProposalError, SettingsError
+from armwright.exceptions import SettingsError
 from armwright.llm.backend import OutputFormat
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
@@ -54,8 +54,6 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         """Ask the model for the next trial, from the trials so far."""
         trials = study.get_trials(deepcopy=False)
         parameters = study_parameters(self.space(study), trials)
-        if not parameters:
-            raise ProposalError("space", "no trial has shown a parameter yet; give StudyLlmProposer(space=…)")
         prompt = study_prompt(study, trials, parameters, self.description, seed, self.options)
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
         text = self._ask(

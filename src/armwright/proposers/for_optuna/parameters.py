@@ -9,7 +9,7 @@ import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution
 from optuna.trial import FrozenTrial, TrialState
 
-from armwright.exceptions import DesignError, SettingsError, did_you_mean
+from armwright.exceptions import DesignError, did_you_mean
 from armwright.proposers.for_optuna.parameter_values import checked_value, describe, value_text
 
 Space = Mapping[str, BaseDistribution]
@@ -41,22 +41,6 @@ def observed_space(study: optuna.Study) -> dict[str, BaseDistribution]:
         if trial.state.is_finished():
             space.update(trial.distributions)
     return space
-
-
-def stated_space(study: optuna.Study, given: Space) -> dict[str, BaseDistribution]:
-    """Return the given distributions, completed by those of the study's trials.
-
-    Raises:
-        SettingsError: A given distribution differs in kind from the study's.
-    """
-    observed = observed_space(study)
-    for name, distribution in given.items():
-        if type(observed.get(name, distribution)) is not type(distribution):
-            raise SettingsError(
-                f"space says that {name} is {describe(distribution)}; in the study's trials it is "
-                f"{describe(observed[name])}"
-            )
-    return {**observed, **given}
 
 
 def study_parameters(space: Space, trials: Sequence[FrozenTrial]) -> list[Parameter]:

@@ -55,7 +55,7 @@ def study_prompt(
         "n_pruned": sum(trial.state == TrialState.PRUNED for trial in trials),
         "n_failed": sum(trial.state == TrialState.FAIL for trial in trials),
         "under_way": under_way[-N_RANDOM:],
-        "form": options.form,
+        "form": options.answer,
     }
 
     def render(most: int) -> str:

@@ -7,7 +7,9 @@ from typing import Any, Protocol
 
 import optuna
 
-from armwright.proposers.for_optuna.parameters import Space, stated_space
+from armwright.exceptions import ProposalError, SettingsError
+from armwright.proposers.for_optuna.parameter_values import describe
+from armwright.proposers.for_optuna.parameters import Space, observed_space
 
 
 @dataclass(frozen=True)
@@ -26,8 +28,23 @@ class StudyProposer(Protocol):
     given_space: Space = MappingProxyType({})  # distributions that take precedence over those of the trials so far
 
     def space(self, study: optuna.Study) -> Space:
-        """Return the distributions of the parameters: the given ones, completed by those of the trials so far."""
-        return stated_space(study, self.given_space)
+        """Return the distributions of the parameters: the given ones, completed by those of the trials so far.
+
+        Raises:
+            SettingsError: A given distribution differs in kind from the study's.
+            ProposalError: There are none yet.
+        """
+        observed = observed_space(study)
+        for name, distribution in self.given_space.items():
+            if type(observed.get(name, distribution)) is not type(distribution):
+                raise SettingsError(
+                    f"space says that {name} is {describe(distribution)}; in the study's trials it is "
+                    f"{describe(observed[name])}"
+                )
+        if not observed and not self.given_space:
+            reason = f"no trial has shown a parameter yet; give {type(self).__name__}(space=…)"
+            raise ProposalError("space", reason)
+        return {**observed, **self.given_space}
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """Propose the next trial. Several threads may call this at a time.

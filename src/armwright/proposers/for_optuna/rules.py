@@ -13,7 +13,6 @@ import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution
 
 from armwright.arrays import Array
-from armwright.exceptions import ProposalError
 from armwright.proposers.for_optuna.parameter_values import from_unit, is_number, to_unit, value_text
 from armwright.proposers.for_optuna.parameters import Space
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
@@ -46,8 +45,6 @@ class StudyRulesProposer(StudyProposer):
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """Apply one of the rules to the study's complete trials."""
         view = StudyView.of(study, self.space(study), self.name)
-        if not view.space:
-            raise ProposalError("space", "no trial has shown a parameter yet; give StudyRulesProposer(space=…)")
         rng = np.random.default_rng(seed)
         rule = draw_rule(view, rng)
         params, reason = RULES[rule](view, rng)
