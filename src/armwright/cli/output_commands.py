@@ -57,7 +57,7 @@ def pick(
     with activity("perturbing the chosen designs"):
         survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
     if json_:
-        print_json(list(with_parts(rows, records, survival)))
+        print_json(list(with_parts(history, rows, records, survival)))
         return
     show_picked(open_console(), run, history, picked, records, survival, n)
 

@@ -78,10 +78,8 @@ def print_json(content: Any) -> None:
 
 
 def print_csv(rows: Iterable[Mapping[str, Any]]) -> None:
-    """Print records as CSV with a header to stdout; a record that lacks a key gets an empty field."""
-    records = list(rows)
-    keys = dict.fromkeys(key for record in records for key in record)
-    print_text(to_csv({key: record.get(key) for key in keys} for record in records), end="")
+    """Print records as CSV with a header to stdout."""
+    print_text(to_csv(rows), end="")
 
 
 def print_records(is_json: bool, is_csv: bool, content: Any, rows: Iterable[Mapping[str, Any]] | None = None) -> bool:
