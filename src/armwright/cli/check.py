@@ -7,10 +7,9 @@ from typing import Any
 
 from rich.console import Console
 
-from armwright.cli.activity import activity
 from armwright.cli.notes import unused_parts
 from armwright.cli.show_inputs import show_target_table, show_task
-from armwright.cli.streams import print_json
+from armwright.cli.streams import activity, print_json
 from armwright.exceptions import TaskError
 from armwright.files import read_text
 from armwright.problem.checks.finding import SUSPECTED, Finding

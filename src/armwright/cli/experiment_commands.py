@@ -3,10 +3,17 @@
 import sys
 from pathlib import Path
 
-from armwright.cli.activity import activity
 from armwright.cli.arm_options import parse_base, parse_prices
 from armwright.cli.options import select_workers
-from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_json, print_records, print_text
+from armwright.cli.streams import (
+    activity,
+    check_formats,
+    exit_interrupted,
+    open_console,
+    print_json,
+    print_records,
+    print_text,
+)
 from armwright.exceptions import FailureError, SettingsError
 
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.activity import activity
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
+from armwright.cli.streams import activity, check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 

@@ -49,7 +49,7 @@ def with_parts(
     """Yield rows for JSON: with the types of the joints, the worst along the cycle, and what a design survives."""
     for row in rows:
         number = row["number"]
-        parts = {
+        parts: dict[str, Any] = {
             "joints": history.trials[number].design.joints,
             "path": to_jsonable_python(records[number].path),
             "survival": survival.get(number),

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armwright.cli.activity import activity
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json
+from armwright.cli.streams import activity, check_formats, open_console, print_csv, print_json
 from armwright.cli.tables import number, print_table, text
 from armwright.exceptions import SettingsError
 

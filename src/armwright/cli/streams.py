@@ -4,7 +4,8 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
@@ -70,6 +71,13 @@ def open_console(is_json: bool = False) -> Console:
     if not console.is_terminal:
         console.soft_wrap, console.width = True, WIDE  # lines and tables in files and pipes are whole
     return console
+
+
+@contextmanager
+def activity(description: str) -> Generator[None]:
+    """Show on stderr what is being done, such as "drawing figures", in a terminal; nothing may be printed meanwhile."""
+    with open_console(is_json=True).status(Text(f"{description} ...", no_wrap=True)):
+        yield
 
 
 def print_json(content: Any) -> None:
