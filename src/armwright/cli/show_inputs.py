@@ -100,7 +100,8 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
         return f"assumed: estimate from {stated}" if found else f"assumed: default of a {record.kind}"
 
     print_named(console, record.name, f": {record.kind} by {record.maker}")
-    console.print(f"page: {record.source}\nnote: {record.note}")
+    console.print(f"page: {record.source}", soft_wrap=True)  # an address stays whole
+    console.print(f"note: {record.note}")
     columns = (
         Column("", str), Column("value", lambda name: rounded(value_of(completed, name), 4), is_number=True),
         Column("", lambda name: UNITS[name]), Column("source", source_of, rank=1, least=24),
