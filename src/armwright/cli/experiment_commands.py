@@ -68,12 +68,10 @@ def experiment(
         chosen = chosen.model_copy(update={"seeds": seeds})
     out = out or Path("experiments") / chosen.name
     cells, skipped = plan_cells(chosen, folder, out, methods=method or (), tasks=task or (), seeds=seed or ())
-    before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
-    finished = {done.cell for done in before}
-    due = [cell for cell in cells if cell not in finished]
+    due = [cell for cell in cells if not running.is_finished(cell)]
     is_default = workers is None and scheduler is None
     placed = running.default_workers(len(due)) if is_default else select_workers(workers, scheduler)
-    show_plan(console, due, len(before), skipped, placed)
+    show_plan(console, due, len(cells) - len(due), skipped, placed)
     drawing = can_draw(console, figures)
     failed: list[running.CellOutcome] = []
     try:
