@@ -49,7 +49,8 @@ def simulate(
         raise SettingsError("--design, --recommended and --all choose the designs; use one of them")
     with activity(f"reading {run}"):
         _, history = read_run(run)
-    simulator, choice = Simulator(history), []
+    simulator = Simulator(history)
+    choice: list[dict[str, Any]] = []
     with activity("simulating"):
         if design is not None:
             simulator(design)
