@@ -157,10 +157,11 @@ def check_name(name: str) -> str:
 
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
-    """Return records with the same keys as CSV with a header; empty if there are none."""
+    """Return records as CSV with a header; empty if there are none. A record that lacks a key gets an empty field."""
     rows, out = list(rows), io.StringIO()
     if rows:
-        writer = csv.DictWriter(out, fieldnames=list(rows[0]), lineterminator="\n")
+        keys = dict.fromkeys(key for row in rows for key in row)
+        writer = csv.DictWriter(out, fieldnames=list(keys), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
     return out.getvalue()

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from armwright.cli.activity import activity
+from armwright.cli.streams import activity
 
 
 class Screen(io.StringIO):

@@ -165,7 +165,7 @@ def test_dominance_counts_match_pairwise_comparison(history: History) -> None:
     assert dominance_counts((1.0, None), (), history) is None
 
 
-def test_run_folder_keeps_existing_arms_for_figures(run: Path, compared: ArmComparison) -> None:
+def test_run_folder_keeps_existing_arms_for_figures_and_page(run: Path, compared: ArmComparison, tab: Tab) -> None:
     comparison = compare_arms(TASK, [UR5, PANDA], run)
     kept = read_existing_arms(run, 2)
     assert kept == comparison.arms == compared.arms
@@ -179,6 +179,9 @@ def test_run_folder_keeps_existing_arms_for_figures(run: Path, compared: ArmComp
     assert entries[-2:] == ["a: near", "b: far, beyond, at 0.001, 1,000,000"]
     assert "existing arm" in entries
     assert {"a", "b"} <= {text.get_text() for text in axes.texts}
+    tab.open(write_report(run))
+    trace = tab.ask('(({ x, y, text }) => ({ x, y, text }))(pareto.data.find((one) => one.name === "existing arm"))')
+    assert (trace["text"], trace["y"]) == (["ur5_robot", "panda"], [arm.values[1] for arm in kept])
 
 
 def test_page_shows_existing_arms_beside_the_recommended_designs(tmp_path: Path, tab: Tab) -> None:
@@ -189,8 +192,6 @@ def test_page_shows_existing_arms_beside_the_recommended_designs(tmp_path: Path,
     comparison = compare_arms(task, [UR5], run, prices={"ur5_robot": 28000.0})
     tab.open(write_report(run))
     stated, (arm,) = table(tab), comparison.arms
-    trace = tab.ask('(({ x, y, text }) => ({ x, y, text }))(pareto.data.find((one) => one.name === "existing arm"))')
-    assert (trace["text"], trace["y"]) == ([arm.name], [arm.values[1]])
     assert stated[arm.name]["Price"] == "28,000 USD"
     assert stated[arm.name]["Deflection"] == "–"
     designs = {design.name: design for design in comparison.designs}

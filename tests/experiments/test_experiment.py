@@ -16,7 +16,7 @@ from armwright.experiments.cells import plan_cells
 from armwright.experiments.outcome import collect
 from armwright.experiments.plan import (
     ExperimentPlan,
-    builtin_experiments,
+    builtin_files,
     builtin_text,
     load_experiment,
     suite_tasks,
@@ -69,7 +69,7 @@ def run_here(file: Path, *options: str) -> Any:
 
 
 def test_paper_experiment_matches_the_paper() -> None:
-    plan = builtin_experiments()["paper"]
+    plan = load_experiment("paper")[0]
     assert plan.task_list == ("target-1", "target-2", "target-3")
     assert (plan.seed_list, plan.n_init, plan.n_total) == ((0, 1, 2, 3, 4), 10, 200)
     asked = {key: method for key, method in plan.methods.items() if method.needs_a_model}
@@ -81,16 +81,16 @@ def test_paper_experiment_matches_the_paper() -> None:
 
 
 def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> None:
-    for name, plan in builtin_experiments().items():
+    for name in builtin_files():
         file = tmp_path / f"{name}.yaml"
         file.write_text(builtin_text(name), encoding="utf-8")
-        assert load_experiment(str(file)) == (plan, tmp_path)
-    assert builtin_experiments()["suite"].task_list == suite_tasks()
-    assert len(builtin_experiments()["rules"].seed_list) == 20
+        assert load_experiment(str(file)) == (load_experiment(name)[0], tmp_path)
+    assert load_experiment("suite")[0].task_list == suite_tasks()
+    assert len(load_experiment("rules")[0].seed_list) == 20
 
 
 def test_samplers_run_alone_and_with_rules(tmp_path: Path) -> None:
-    plan = builtin_experiments()["samplers"]
+    plan = load_experiment("samplers")[0]
     pairs = {(method.sampler, method.proposer) for method in plan.methods.values()}
     assert pairs == {(sampler, proposer) for sampler in SAMPLERS for proposer in ("none", "rules")}
     cells, skipped = plan_cells(plan, tmp_path, tmp_path)
@@ -175,7 +175,7 @@ def test_task_and_space_files_next_to_the_experiment_are_found(tmp_path: Path) -
 
 
 def test_cells_without_a_model_are_skipped_with_a_reason(tmp_path: Path) -> None:
-    plan = builtin_experiments()["n-step"]
+    plan = load_experiment("n-step")[0]
     cells, skipped = plan_cells(plan, tmp_path, tmp_path)
     assert {one.plan.proposer for one in skipped} == {"llm"}
     assert "no language model is configured" in skipped[0].reason
@@ -188,7 +188,7 @@ def test_cells_without_a_model_are_skipped_with_a_reason(tmp_path: Path) -> None
 
 
 def test_replayed_methods_run_the_cells_with_a_recording(tmp_path: Path) -> None:
-    plan = builtin_experiments()["recorded"]
+    plan = load_experiment("recorded")[0]
     cells, skipped = plan_cells(plan, tmp_path, tmp_path)
     replayed = {(cell.method, cell.replay) for cell in cells if cell.replay}
     assert {name for _, name in replayed} == set(shipped_recordings())

@@ -12,17 +12,15 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from armwright.cli import (
-    datasheet_command,
-    experiment_commands,
-    input_commands,
-    output_commands,
-    reach_map_command,
-    search_commands,
-    simulate_command,
-)
+from armwright.cli.datasheet_command import datasheet
+from armwright.cli.experiment_commands import compare, compare_arms, experiment
+from armwright.cli.input_commands import actuators, check, draft, edit, init, tasks
 from armwright.cli.options import read_declaration
+from armwright.cli.output_commands import doctor, export, pick, report
+from armwright.cli.reach_map_command import reach_map
+from armwright.cli.search_commands import design, optimize
 from armwright.cli.signals import INTERRUPTED, install_handlers
+from armwright.cli.simulate_command import simulate
 from armwright.cli.streams import abandon_streams, claim_streams, print_error
 from armwright.exceptions import ArmwrightError
 from armwright.extras import naming_extras
@@ -37,25 +35,10 @@ app = typer.Typer(
     "for small position error and small joint torque, and returns the Pareto set with a URDF for each arm.",
 )
 COMMANDS = {
-    "Before a run": (
-        input_commands.init,
-        input_commands.edit,
-        input_commands.check,
-        input_commands.tasks,
-        input_commands.actuators,
-        input_commands.draft,
-    ),
-    "Search": (search_commands.design, search_commands.optimize, experiment_commands.experiment),
-    "After a run": (
-        output_commands.pick,
-        output_commands.export,
-        simulate_command.simulate,
-        datasheet_command.datasheet,
-        reach_map_command.reach_map,
-        experiment_commands.compare,
-        experiment_commands.compare_arms,
-    ),
-    "Show": (output_commands.report, output_commands.doctor),
+    "Before a run": (init, edit, check, tasks, actuators, draft),
+    "Search": (design, optimize, experiment),
+    "After a run": (pick, export, simulate, datasheet, reach_map, compare, compare_arms),
+    "Show": (report, doctor),
 }
 
 

@@ -6,10 +6,9 @@ from typing import Any
 
 from rich.console import Console
 
-from armwright.cli.activity import activity
 from armwright.cli.notes import unused_parts
 from armwright.cli.show_inputs import show_target_table, show_task
-from armwright.cli.streams import print_json
+from armwright.cli.streams import activity, print_json
 from armwright.problem.checks.finding import Finding
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.checks.sampling import check_by_sampling

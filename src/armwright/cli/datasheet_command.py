@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from armwright.cli.activity import activity
 from armwright.cli.arm_options import parse_base
 from armwright.cli.options import load_problem
-from armwright.cli.streams import print_json, print_text
+from armwright.cli.streams import activity, print_json, print_text
 from armwright.exceptions import SettingsError
 
 

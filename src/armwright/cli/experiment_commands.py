@@ -3,10 +3,17 @@
 import sys
 from pathlib import Path
 
-from armwright.cli.activity import activity
 from armwright.cli.arm_options import parse_base, parse_prices
 from armwright.cli.options import select_workers
-from armwright.cli.streams import check_formats, exit_interrupted, open_console, print_json, print_records, print_text
+from armwright.cli.streams import (
+    activity,
+    check_formats,
+    exit_interrupted,
+    open_console,
+    print_json,
+    print_records,
+    print_text,
+)
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -61,12 +68,10 @@ def experiment(
         chosen = chosen.model_copy(update={"seeds": seeds})
     out = out or Path("experiments") / chosen.name
     cells, skipped = plan_cells(chosen, folder, out, methods=method or (), tasks=task or (), seeds=seed or ())
-    before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
-    finished = {done.cell for done in before}
-    due = [cell for cell in cells if cell not in finished]
+    due = [cell for cell in cells if not running.is_finished(cell)]
     is_default = workers is None and scheduler is None
     placed = running.default_workers(len(due)) if is_default else select_workers(workers, scheduler)
-    show_plan(console, due, len(before), skipped, placed)
+    show_plan(console, due, len(cells) - len(due), skipped, placed)
     drawing = can_draw(console, figures)
     failed: list[running.CellOutcome] = []
     try:

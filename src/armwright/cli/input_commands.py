@@ -3,13 +3,12 @@
 import os
 import shlex
 import sys
-from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 
 from armwright.cli.options import load_problem
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_records, print_text
+from armwright.cli.streams import check_formats, open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -94,31 +93,18 @@ def tasks(names: list[str] | None = None, *, json_: bool = False, csv_: bool = F
     Parameters:
         names: Describe these tasks (built-in, random-N, files).
     """
-    from armwright.cli.show_inputs import show_task, show_tasks, task_rows
-    from armwright.experiments.baselines import baselines_of
-    from armwright.proof.front_gap import best_known_hypervolume
+    from armwright.cli.show_inputs import results_of, show_task, show_tasks, task_record, task_rows
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
     console = open_console(check_formats(json_, csv_))
     listed = [load_task(name) for name in names] if names else list(builtin_tasks().values())
-    if not (names or json_ or csv_):
+    content = [task_record(task) for task in listed] if json_ else ()
+    if print_records(json_, csv_, content, task_rows(listed)):
+        return
+    if not names:
         show_tasks(console, listed)
-    elif csv_:
-        print_csv(task_rows(listed))
-    else:
-        known = [(task, best_known_hypervolume(task)) for task in listed]
-        stored = [(task, best, [] if best is None else baselines_of(task.name)) for task, best in known]
-        if json_:
-            print_json(
-                [
-                    task.model_dump(mode="json")
-                    | {"best_known_hypervolume": best, "baselines": [asdict(one) for one in baselines]}
-                    for task, best, baselines in stored
-                ]
-            )
-            return
-        for task, best, baselines in stored:
-            show_task(console, task, best, baselines)
+    for task in listed if names else ():
+        show_task(console, task, *results_of(task))
 
 
 def actuators(

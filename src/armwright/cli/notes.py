@@ -1,6 +1,7 @@
 """Notes on what a task holds, what its objectives leave out, and on figures that cannot be drawn."""
 
 import shlex
+from collections.abc import Mapping, Set
 from pathlib import Path
 
 from rich.console import Console
@@ -11,6 +12,9 @@ from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.task import Task
+
+# Parts of tasks, and the needs of quantities that use them
+PARTS: Mapping[str, Set[Need]] = {"obstacles": {"clearance"}, "workspace": {"workspace", "directions"}}
 
 
 def can_draw(console: Console, wanted: bool = True) -> bool:
@@ -23,17 +27,11 @@ def can_draw(console: Console, wanted: bool = True) -> bool:
 
 def unused_parts(problem: Problem) -> list[str]:
     """Return a note for each part of the task that neither an objective nor a constraint uses."""
-    task = problem.task
-    parts: dict[str, tuple[Need, ...]] = {}
-    if task.obstacles:
-        parts["obstacles"] = ("clearance",)
-    if task.workspace:
-        parts["workspace"] = ("workspace", "directions")
     return [
         f"no objective or constraint uses the task's {part}; quantities for it: "
-        + ", ".join(name for name, quantity in QUANTITIES.items() if {*needs} & {*quantity.needs})
-        for part, needs in parts.items()
-        if not problem.uses(*needs)
+        + ", ".join(name for name, quantity in QUANTITIES.items() if needs & {*quantity.needs})
+        for part, needs in PARTS.items()
+        if getattr(problem.task, part) and not problem.uses(*needs)
     ]
 
 

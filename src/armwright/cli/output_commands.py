@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.activity import activity
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json, print_text
+from armwright.cli.streams import activity, check_formats, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -57,7 +56,7 @@ def pick(
     with activity("perturbing the chosen designs"):
         survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
     if json_:
-        print_json(list(with_parts(rows, records, survival)))
+        print_json(list(with_parts(history, rows, records, survival)))
         return
     show_picked(open_console(), run, history, picked, records, survival, n)
 

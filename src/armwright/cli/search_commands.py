@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from armwright.cli.activity import activity
 from armwright.cli.options import is_run, load_problem, select_workers
 from armwright.cli.signals import interruptible
 from armwright.cli.streams import (
+    activity,
     exit_interrupted,
     open_console,
     print_command,

@@ -4,6 +4,7 @@ import math
 import shlex
 import textwrap
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.problem.checks.reach import distance_to_bases
 from armwright.problem.constraints import implied_constraints
 from armwright.problem.problem import Problem
+from armwright.proof.front_gap import best_known_hypervolume
 from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
 from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
@@ -37,6 +39,18 @@ def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
         shares = {baseline.method: baseline.share for baseline in baselines_of(task.name)}
         shown = {method: shares.get(method) for method in methods}
         yield {"name": task.name, "targets": len(task.targets), **shown, "description": task.description}
+
+
+def task_record(task: DesignTask) -> dict[str, Any]:
+    """Return a task for JSON, with the best known hypervolume and its baselines."""
+    best, stored = results_of(task)
+    return task.model_dump(mode="json") | {"best_known_hypervolume": best, "baselines": list(map(asdict, stored))}
+
+
+def results_of(task: DesignTask) -> tuple[float | None, list[Baseline]]:
+    """Return the best known hypervolume of a built-in task and its baselines; None and no baselines for another."""
+    best = best_known_hypervolume(task)
+    return best, [] if best is None else baselines_of(task.name)
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
@@ -86,7 +100,8 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
         return f"assumed: estimate from {stated}" if found else f"assumed: default of a {record.kind}"
 
     print_named(console, record.name, f": {record.kind} by {record.maker}")
-    console.print(f"page: {record.source}\nnote: {record.note}")
+    console.print(f"page: {record.source}", soft_wrap=True)  # an address stays whole
+    console.print(f"note: {record.note}")
     columns = (
         Column("", str), Column("value", lambda name: rounded(value_of(completed, name), 4), is_number=True),
         Column("", lambda name: UNITS[name]), Column("source", source_of, rank=1, least=24),

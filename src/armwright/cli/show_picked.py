@@ -37,17 +37,23 @@ def picked_rows(
             "source": member.source,
             **{name: member.design.params.get(name) for name in categorical},
             **quantities[member.number],
-            "joints": member.design.joints,
         }
 
 
 def with_parts(
-    rows: Iterable[dict[str, Any]], records: Records, survival: Mapping[int, Mapping[str, Any]]
+    history: History,
+    rows: Iterable[dict[str, Any]],
+    records: Records,
+    survival: Mapping[int, Mapping[str, Any]],
 ) -> Iterator[dict[str, Any]]:
-    """Yield rows for JSON: with the worst along the cycle, and with what a design survives."""
+    """Yield rows for JSON: with the types of the joints, the worst along the cycle, and what a design survives."""
     for row in rows:
         number = row["number"]
-        parts = {"path": to_jsonable_python(records[number].path), "survival": survival.get(number)}
+        parts: dict[str, Any] = {
+            "joints": history.trials[number].design.joints,
+            "path": to_jsonable_python(records[number].path),
+            "survival": survival.get(number),
+        }
         yield row | {name: part for name, part in parts.items() if part is not None}
 
 

@@ -138,14 +138,6 @@ def _search_lines(history: History, summary: Record, search: Record) -> Iterator
     yield f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}"
     if summary["n_trials"] < min(search["found"], MAX_DESIGNS):
         yield f"{summary['n_trials']} of {search['found']} distinct designs are kept: there was no time to verify more"
-    if tried := search["reduced"]["evaluations"]:
-        kept = search["reduced"]["designs"]
-        yield f"{tried} arms without a joint that never moved were evaluated; {kept} are on the front"
-    if screening := search.get("screening"):
-        yield (
-            f"considered {screening['considered']:,} designs: bounds discarded {screening['discarded_by_bounds']:,}, "
-            f"estimates ranked the rest; {screening['evaluated_though_rejected']:,} evaluated though rejected"
-        )
 
 
 def show_recommended(console: Console, recommended: Sequence[Record]) -> None:
@@ -210,14 +202,7 @@ def _proposer_lines(proposer: Record) -> Iterator[str]:
             "proposer and is left out of its row in tables"
         )
     if proposer.get("differing_prompts"):
-        yield f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones"
-    if (overlap := proposer["overlap"]) is not None:
-        age = overlap["feedback_age"]
-        feedback = "" if age is None else f"; feedback {age['mean']:.1f} trials old on average, {age['max']} at most"
-        yield (
-            f"overlap: {overlap['ratio']:.1%} of the trials were proposals (planned: {overlap['ratio_planned']:.1%})"
-            f"{feedback}"
-        )
+        yield (f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones")
 
 
 def format_value(value: float) -> str:

@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armwright.cli.activity import activity
-from armwright.cli.streams import check_formats, open_console, print_csv, print_json
+from armwright.cli.streams import activity, check_formats, open_console, print_records
 from armwright.cli.tables import number, print_table, text
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from armwright.proof.simulated_run import Simulator
     from armwright.proof.simulation import SimulatedDesign
 
 
@@ -36,7 +34,10 @@ def simulate(
     """
     import json
 
+    from pydantic_core import to_jsonable_python
+
     from armwright.cli.notes import can_draw
+    from armwright.proof.recommendation import recommend
     from armwright.proof.results import SUMMARY, read_summary
     from armwright.proof.simulated_run import Simulator
     from armwright.proof.simulation_files import SIMULATION, simulation_record, write_simulated
@@ -48,11 +49,16 @@ def simulate(
         raise SettingsError("--design, --recommended and --all choose the designs; use one of them")
     with activity(f"reading {run}"):
         _, history = read_run(run)
-    if design is not None and not 0 <= design < len(history):
-        raise SettingsError(f"--design {design}: {run} has the designs 0 to {len(history) - 1}")
     simulator = Simulator(history)
+    choice: list[dict[str, Any]] = []
     with activity("simulating"):
-        choice = _simulate_chosen(simulator, design, all_)
+        if design is not None:
+            simulator(design)
+        elif all_:
+            for member in history.front:
+                simulator(member.number)
+        else:
+            choice = to_jsonable_python(recommend(history, simulator))
     members = [simulator.members[number] for number in sorted(simulator.members)]
     record = simulation_record(members)
     with Folder(run) as folder:
@@ -67,26 +73,9 @@ def simulate(
             from armwright.pictures.simulation_figure import write_simulation_figure
 
             write_simulation_figure(run, history.member(member.result.design).arm, member)
-    if json_:
-        print_json(record)
-        return
-    if csv_:
-        print_csv(map(_row, (member.result for member in members)))
-        return
-    _show(open_console(), run, [member.result for member in members], choice)
-
-
-def _simulate_chosen(simulator: "Simulator", design: int | None, every: bool) -> list[dict[str, Any]]:
-    """Simulate the chosen designs; return the recommended ones if those were chosen."""
-    from pydantic_core import to_jsonable_python
-
-    from armwright.proof.recommendation import recommend
-
-    if design is None and not every:
-        return to_jsonable_python(recommend(simulator.history, simulator))
-    for one in [member.number for member in simulator.history.front] if design is None else [design]:
-        simulator(one)
-    return []
+    results = [member.result for member in members]
+    if not print_records(json_, csv_, record, map(_row, results)):
+        _show(open_console(), run, results, choice)
 
 
 def _row(one: "SimulatedDesign") -> dict[str, Any]:

@@ -4,7 +4,8 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
@@ -72,16 +73,21 @@ def open_console(is_json: bool = False) -> Console:
     return console
 
 
+@contextmanager
+def activity(description: str) -> Generator[None]:
+    """Show on stderr what is being done, such as "drawing figures", in a terminal; nothing may be printed meanwhile."""
+    with open_console(is_json=True).status(Text(f"{description} ...", no_wrap=True)):
+        yield
+
+
 def print_json(content: Any) -> None:
     """Print content as indented JSON to stdout; paths become strings."""
     print_text(json.dumps(content, indent=2, default=str))
 
 
 def print_csv(rows: Iterable[Mapping[str, Any]]) -> None:
-    """Print records as CSV with a header to stdout; a record that lacks a key gets an empty field."""
-    records = list(rows)
-    keys = dict.fromkeys(key for record in records for key in record)
-    print_text(to_csv({key: record.get(key) for key in keys} for record in records), end="")
+    """Print records as CSV with a header to stdout."""
+    print_text(to_csv(rows), end="")
 
 
 def print_records(is_json: bool, is_csv: bool, content: Any, rows: Iterable[Mapping[str, Any]] | None = None) -> bool:

@@ -168,11 +168,6 @@ class Comparison:
                 tests.append(Contrast("", method, other, test, None, interval(own / baseline)))
         return _corrected(tests)
 
-    @property
-    def is_undecidable(self) -> bool:
-        """True if some contrast has too few pairs for any test at 5 %."""
-        return any(not can_reject(contrast.test.n) for contrast in self.contrasts)
-
     @cached_property
     def times(self) -> list[TimeToTarget]:
         """Times to shares of the best known hypervolume, or of the best of these runs if none is known."""

@@ -159,7 +159,7 @@ def suite_tasks() -> tuple[str, ...]:
     return tuple(name for name in builtin_names() if name not in builtin_spaces())
 
 
-def _builtin_files() -> dict[str, Traversable]:
+def builtin_files() -> dict[str, Traversable]:
     """Return the files of the built-in experiments by name."""
     folder = resources.files("armwright.experiments") / "builtin"
     return {file.name.removesuffix(".yaml"): file for file in sorted(folder.iterdir(), key=lambda file: file.name)}
@@ -167,7 +167,7 @@ def _builtin_files() -> dict[str, Traversable]:
 
 def builtin_text(name: str) -> str:
     """Return the file of a built-in experiment, as a template."""
-    files = _builtin_files()
+    files = builtin_files()
     if name not in files:
         raise SettingsError(
             f'unknown experiment "{name}".{did_you_mean(name, files)} Built-in experiments: {", ".join(files)}; '
@@ -176,15 +176,10 @@ def builtin_text(name: str) -> str:
     return files[name].read_text(encoding="utf-8")
 
 
-def builtin_experiments() -> dict[str, ExperimentPlan]:
-    """Return the built-in experiments by name."""
-    return {name: parse_document(builtin_text(name), ExperimentPlan, SettingsError, name) for name in _builtin_files()}
-
-
 def load_experiment(name_or_path: str) -> tuple[ExperimentPlan, Path]:
     """Return an experiment by its name or YAML file, and the folder of its other files."""
     path = Path(name_or_path)
-    if name_or_path in _builtin_files() or not path.is_file():
+    if name_or_path in builtin_files() or not path.is_file():
         return parse_document(builtin_text(name_or_path), ExperimentPlan, SettingsError, name_or_path), Path.cwd()
     plan = read_document(path, ExperimentPlan, SettingsError)
     methods = {

@@ -21,6 +21,7 @@ from armwright.search.samplers import sampler_factory, sampler_for
 from armwright.spaces.design_space import default_space, load_space
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.study.front.front_run import find_front
+from armwright.study.progress import RunResult
 from armwright.study.run_settings import run_config
 from armwright.study.settings import study_method
 from armwright.study.study import optimize
@@ -32,37 +33,31 @@ POLL = 1.0  # [s] between two checks of the cluster
 
 @dataclass(frozen=True)
 class CellOutcome:
-    """The outcome of a cell.
-
-    fault: why it failed; empty if it is finished. resumed: whether it was complete before.
-    """
+    """The outcome of a cell."""
 
     cell: Cell
     seconds: float
     hypervolume: float | None = None
-    fault: str = ""
-    resumed: bool = False
+    fault: str = ""  # why it failed; empty if it is finished
 
 
 def run_cell(cell: Cell) -> CellOutcome:
     """Run one cell, or the rest of it, in this process; a failure is returned, not raised."""
-    started = time.perf_counter()
+    started, volume, fault = time.perf_counter(), None, ""
     try:
-        summary, resumed = _run(cell)
-    except ArmwrightError as fault:
-        return CellOutcome(cell, time.perf_counter() - started, fault=str(fault))
-    except Exception as fault:  # noqa: BLE001 (a failing cell must not stop the others)
-        message = " ".join(f"{type(fault).__name__}: {fault}".split())
-        return CellOutcome(cell, time.perf_counter() - started, fault=message)
-    return CellOutcome(cell, time.perf_counter() - started, summary["hypervolume"]["final"], resumed=resumed)
+        volume = _run(cell).summary["hypervolume"]["final"]
+    except ArmwrightError as error:
+        fault = str(error)
+    except Exception as error:  # noqa: BLE001 (a failing cell must not stop the others)
+        fault = " ".join(f"{type(error).__name__}: {error}".split())
+    return CellOutcome(cell, time.perf_counter() - started, volume, fault)
 
 
-def _run(cell: Cell) -> tuple[dict[str, Any], bool]:
+def _run(cell: Cell) -> RunResult:
     plan, problem = cell.plan, _problem(cell)
     if plan.design is not None:
-        found = find_front(problem, evaluations=plan.design, seed=cell.seed, out=cell.folder)
-        return found.summary, found.resumed == found.summary["search"]["evaluations"]
-    run = optimize(
+        return find_front(problem, evaluations=plan.design, seed=cell.seed, out=cell.folder)
+    return optimize(
         problem,
         proposer=plan.choose_proposer(cell.replay).proposer or "none",
         sampler=plan.sampler,
@@ -73,7 +68,6 @@ def _run(cell: Cell) -> tuple[dict[str, Any], bool]:
         seed=cell.seed,
         out=cell.folder,
     )
-    return run.summary, run.resumed == len(run.trials)
 
 
 def _problem(cell: Cell) -> Problem:
@@ -86,26 +80,20 @@ def _problem(cell: Cell) -> Problem:
     )
 
 
-def finished_before(cell: Cell) -> CellOutcome | None:
-    """Return the outcome of a cell that is finished with the same settings; None if anything is left to do."""
-    summary = read_summary(cell.folder)
-    if summary is None or cell.plan.design is not None or summary["n_trials"] < cell.n_init + cell.n_total:
-        return None
-    plan = cell.plan
+def is_finished(cell: Cell) -> bool:
+    """Return whether a cell is finished with the same settings; a front search is asked again each time."""
+    plan, summary = cell.plan, read_summary(cell.folder)
+    if summary is None or plan.design is not None or summary["n_trials"] < cell.n_init + cell.n_total:
+        return False
     try:
-        proposer = plan.choose_proposer(cell.replay).proposer
-        method = study_method(
-            proposer,
-            sampler_for(_problem(cell), plan.sampler),
-            cell.n_init,
-            plan.n_step,
-            cell.n_total,
-            plan.model_options.in_flight,
-        )
-        check_same_run(cell.folder, read_config(cell.folder), run_config(_problem(cell), method, cell.seed))
+        problem = _problem(cell)
+        proposer, sampler = plan.choose_proposer(cell.replay).proposer, sampler_for(problem, plan.sampler)
+        in_flight = plan.model_options.in_flight
+        method = study_method(proposer, sampler, cell.n_init, plan.n_step, cell.n_total, in_flight)
+        check_same_run(cell.folder, read_config(cell.folder), run_config(problem, method, cell.seed))
     except ArmwrightError:
-        return None  # `run_cell` reports it
-    return CellOutcome(cell, 0.0, summary["hypervolume"]["final"], resumed=True)
+        return False  # `run_cell` reports it
+    return True
 
 
 def _check_extras(cells: Sequence[Cell]) -> None:
