@@ -58,7 +58,7 @@ class ShownRun:
         """Return the content of `shown.npz`."""
         content = io.BytesIO()
         head = np.frombuffer(to_json(self.head, inf_nan_mode="null"), dtype=np.uint8)
-        np.savez_compressed(content, allow_pickle=False, head=head, **self.arrays)
+        np.savez_compressed(content, head=head, **self.arrays)
         return content.getvalue()
 
 
