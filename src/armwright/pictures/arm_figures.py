@@ -142,7 +142,8 @@ def _tip_paths(arm: Arm, record: DesignRecord) -> list[Array]:
     for points in [] if record.motion is None else record.motion.q:
         shares, at = np.linspace(0.0, 1.0, len(points)), np.linspace(0.0, 1.0, SAMPLES)
         columns: Array = np.array(points, dtype=np.float64).T
-        q = np.column_stack([np.interp(at, shares, column) for column in columns])
+        values: list[Array] = [np.interp(at, shares, column) for column in columns]
+        q: Array = np.stack(values, axis=-1)
         found.append(forward_kinematics(stack_arms([arm], "float64"), q[None]).tip[0])
     return found
 
