@@ -73,7 +73,8 @@ def _extent(text: str, key: str, where: str) -> tuple[int, int]:
     if root is not None and (not isinstance(root, yaml.MappingNode) or root.flow_style):
         raise TaskError(f"{where}: expected keys and values, one a line")
     lines = text.splitlines()
-    starts = [] if root is None else [(str(name.value), int(name.start_mark.line)) for name, _ in root.value]
+    pairs = [] if root is None else cast("list[tuple[Any, Any]]", root.value)
+    starts = [(str(name.value), int(name.start_mark.line)) for name, _ in pairs]
     ends = [line for _, line in starts[1:]] + [len(lines)]
     for (name, first), end in zip(starts, ends, strict=True):
         if name == key:
@@ -90,14 +91,15 @@ def _apply(content: Any, edit: Edit, where: str, styled: Callable[[Any], Any]) -
         for step, following in pairwise(edit.path):
             if isinstance(place, dict) and isinstance(step, str) and cast("Any", place).get(step) is None:
                 place[step] = styled([] if isinstance(following, int) else {})
-            place = place[step]
-        if isinstance(place, dict) != isinstance(last, str):
+            place = cast("Any", place)[step]
+        is_record, is_list = isinstance(place, dict), isinstance(place, list)
+        if not (is_record if isinstance(last, str) else is_list):
             raise TypeError("expected a key of a record, or the index of an item")
-        if isinstance(place, dict) and edit.remove:
-            cast("Any", place).pop(last, None)
+        if edit.remove and is_record:
+            place.pop(last, None)
         elif edit.remove:
             del place[last]
-        elif isinstance(place, list) and last == len(cast("Any", place)):
+        elif is_list and last == len(place):
             place.append(styled(edit.value))
         else:
             place[last] = styled(edit.value)
@@ -134,11 +136,14 @@ def _styled(value: Any) -> Any:
 def _fits_a_line(value: Any) -> bool:
     """Return True for a value that task files state on one line: one without records or lists of lists in it."""
     parts = cast("Mapping[str, Any]", value).values() if isinstance(value, Mapping) else [value]
-    return not any(isinstance(one, dict) or (isinstance(one, list) and _holds_any(one, (dict, list))) for one in parts)
+    return all(map(_is_short, parts))
 
 
-def _holds_any(items: list[Any], kinds: tuple[type, ...]) -> bool:
-    return any(isinstance(item, kinds) for item in items)
+def _is_short(item: Any) -> bool:
+    """Return True for what fits into a record on one line."""
+    if isinstance(item, list):
+        return not any(isinstance(part, (dict, list)) for part in cast("list[Any]", item))
+    return not isinstance(item, dict)
 
 
 def _reads_as(text: str) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic_core import to_json
 
 from armwright.arrays import Array
+from armwright.exceptions import RunFolderError
 from armwright.existing.compare_arms import read_existing_arms
 from armwright.files import MAX_DERIVED, check_no_links, read_text
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
@@ -99,8 +100,9 @@ class RunContent:
 
     def file(self, number: int, kind: str) -> str | None:
         """Return a design as text for simulators, urdf or mjcf; None for other kinds."""
-        if self.summary is not None and number in {member.number for member in self.history.front}:
-            return _files(self.folder, number).get(kind)
+        is_stored = self.summary is not None and number in {member.number for member in self.history.front}
+        if is_stored and kind in (stored := _files(self.folder, number)):
+            return stored[kind]
         name, arm = f"{self.history.problem.task.name}-{number}", self.history.member(number).arm
         return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}.get(kind)
 
@@ -162,7 +164,7 @@ def _files(folder: Path, number: int) -> dict[str, str]:
     """Return the files of a design of the front, by format."""
     place = folder / DESIGNS / design_name(number)
     return {
-        kind: read_text(place / name, MAX_DERIVED, ValueError)
+        kind: read_text(place / name, MAX_DERIVED, RunFolderError)
         for kind, name in FILES.items()
         if (place / name).is_file()
     }

@@ -64,7 +64,7 @@ def draw_arm(history: History, title: str, member: FrontMember, records: Records
     """Draw one design with a panel for each target; of more than 12 targets, 12 spread evenly over the list."""
     targets = records[member.number].targets
     n = len(targets)
-    shown = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MAX_PANELS))})
+    shown: list[int] = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MAX_PANELS))})
     panels: list[Panel] = []
     for target in shown:
         reason = targets[target].unreached_reason
@@ -141,7 +141,9 @@ def _tip_paths(arm: Arm, record: DesignRecord) -> list[Array]:
     found: list[Array] = []
     for points in [] if record.motion is None else record.motion.q:
         shares, at = np.linspace(0.0, 1.0, len(points)), np.linspace(0.0, 1.0, SAMPLES)
-        q = np.column_stack([np.interp(at, shares, values) for values in np.transpose(points)])
+        columns: Array = np.array(points, dtype=np.float64).T
+        values: list[Array] = [np.interp(at, shares, column) for column in columns]
+        q: Array = np.stack(values, axis=-1)
         found.append(forward_kinematics(stack_arms([arm], "float64"), q[None]).tip[0])
     return found
 

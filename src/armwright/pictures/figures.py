@@ -168,7 +168,9 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
         if np.all(np.array(member.values[:2]) <= limits[:, 1])
     ]
     arms = [arm for arm in existing if None not in arm.values[:2]]
-    arms.sort(key=lambda arm: np.minimum(arm.values[0] or 0.0, limits[0, 1]), reverse=True)  # as `_named` takes turns
+    arms.sort(
+        key=lambda arm: np.minimum(arm.values[0] or 0.0, limits[0, 1]), reverse=True
+    )  # marks on both sides keep apart
     figure, axes = one_panel(5.2, 4.2 + LINE * (len(marked) + len(arms)), MARK_PAD if arms else None)
     _scatter(axes, history, reference, limits, alpha=0.25)
     for member in history.front:
@@ -179,23 +181,25 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
     axes.set_title(f"{history.problem.task.name}: {n} design{'s' * (n != 1)} on the front, hypervolume {area:.2f}")
     handles = [*_legend(history), *([_mark(EXISTING)] if arms else [])]
     for number, (label, values) in enumerate(marked):
-        handles.append(_named(axes, values[:2], number, str(number + 1), label))
+        side = -1 if number % 2 else 1
+        handles.append(_named(axes, values[:2], (side, side), str(number + 1), label))
     for number, arm in enumerate(arms):
         place = np.array(arm.values[:2], dtype=float)
         at = np.minimum(place, limits[:, 1])
         beyond = "" if np.all(place <= at) else f", beyond, at {rounded(place[0])}, {rounded(place[1])}"
         axes.scatter(*at, **EXISTING.points | {"edgecolors": FRONT}, zorder=6, clip_on=False)
-        handles.append(_named(axes, at, number, ascii_lowercase[number % 26], f"{arm.name}{beyond}"))
+        sides = (-1 if number % 2 else 1, -1 if at[1] > limits[1].mean() else 1)
+        handles.append(_named(axes, at, sides, ascii_lowercase[number % 26], f"{arm.name}{beyond}"))
     legend_below(figure, handles)
     return figure
 
 
-def _named(axes: Any, place: Any, number: int, mark: str, label: str) -> Line2D:
-    """Ring a place, write a mark on one of four sides of it, and return the legend entry."""
-    x, y = (1, -1)[number % 2], (1, -1)[number // 2 % 2]
+def _named(axes: Any, place: Any, sides: tuple[int, int], mark: str, label: str) -> Line2D:
+    """Ring a place, write a mark on its right or left (1, -1), above or below, and return the legend entry."""
+    x, y = sides
     axes.plot(*place, marker="o", markersize=10, color=FRONT, markerfacecolor="none", clip_on=False, zorder=7)
-    sides = {"ha": "left" if x > 0 else "right", "va": "bottom" if y > 0 else "top"}
-    axes.annotate(mark, place, (5 * x, 4 * y), textcoords="offset points", **sides, weight="bold", zorder=7)
+    aligned = {"ha": "left" if x > 0 else "right", "va": "bottom" if y > 0 else "top"}
+    axes.annotate(mark, place, (5 * x, 4 * y), textcoords="offset points", **aligned, weight="bold", zorder=7)
     return legend_mark(f"{mark}: {label}", "", FRONT)
 
 

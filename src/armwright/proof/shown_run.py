@@ -56,9 +56,9 @@ class ShownRun:
 
     def to_bytes(self) -> bytes:
         """Return the content of `shown.npz`."""
-        content = io.BytesIO()
-        head = np.frombuffer(to_json(self.head, inf_nan_mode="null"), dtype=np.uint8)
-        np.savez_compressed(content, allow_pickle=False, head=head, **self.arrays)
+        content, head = io.BytesIO(), to_json(self.head, inf_nan_mode="null")
+        arrays: dict[str, Any] = {"head": np.frombuffer(head, dtype=np.uint8), **self.arrays}
+        np.savez_compressed(content, **arrays)
         return content.getvalue()
 
 

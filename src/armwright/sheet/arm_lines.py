@@ -9,7 +9,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.forward import link_lines
 from armwright.kinematics.reach.reach_outline import reach_outline
 from armwright.problem.over_reach import reach_lines
-from armwright.robot.arm import Arm
+from armwright.robot.arm import Arm, Vector
 from armwright.sheet.record import Drawing, LinkLine
 
 SIDE, TOP = (0, 2), (0, 1)  # axes of the views
@@ -50,9 +50,16 @@ def _drawing(arm: Arm, targets: Array, zeros: Sequence[float]) -> Drawing:
     return Drawing(
         base=arm.base,
         is_at_zero=np.allclose(q, zeros),
-        links=tuple((n, *map(tuple, line.tolist())) for n, line in zip(numbers, link_lines(arm, q), strict=True)),
+        links=tuple(
+            (n, _vector(start), _vector(end)) for n, (start, end) in zip(numbers, link_lines(arm, q), strict=True)
+        ),
         column=None if arm.column is None else arm.column.length,
-        targets=tuple(map(tuple, targets.tolist())),
+        targets=tuple(map(_vector, targets)),
         side=reach_outline(arm, SIDE),
         top=reach_outline(arm, TOP),
     )
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -68,6 +68,7 @@ def sensitivities(problem: Problem, design: Design) -> tuple[Sensitivity, ...]:
         Sensitivity(
             part=variation.part,
             change=variation.change,
+            impossible="",
             **{name: finite_or_none(column[row]) for name, column in changes.items()},
             broken=tuple(c.description for c, one in zip(problem.constraints, broken[row], strict=True) if one),
         )

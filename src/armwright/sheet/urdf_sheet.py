@@ -111,7 +111,8 @@ def urdf_sheet(
         not_modelled="",
         **lines,
         **({} if existing is None else _on_task(existing)),
-        **({} if job is None else {"base_position": job.mounting.position, "base_yaw": job.mounting.yaw}),
+        base_position=None if job is None else job.mounting.position,
+        base_yaw=None if job is None else job.mounting.yaw,
     )
 
 
