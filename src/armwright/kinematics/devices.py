@@ -105,8 +105,7 @@ class Loaded:
         kind = getattr(self.kernels, name)
         made = kind()
         for field, value in values.items():
-            is_array = isinstance(value, np.ndarray)
-            setattr(made, field, self.array(value, kind.vars[field].type.dtype) if is_array else value)
+            setattr(made, field, self._given(value, kind.vars[field].type))
         return made
 
     def launch(self, name: str, dim: tuple[int, ...], *inputs: Any, outputs: Sequence[NDArray[Any]] = ()) -> None:
@@ -119,15 +118,16 @@ class Loaded:
             outputs: Contiguous arrays in the precision of its last arguments, to be filled with them.
         """
         kernel = getattr(self.kernels, name)
-        dtypes = [getattr(argument.type, "dtype", None) for argument in kernel.adj.args]
-        given = [
-            self.array(value, dtype) if isinstance(value, np.ndarray) else value
-            for value, dtype in zip((*inputs, *outputs), dtypes, strict=True)
-        ]
+        arguments = zip((*inputs, *outputs), kernel.adj.args, strict=True)
+        given = [self._given(value, argument.type) for value, argument in arguments]
         self.warp.launch(kernel, dim, inputs=given, device=self.device)
         if self.device == "cuda":
             for values, found in zip(outputs, given[len(inputs) :], strict=True):
                 values[...] = found.numpy()
+
+    def _given(self, value: Any, kind: Any) -> Any:
+        """Return a value as a kernel or a struct takes it."""
+        return self.array(cast("NDArray[Any]", value), kind.dtype) if isinstance(value, np.ndarray) else value
 
 
 def load_kernels(name: str, device: Device, *variant: Hashable) -> Loaded:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import PRISMATIC, ArmArrays, stack_arms
+from armwright.kinematics.arms.arm_arrays import PRISMATIC, ArmArrays, Floats, stack_arms
 from armwright.kinematics.arms.motor_bodies import body_values
 from armwright.robot.arm import Arm
 from armwright.robot.axes import Axis
@@ -23,7 +23,7 @@ class Frames:
     axis: Array  # (N, K, D, 3) that it rotates about or translates along; 0 for a fixed joint
     tip: Array  # (N, K, 3) [m]
 
-    def from_tip(self, local: Array) -> Array:
+    def from_tip(self, local: Floats) -> Array:
         """Return the (N, K, 3) world positions of points (N, 3) from the tip in the last frame [m]."""
         return self.tip + (self.rotation[:, :, -1] @ local.astype(np.float64)[:, None, :, None])[..., 0]
 

@@ -56,8 +56,9 @@ class Postures:
     def nearer(self, other: "Postures", points: Array, metres_per_radian: Array | float) -> "Postures":
         """Return, per arm and target, the posture with the smaller distance, angles included; of equals this one."""
         mine, others = (np.hypot(each.distance(points), metres_per_radian * each.angle) for each in (self, other))
-        better, values = others < mine, zip(vars(self).values(), vars(other).values(), strict=True)
-        return Postures(*(np.where(better.reshape(*better.shape, *(1,) * (a.ndim - 2)), b, a) for a, b in values))
+        better, pairs = others < mine, zip(vars(self).values(), vars(other).values(), strict=True)
+        kept: list[Any] = [np.where(better[..., None] if a.ndim > better.ndim else better, b, a) for a, b in pairs]
+        return Postures(*kept)
 
 
 def solve_postures(
