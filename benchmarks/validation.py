@@ -20,7 +20,8 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.ik.ik import solve_postures
 from armwright.kinematics.reach.compliance import Stiffness, backlash_errors, own_loads, tip_displacements, unit_payload
-from armwright.kinematics.reach.payload_limits import payloads_over_reach
+from armwright.kinematics.reach.payload_limits import held_payloads
+from armwright.kinematics.reach.reach_postures import postures_over_reach
 from armwright.robot.actuators import named_actuator
 from armwright.robot.arm import GRAVITY, Actuator, Arm
 from armwright.robot.robot_descriptions import find_urdf
@@ -122,7 +123,8 @@ def print_payloads(arms: Mapping[str, tuple[Path, UrdfArm]]) -> None:
     for case in CASES:
         if case.arm in arms:
             arm = arms[case.arm][1].arm
-            mass, found = sum(link.mass for link in arm.links), payloads_over_reach(driven(arm, case.torques))
+            mass = sum(link.mass for link in arm.links)
+            found = held_payloads(postures_over_reach(driven(arm, case.torques), (0.5, 1.0)))
             near, far = (f"{payload:.2f} kg" for payload in found.payloads)
             print(f"| {case.arm} | {case.motors} | {mass:.2f} kg | {found.reach:.3f} m | {near} | {far} |")
 

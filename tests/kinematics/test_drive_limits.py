@@ -13,7 +13,6 @@ from armwright.kinematics.arms.actuation import Actuation, actuation_at_joints
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.cycle.drive_limits import (
     MotionLoad,
-    available_torque,
     least_time,
     motion_load,
     torque_speed_utilisation,
@@ -44,9 +43,8 @@ def loads(motors: Actuation, rng: np.random.Generator, samples: int = S) -> Moti
     return motion_load(gravity, inertial, velocity, acceleration, motors)
 
 
-def can_follow(load: MotionLoad, motors: Actuation, time: Array, slack: float = 0.0) -> Array:
-    """Whether torque and speed are within the limits at every sample, by the definition of the issue: (N,)."""
-    torque, speed = load.torque(time), load.velocity / time[:, None, None]
+def are_within(torque: Array, speed: Array, motors: Actuation, slack: float = 0.0) -> Array:
+    """(N, K, D) whether required torques and speeds are within the limits, by the definition of the issue."""
     peak, corner, no_load = (each[:, None] for each in (motors.peak, motors.corner_speed, motors.no_load_speed))
     with np.errstate(divide="ignore", invalid="ignore"):
         line = np.where(
@@ -54,8 +52,12 @@ def can_follow(load: MotionLoad, motors: Actuation, time: Array, slack: float = 
         )
     limit = np.where(torque * speed > 0.0, np.minimum(peak, line), peak)
     required = motors.safety_factor[:, None, None] * np.abs(torque)
-    within = (required <= limit + slack * peak) & (np.abs(speed) <= no_load * (1.0 + slack))
-    return within.all(axis=(1, 2))
+    return (required <= limit + slack * peak) & (np.abs(speed) <= no_load * (1.0 + slack))
+
+
+def can_follow(load: MotionLoad, motors: Actuation, time: Array, slack: float = 0.0) -> Array:
+    """(N,) whether that holds at every sample."""
+    return are_within(load.torque(time), load.velocity / time[:, None, None], motors, slack).all(axis=(1, 2))
 
 
 def random_motions(seed: int, samples: int = S, joints: int = D) -> tuple[MotionLoad, Actuation]:
@@ -99,34 +101,20 @@ def test_unknown_ratings_give_no_number(name: str) -> None:
     assert np.isnan(least_time(loads(unknown, rng), unknown)).all()
     if "speed" in name:
         moving = np.ones((3, S, D))
-        for use in (torque_speed_utilisation, available_torque):
-            assert np.isnan(use(moving, moving, unknown)[..., 1]).all()
+        assert np.isnan(torque_speed_utilisation(moving, moving, unknown)[..., 1]).all()
 
 
-def test_available_torque_of_servos_and_drives() -> None:
-    """A servo of 4 N m and 5 rad/s, a drive with the corner speed 3 rad/s, and one with a constant torque."""
-    ratings = np.array([[[4.0, 1.0, corner, 5.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0] for corner in (0.0, 3.0, 5.0)]])
-    motors = actuation_at_joints(ratings, np.ones((1, 3)), np.zeros(1), np.array([2.0]))
-    speeds = np.array([0.0, 1.0, 3.0, 4.0, 5.0, 6.0])
-    velocity = np.tile(speeds[None, :, None], (1, 1, 3))
-    pushes = available_torque(np.ones_like(velocity), velocity, motors)[0].T
-    assert pushes[0] == pytest.approx([4.0, 3.2, 1.6, 0.8, 0.0, 0.0])
-    assert pushes[1] == pytest.approx([4.0, 4.0, 4.0, 2.0, 0.0, 0.0])
-    assert pushes[2] == pytest.approx([4.0, 4.0, 4.0, 4.0, 4.0, 0.0])
-    assert (available_torque(-np.ones_like(velocity), velocity, motors) == 4.0).all()
-    assert np.array_equal(available_torque(-np.ones_like(velocity), -velocity, motors)[0].T, pushes)
-
-
-def test_utilisation_is_at_most_1_where_the_torque_is_available() -> None:
+def test_utilisation_is_at_most_1_within_the_limits() -> None:
     rng = np.random.default_rng(5)
     motors = drives(N, D, rng)
     torque, velocity = rng.normal(size=(2, N, S, D)) * [[[[2.0]]], [[[4.0]]]]
-    available = available_torque(torque, velocity, motors)
     use = torque_speed_utilisation(torque, velocity, motors)
+    motoring = torque * velocity > 0.0  # the utilisation of a motor that brakes is that of its torque
+    assert np.array_equal((use <= 1.0)[motoring], are_within(torque, velocity, motors)[motoring])
     required = motors.safety_factor[:, None, None] * np.abs(torque)
-    assert np.array_equal(use <= 1.0, required <= available)
-    at_rest = torque_speed_utilisation(torque, np.zeros_like(velocity), motors)
-    assert np.array_equal(at_rest, required / motors.peak[:, None])
+    for still in (torque_speed_utilisation(torque, np.zeros_like(velocity), motors), np.where(motoring, np.nan, use)):
+        known = ~np.isnan(still)
+        assert np.array_equal(still[known], (required / motors.peak[:, None])[known])
 
 
 def quintic(n: int) -> tuple[Array, Array, Array]:

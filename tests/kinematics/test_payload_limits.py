@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.reach.payload_limits import payloads_over_reach
+from armwright.kinematics.reach.payload_limits import held_payloads
+from armwright.kinematics.reach.reach_postures import postures_over_reach
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import payload_capacity
 from armwright.robot.arm import GRAVITY, Actuator, Arm, Joint, uniform_link
@@ -51,7 +52,7 @@ def planar_arm(peak: float) -> Arm:
 
 
 def test_payload_at_full_reach_has_the_closed_form() -> None:
-    found = payloads_over_reach(planar_arm(12.0), (1.0,))
+    found = held_payloads(postures_over_reach(planar_arm(12.0), (1.0,)))
     assert found.reach == pytest.approx(0.5, rel=1e-3)
     own = 0.2 * GRAVITY * (0.15 + 0.4)
     # The tip may be 1 % of the reach off.
@@ -64,6 +65,6 @@ def test_payload_at_full_reach_is_that_of_the_worst_posture() -> None:
     shoulder = tuple(Joint("revolute", axis, -2.4, 2.4, arm.joints[0].actuator) for axis in ("y", "x"))
     universal = replace(arm, joints=(*shoulder, *arm.joints[1:]), links=(arm.links[0], uniform_link((0, 0, 0), 0, 0.01),
                                                                        *arm.links[1:]))  # fmt: skip
-    (found,) = payloads_over_reach(universal, (1.0,)).payloads
+    (found,) = held_payloads(postures_over_reach(universal, (1.0,))).payloads
     own = 0.2 * GRAVITY * (0.05 + 0.25 + 0.5)
     assert found == pytest.approx((12.0 / FACTOR - own) / (0.6 * GRAVITY), rel=5e-2)

@@ -11,7 +11,7 @@ import pytest
 import armwright as aw
 from armwright.exceptions import ArmError, SettingsError
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.kinematics.reach.reachable_poses import PoseSearch, Tolerances, sample_postures
+from armwright.kinematics.reach.reachable_poses import PoseSearch, sample_postures
 from armwright.robot.arm import Actuator, Arm, Joint, MountedTool, uniform_link
 from armwright.rotations import cone_directions
 from armwright.tasks.obstacles import Ground
@@ -95,7 +95,7 @@ def test_poses_of_random_postures_are_found() -> None:
         arrays = stack_arms([arm])
         known = sample_postures(arrays, 2**15 + 100)  # other postures than those that the search starts from
         tips, axes = known.tip[-100:], known.axis[-100:]
-        search = PoseSearch(arrays, sample_postures(arrays), tips, axes, Tolerances(1e-3, 1e-3))
+        search = PoseSearch(arrays, sample_postures(arrays), tips, axes, 1e-3, 1e-3)
         assert np.diag(search.find().reached).mean() >= 0.95
 
 

@@ -1,4 +1,4 @@
-"""URDF files in Pinocchio, MuJoCo, yourdfpy and scikit-robot."""
+"""URDF files in Pinocchio and MuJoCo."""
 
 from collections.abc import Callable
 from xml.etree import ElementTree
@@ -63,24 +63,6 @@ def test_urdf_in_mujoco_matches_the_arm(arm: Arm) -> None:
         assert np.allclose(seen.range, [joint.lower, joint.upper])
         assert np.allclose(seen.axis, np.eye(3)["xyz".index(joint.axis)])
     assert model.body_mass.sum() == pytest.approx(sum(link.mass for link in arm.links))
-
-
-@EVERY_ARM
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_urdf_in_scikit_robot_matches_the_arm(arm: Arm) -> None:
-    """Masses, limits and axes; and the tip stands at the straight arm's."""
-    from skrobot.model import RobotModel
-
-    robot = RobotModel()
-    robot.load_urdf(to_urdf(arm))
-    assert [joint.name for joint in robot.joint_list] == [f"joint_{number}" for number, _ in moving(arm)]
-    for seen, (_, joint) in zip(robot.joint_list, moving(arm), strict=True):
-        assert (seen.min_angle, seen.max_angle) == pytest.approx((joint.lower, joint.upper))
-        assert np.allclose(seen.axis, np.eye(3)["xyz".index(joint.axis)])
-    for number, link in enumerate(arm.links, start=1):
-        assert getattr(robot, f"link_{number}").mass == pytest.approx(link.mass)
-    straight = np.array(arm.base) + np.sum([link.offset for link in arm.links], axis=0)
-    assert np.allclose(robot.tip.worldpos(), straight, atol=1e-6)
 
 
 def test_links_without_length_load_in_mujoco() -> None:

@@ -60,11 +60,13 @@ def update_once(
     # Only the target's position relative to the base matters, so each arm is moved and all share the target 0.
     shifted = replace(arrays, base=np.asarray(arrays.base - targets, dtype=arrays.precision))
     kind = ik._kind_of(target_arrays)
-    wp, kernels = load_kernels("ik.ik_kernels", "cpu", arrays.precision, lanes, arrays.motions, kind)
+    loaded = load_kernels("ik.ik_kernels", "cpu", arrays.precision, lanes, arrays.motions, kind)
     columns = ik._target_columns(np.zeros((1, 3)), np.zeros(1), target_arrays)
     columns_, q_last, h_last = (
-        wp.array(ik._in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
+        loaded.warp.array(ik._in_lanes(values, lanes), dtype=loaded.kernels.Lane, device="cpu")
         for values in (columns[None], of_all(q, arrays)[:, None], of_all(h_before, arrays)[:, None])
     )
-    ik._launch(shifted, columns_[0], 1, q_last, h_last, wp, kernels)
+    results = [loaded.empty((*q_last.shape[:2], n), loaded.kernels.Lane) for n in ik._result_sizes(arrays.dof)]
+    kernel, inputs = ik._steps(shifted, columns_[0], 1, q_last, h_last, results, loaded)[0]
+    loaded.warp.launch(kernel, q_last.shape[:2], inputs=inputs, device="cpu")
     return ik._from_lanes(q_last.numpy())[:, 0, own], ik._from_lanes(h_last.numpy())[:, 0, own]

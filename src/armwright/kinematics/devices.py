@@ -3,11 +3,15 @@
 import os
 import threading
 import time
-from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from typing import Any, Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.kinematics.kernel_cache import init_warp, make_cache_writable, report_cache_errors
@@ -78,8 +82,56 @@ def find_cache() -> None:
         _warp()
 
 
-def load_kernels(name: str, device: Device, *variant: Hashable) -> tuple[Any, Any]:
-    """Return Warp and one variant of kernels, compiled and loaded on a device, so that threads only launch.
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """Warp and one variant of kernels on a device."""
+
+    warp: Any
+    kernels: Any
+    device: Device
+
+    def array(self, values: NDArray[Any], dtype: Any) -> Any:
+        """Return values on the device, which are copied only if they have to be."""
+        values = np.ascontiguousarray(values, dtype=self.warp.dtype_to_numpy(getattr(dtype, "_wp_scalar_type_", dtype)))
+        shape = values.shape[: values.ndim - len(getattr(dtype, "_shape_", ()))]  # of numbers, vectors or matrices
+        return self.warp.array(values, dtype=dtype, shape=shape, device=self.device, copy=False)
+
+    def empty(self, shape: tuple[int, ...], dtype: Any) -> Any:
+        """Return an array on the device."""
+        return self.warp.empty(shape, dtype=dtype, device=self.device)
+
+    def struct(self, name: str, values: Mapping[str, Any]) -> Any:
+        """Return a struct of the kernels on the device; values: by the names of its fields."""
+        kind = getattr(self.kernels, name)
+        made = kind()
+        for field, value in values.items():
+            setattr(made, field, self._given(value, kind.vars[field].type))
+        return made
+
+    def launch(self, name: str, dim: tuple[int, ...], *inputs: Any, outputs: Sequence[NDArray[Any]] = ()) -> None:
+        """Run a kernel.
+
+        Args:
+            name: The name of the kernel.
+            dim: The numbers of its threads.
+            inputs: Its arguments, of which numpy arrays are put on the device.
+            outputs: Contiguous arrays in the precision of its last arguments, to be filled with them.
+        """
+        kernel = getattr(self.kernels, name)
+        arguments = zip((*inputs, *outputs), kernel.adj.args, strict=True)
+        given = [self._given(value, argument.type) for value, argument in arguments]
+        self.warp.launch(kernel, dim, inputs=given, device=self.device)
+        if self.device == "cuda":
+            for values, found in zip(outputs, given[len(inputs) :], strict=True):
+                values[...] = found.numpy()
+
+    def _given(self, value: Any, kind: Any) -> Any:
+        """Return a value as a kernel or a struct takes it."""
+        return self.array(cast("NDArray[Any]", value), kind.dtype) if isinstance(value, np.ndarray) else value
+
+
+def load_kernels(name: str, device: Device, *variant: Hashable) -> Loaded:
+    """Return one variant of kernels, compiled and loaded on a device, so that threads only launch.
 
     Args:
         name: A module of this package, such as `ik.ik_kernels`; its function of the same name makes the variant.
@@ -87,7 +139,7 @@ def load_kernels(name: str, device: Device, *variant: Hashable) -> tuple[Any, An
         variant: The arguments of that function.
     """
     with _loading:
-        return _warp(), _kernels(name, device, *variant)
+        return _loaded(name, device, *variant)
 
 
 def _has_cuda() -> bool:
@@ -106,12 +158,12 @@ def _warp() -> Any:
 
 
 @cache
-def _kernels(name: str, device: Device, *variant: Hashable) -> Any:
+def _loaded(name: str, device: Device, *variant: Hashable) -> Loaded:
     with report_cache_errors():
         made = getattr(import_module(f"{__package__}.{name}"), name.rpartition(".")[2])(*variant)
         parts = cast("Iterable[Any]", vars(made).values())
         _load_modules([part.module for part in parts if hasattr(part, "adj")], device)  # those of kernels
-    return made
+    return Loaded(_warp(), made, device)
 
 
 def _load_modules(modules: Sequence[Any], device: Device) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.reach.reachable_poses import PoseSearch, PostureConditions, Tolerances, sample_postures
+from armwright.kinematics.reach.reachable_poses import PoseSearch, PostureConditions, sample_postures
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.targets import ALIGNED, REACHED
 from armwright.tasks.workspace import Region, sample_regions
@@ -22,7 +22,6 @@ def dexterous_volumes(arms: ArmArrays, workspace: Sequence[Region], obstacles: S
     arm touches itself, either.
     """
     asked = [(region, region.directions) for region in workspace if region.directions is not None]
-    tolerances = Tolerances(REACHED, ALIGNED)
     free = PostureConditions(clearance=0.0, obstacles=tuple(obstacles)) if obstacles else None
     dexterous = np.zeros(len(arms))
     for i in range(len(arms)):
@@ -30,7 +29,7 @@ def dexterous_volumes(arms: ArmArrays, workspace: Sequence[Region], obstacles: S
         samples = sample_postures(arm, N_SAMPLES)
         for region, directions in asked:
             points = sample_regions((region,))
-            search = PoseSearch(arm, samples, points, directions.vectors, tolerances, N_STARTS)
+            search = PoseSearch(arm, samples, points, directions.vectors, REACHED, ALIGNED, N_STARTS)
             found = search.find()
             if free is not None:
                 found = search.find_usable(found, free)

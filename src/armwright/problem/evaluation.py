@@ -12,8 +12,7 @@ from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import ArmArrays, carrying, stack_arms
-from armwright.kinematics.arms.forward import Frames, forward_kinematics
-from armwright.kinematics.arms.jacobian import jacobian_of
+from armwright.kinematics.arms.forward import Frames, forward_kinematics, jacobian_of
 from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_loads, holding_torques
 from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths, rough_paths
@@ -21,7 +20,6 @@ from armwright.kinematics.cycle.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik.ik import UPDATES, Postures, solve_postures
-from armwright.kinematics.ik.restarts import nearer_postures, random_starts
 from armwright.problem.dexterous_volume import dexterous_volumes
 from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
@@ -297,7 +295,7 @@ def evaluate_arrays(
     """
     targets, arrays = scene.targets, carrying(arrays, scene.load_shape)
 
-    def solve(initial: ArrayLike | None, updates: int = UPDATES) -> Postures:
+    def solve(initial: ArrayLike | None, updates: int = UPDATES, restarts: int = 0) -> Postures:
         return solve_postures(
             arrays,
             targets,
@@ -305,18 +303,15 @@ def evaluate_arrays(
             initial_q=initial,
             payload=scene.payload,
             target_arrays=scene.target_arrays,
+            restarts=restarts,
             precision=arrays.precision,
             device=device,
         )
 
-    def nearest() -> Postures:
-        postures = solve(initial_q)
-        for other in random_starts(arrays, scene.target_arrays.restarts):
-            postures = nearer_postures(postures, solve(other), targets, scene.target_arrays)
-        return postures
+    restarts = scene.target_arrays.restarts
 
     if scene.plan is None:
-        paths, postures = None, nearest()
+        paths, postures = None, solve(initial_q, restarts=restarts)
     else:
         if roughly_near is None:
             paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=near)
@@ -324,7 +319,7 @@ def evaluate_arrays(
             paths = rough_paths(arrays, scene.plan, roughly_near, scene.obstacles, device)
         q = paths.postures(len(targets))
         if np.isnan(q).any():
-            q = np.where(np.isnan(q), nearest().q, q)
+            q = np.where(np.isnan(q), solve(initial_q, restarts=restarts).q, q)
         postures = solve(q, updates=0)
     reached = postures.reached.astype(np.float64)
     return Evaluation(

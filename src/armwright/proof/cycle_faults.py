@@ -9,9 +9,8 @@ import numpy as np
 from pydantic import ConfigDict
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
-from armwright.kinematics.arms.forward import forward_kinematics
-from armwright.kinematics.arms.jacobian import jacobians
+from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.arms.forward import forward_kinematics, jacobian_of
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_path import CyclePaths
 from armwright.kinematics.cycle.motion_path import MotionPath
@@ -138,7 +137,7 @@ def via_point(arm: ArmArrays, path: MotionPath, share: float, obstacles: Sequenc
     start, end, along = q[0, 0], q[0, 2], VIA_SHARES[:, None]
     ways = np.concatenate([start + along * (via - start), via + along * (end - via)], axis=1)  # (P, 34, D)
     clearance = np.minimum(*clearances(arm, ways.reshape(1, -1, arm.dof), obstacles)).reshape(len(points), -1)
-    reached = np.linalg.norm(found.reached[0] - points, axis=1) < REACHED
+    reached = found.distance(points)[0] < REACHED
     least = np.where(reached, clearance.min(axis=1), -np.inf)
     return points[least.argmax()] if least.max() > 0.0 else None
 
@@ -172,13 +171,12 @@ def _part(plan: CyclePlan, index: int) -> str:
 
 def _limit_distances(arm: ArmArrays, q: Array) -> Array:
     """Return the (R,) smallest distance of a joint from its limits [rad] or [m]; q: (1, R, D)."""
-    margin = np.minimum(q - arm.lower[:, None], arm.upper[:, None] - q)
-    return np.where(arm.motion[:, None] == FIXED, np.inf, margin).min(axis=2)[0]
+    return arm.limit_distance(q)[0]
 
 
 def _manipulabilities(arm: ArmArrays, q: Array) -> Array:
     """Return the (R,) manipulability sqrt(det J Jᵀ) of the position Jacobian [m³]; q: (1, R, D)."""
-    jacobian = jacobians(arm, q)[0]
+    jacobian = jacobian_of(arm, forward_kinematics(arm, q))[0]
     return np.sqrt(np.maximum(np.linalg.det(jacobian @ jacobian.swapaxes(-1, -2)), 0.0))
 
 

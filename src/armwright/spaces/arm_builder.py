@@ -15,8 +15,15 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints, ratings_of
-from armwright.kinematics.arms.arm_arrays import FIXED, PRISMATIC, ArmArrays, Precision, exact_arms, stack_tools
-from armwright.kinematics.arms.columns import columns_of
+from armwright.kinematics.arms.arm_arrays import (
+    FIXED,
+    PRISMATIC,
+    ArmArrays,
+    Precision,
+    exact_arms,
+    stack_columns,
+    stack_tools,
+)
 from armwright.kinematics.arms.motor_bodies import MotorBodies, bodies_in, body_values, without_bodies
 from armwright.kinematics.arms.rigid_bodies import Bodies, Tools
 from armwright.robot.arm import AXES, Arm, Joint, Link, Vector
@@ -186,7 +193,7 @@ class _Parts:
             motor_bodies=bodies_in({f.name: flat[f"motor_{f.name}"] for f in fields(MotorBodies)}, precision)
             if space.has_motor_bodies
             else None,
-            columns=None if column is None else columns_of(column.outer_diameter, below, precision),
+            columns=None if column is None else stack_columns(column.outer_diameter, below, precision),
         )
 
     def _of_links(self, name: str, without: float) -> Array:

@@ -1,6 +1,6 @@
 """Ratings of the actuators of stacked arms."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,22 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.rigid_bodies import PerArm
 from armwright.robot.arm import Actuator, Arm
 
-FIXED_RATINGS = (np.inf, np.inf, np.inf, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.inf)
+# Of each field of `Actuation` by joint: the field of `Actuator`, the power of the joint's travel that its value is
+# multiplied by, and the value of a fixed joint.
+RATINGS: Mapping[str, tuple[str, int, float]] = {
+    "peak": ("peak_torque", -1, np.inf),
+    "continuous": ("continuous_torque", -1, np.inf),
+    "corner_speed": ("corner_speed", 1, np.inf),
+    "no_load_speed": ("speed", 1, np.inf),
+    "rotor_inertia": ("rotor_inertia", -2, 0.0),
+    "coulomb": ("coulomb_friction", -1, 0.0),
+    "viscous": ("viscous_friction", -2, 0.0),
+    "voltage": ("voltage", 0, 0.0),
+    "current": ("current", 0, 0.0),
+    "backlash": ("backlash", 1, 0.0),
+    "joint_stiffness": ("joint_stiffness", -2, np.inf),
+}
+FIXED_RATINGS = tuple(value for _, _, value in RATINGS.values())
 
 
 @dataclass(frozen=True)
@@ -43,41 +58,17 @@ def actuation_at_joints(ratings: Array, travel: Array, price: Array, safety_fact
         price: (N,) of all actuators of an arm [USD].
         safety_factor: (N,) by which required torques are multiplied.
     """
-    peak, continuous, corner, no_load, inertia, coulomb, viscous, *others = np.moveaxis(ratings, -1, 0)
-    voltage, current, backlash, stiffness = others
-    return Actuation(
-        peak=peak / travel,
-        continuous=continuous / travel,
-        corner_speed=corner * travel,
-        no_load_speed=no_load * travel,
-        rotor_inertia=inertia / travel**2,
-        coulomb=coulomb / travel,
-        viscous=viscous / travel**2,
-        voltage=voltage.copy(),
-        current=current.copy(),
-        backlash=backlash * travel,
-        joint_stiffness=stiffness / travel**2,
-        price=price,
-        safety_factor=safety_factor,
-    )
+    at_joints = {
+        name: ratings[..., i] * travel**power if power >= 0 else ratings[..., i] / travel**-power
+        for i, (name, (_, power, _)) in enumerate(RATINGS.items())
+    }
+    return Actuation(**at_joints, price=price, safety_factor=safety_factor)
 
 
 def ratings_of(actuator: Actuator) -> tuple[float, ...]:
     """Return what `actuation_at_joints` needs of an actuator; NaN for unknown values."""
-    stated = (
-        actuator.peak_torque,
-        actuator.continuous_torque,
-        actuator.corner_speed,
-        actuator.speed,
-        actuator.rotor_inertia,
-        actuator.coulomb_friction,
-        actuator.viscous_friction,
-        actuator.voltage,
-        actuator.current,
-        actuator.backlash,
-        actuator.joint_stiffness,
-    )
-    return tuple(np.nan if value is None else value for value in stated)
+    values = (getattr(actuator, name) for name, _, _ in RATINGS.values())
+    return tuple(np.nan if value is None else value for value in values)
 
 
 def actuation_of(arms: Sequence[Arm], travel: Array) -> Actuation | None:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.kinematics.arms.actuation import Actuation, actuation_of
-from armwright.kinematics.arms.columns import Columns, stack_columns
 from armwright.kinematics.arms.motor_bodies import MotorBodies, stack_bodies
 from armwright.kinematics.arms.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
 from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
@@ -61,7 +60,9 @@ class ArmArrays(PerArm):
     bodies: Bodies  # without tools; for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
     motor_bodies: MotorBodies | None = None  # None if the bodies of actuators do not count
-    columns: Columns | None = None  # None if no base stands on a column
+    columns: Floats | None = None
+    """(N, 3) radius, radius, half the length of the upright cylinder below each base [m], length 0 without one; None
+    if no base stands on a column."""
 
     def __len__(self) -> int:
         return len(self.base)
@@ -95,6 +96,25 @@ class ArmArrays(PerArm):
     def ranges_include_zero(self) -> bool:
         """True if every joint can be at 0."""
         return bool(np.all(self.lower <= 0.0) and np.all(self.upper >= 0.0))
+
+    def limit_distance(self, q: Array) -> Array:
+        """Return the (N, ...) smallest distance of a joint from its limits [rad] or [m]; q: (N, ..., D)."""
+        lower, upper, motion = (
+            values.reshape(len(self), *(1,) * (q.ndim - 2), self.dof)
+            for values in (self.lower, self.upper, self.motion)
+        )
+        return np.where(motion == FIXED, np.inf, np.minimum(q - lower, upper - q)).min(axis=-1)
+
+    def random_postures(self, n: int) -> Array:
+        """Return (n, N, D) postures within the limits, the same in every call [rad] or [m].
+
+        Each has the same share of every joint's range for all arms, whatever their number of joints.
+        """
+        if n == 0:  # a generator takes as long as solving an arm
+            return np.empty((0, *self.motion.shape))
+        shares = np.random.default_rng(0).uniform(size=(n, MAX_JOINTS))[:, None, : self.dof]
+        lower, upper = self.lower.astype(np.float64), self.upper.astype(np.float64)
+        return np.where(self.motion == FIXED, 0.0, lower + shares * (upper - lower))
 
 
 def check_precision(name: str) -> Precision:
@@ -161,7 +181,11 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         bodies=bodies,
         actuation=actuation_of(arms, travel),
         motor_bodies=stack_bodies(arms, dof, precision),
-        columns=stack_columns(arms, precision),
+        columns=stack_columns(
+            np.array([0.0 if arm.column is None else arm.column.outer_diameter for arm in arms]),
+            np.array([0.0 if arm.column is None else arm.column.length for arm in arms]),
+            precision,
+        ),
     )
 
 
@@ -194,6 +218,14 @@ def exact_arms(
 def stack_tools(tools: Sequence[MountedTool]) -> Tools:
     """Stack tools into arrays."""
     return Tools(*(np.array([getattr(tool, part.name) for tool in tools]) for part in fields(Tools)))
+
+
+def stack_columns(diameter: Array | float, length: Array, precision: Precision) -> Floats | None:
+    """Return `ArmArrays.columns` of these diameters and lengths (N,) [m]."""
+    if not length.any():
+        return None
+    radius = np.where(length > 0.0, np.asarray(diameter) / 2, 0.0)
+    return np.stack([radius, radius, length / 2], axis=-1).astype(precision)
 
 
 def carrying(arms: ArmArrays, shape: LoadShape) -> ArmArrays:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import PRISMATIC, ArmArrays, stack_arms
+from armwright.kinematics.arms.arm_arrays import PRISMATIC, ArmArrays, Floats, stack_arms
 from armwright.kinematics.arms.motor_bodies import body_values
 from armwright.robot.arm import Arm
 from armwright.robot.axes import Axis
@@ -22,6 +22,10 @@ class Frames:
     position: Array  # (N, K, D, 3) position of the joint, after its translation [m]
     axis: Array  # (N, K, D, 3) that it rotates about or translates along; 0 for a fixed joint
     tip: Array  # (N, K, 3) [m]
+
+    def from_tip(self, local: Floats) -> Array:
+        """Return the (N, K, 3) world positions of points (N, 3) from the tip in the last frame [m]."""
+        return self.tip + (self.rotation[:, :, -1] @ local.astype(np.float64)[:, None, :, None])[..., 0]
 
 
 def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
@@ -48,6 +52,13 @@ def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
     return Frames(rotation, position, axis, at)
 
 
+def jacobian_of(arms: ArmArrays, frames: Frames) -> Array:
+    """Return the (N, K, 3, D) derivative of the tip position by the joints [m/rad] or [m/m]."""
+    rotational = np.cross(frames.axis, frames.tip[:, :, None] - frames.position)
+    translates = (arms.motion >= PRISMATIC)[:, None, :, None]  # or is fixed, whose axis is 0
+    return np.where(translates, frames.axis, rotational).swapaxes(-1, -2)
+
+
 def joint_positions(arm: Arm, q: Sequence[float] | Array) -> Array:
     """Return the (J + 1, 3) positions of the joints and, last, of the tip [m]; q: (J,) [rad] or [m]."""
     frames = _frames(arm, q)
@@ -57,10 +68,8 @@ def joint_positions(arm: Arm, q: Sequence[float] | Array) -> Array:
 def link_lines(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
     """Return start and end (2, 3) of each link and, last, of the tool [m]; q: (J,) [rad] or [m]."""
     frames = _frames(arm, q)
-    starts = frames.position[0, 0]  # (J, 3)
-    offsets = np.array([link.offset for link in arm.links])
-    ends = starts + (frames.rotation[0, 0] @ offsets[..., None])[..., 0]
-    return [*np.stack([starts, ends], axis=1), np.vstack([ends[-1:], frames.tip[0]])]
+    ends = _link_ends(arm, frames)
+    return [*np.stack([frames.position[0, 0], ends], axis=1), np.vstack([ends[-1:], frames.tip[0]])]
 
 
 def rails(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
@@ -79,7 +88,8 @@ def motor_solids(arm: Arm, q: Sequence[float] | Array) -> list[tuple[Axis, Solid
     frames = _frames(arm, q)
     rotations = [np.eye(3), *frames.rotation[0, 0]]  # of the base and the links
     found: list[tuple[Axis, Solid]] = []
-    for joint, start, rotation in zip(arm.joints, _link_ends(arm, frames), rotations[:-1], strict=True):
+    starts = [np.array(arm.base), *_link_ends(arm, frames)]
+    for joint, start, rotation in zip(arm.joints, starts[:-1], rotations[:-1], strict=True):
         if joint.body is not None:
             _, axis, half, centre = body_values(joint.body)
             x, y, z = (start + rotation @ np.array(centre)).tolist()
@@ -98,10 +108,9 @@ def column_solid(arm: Arm) -> Solid | None:
 
 
 def _link_ends(arm: Arm, frames: Frames) -> Array:
-    """Return the (J, 3) positions of the base and of the ends of all links but the last [m]."""
+    """Return the (J, 3) positions of the ends of all links [m]."""
     offsets = np.array([link.offset for link in arm.links])
-    ends = frames.position[0, 0] + (frames.rotation[0, 0] @ offsets[..., None])[..., 0]
-    return np.vstack([arm.base, ends[:-1]])
+    return frames.position[0, 0] + (frames.rotation[0, 0] @ offsets[..., None])[..., 0]
 
 
 def _frames(arm: Arm, q: Sequence[float] | Array) -> Frames:

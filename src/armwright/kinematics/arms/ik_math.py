@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from armwright.kinematics.arms.arm_arrays import FIXED, MAX_JOINTS, PRISMATIC, Motions, Precision
+from armwright.kinematics.arms.arm_arrays import FIXED, PRISMATIC, Motions, Precision
 from armwright.kinematics.arms.lane_math import lane_math
 
 # At -O2, Warp's default, LLVM leaves more of the lanes scalar: 43,000 designs/s on a core rather than 58,000.
@@ -26,9 +26,10 @@ kernel = partial(wp.kernel, enable_backward=False, module="unique", module_optio
 def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespace:
     """Return the variant for a precision, a number of lanes and what the joints of the arms do."""
     base = lane_math(precision, lanes)
-    real, Vector3, Lane = base.real, base.Vector3, base.Lane
-    at_least, sine_cosine = base.at_least, base.sine_cosine
-    Joints = wp.types.matrix(shape=(MAX_JOINTS, lanes), dtype=real)  # row j is joint j in all lanes
+    real, Vector3, Lane, Vector = base.real, base.Vector3, base.Lane, base.Vector
+    at_least, sine_cosine, scaled = base.at_least, base.sine_cosine, base.scaled
+    dot, cross, in_frame = base.dot, base.cross, base.in_frame
+    any_motion = motions == "any"
 
     zero, one, two = real(0.0), real(1.0), real(2.0)
     angle_margin = real(math.radians(1.0))  # from the limits, keeps the limit gradient finite
@@ -50,103 +51,73 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
         payload_center: wp.array(dtype=Vector3)  # (N,)
 
     @wp.func
-    def rotate_revolute(motion: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
-        """Return one world component of the frame's axes x, y, z after a joint; last, of the axis of that joint."""
+    def rotate(motion: int, x: Vector, y: Vector, z: Vector, s: Lane, c: Lane):
+        """Return the frame's axes after a joint; last, the axis of that joint, which is arbitrary if it is fixed."""
+        if wp.static(any_motion):
+            if motion == PRISMATIC:
+                return x, y, z, x
+            if motion == PRISMATIC + 1:
+                return x, y, z, y
+            if motion > PRISMATIC + 1:
+                return x, y, z, z
         if motion == 0:
-            return x, wp.cw_mul(c, y) + wp.cw_mul(s, z), wp.cw_mul(c, z) - wp.cw_mul(s, y), x
+            return x, scaled(c, y) + scaled(s, z), scaled(c, z) - scaled(s, y), x
         if motion == 1:
-            return wp.cw_mul(c, x) - wp.cw_mul(s, z), y, wp.cw_mul(c, z) + wp.cw_mul(s, x), y
-        return wp.cw_mul(c, x) + wp.cw_mul(s, y), wp.cw_mul(c, y) - wp.cw_mul(s, x), z, z
+            return scaled(c, x) - scaled(s, z), y, scaled(c, z) + scaled(s, x), y
+        return scaled(c, x) + scaled(s, y), scaled(c, y) - scaled(s, x), z, z
 
     @wp.func
-    def rotate_any(motion: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
-        """Return the same for all joints; the axis of a fixed joint is arbitrary."""
-        if motion < PRISMATIC:
-            return rotate_revolute(motion, x, y, z, s, c)
-        if motion == PRISMATIC:
-            return x, y, z, x
-        if motion == PRISMATIC + 1:
-            return x, y, z, y
-        return x, y, z, z
-
-    @wp.func
-    def translate_revolute(motion: int, place: Lane, displacement: Lane, axis: Lane):
-        """Return one component of a joint's place: a prismatic joint is displaced along its axis."""
+    def translate(motion: int, place: Vector, displacement: Lane, axis: Vector):
+        """Return the place of a joint: a prismatic joint is displaced along its axis."""
+        if wp.static(any_motion) and motion >= PRISMATIC and motion < FIXED:
+            return place + scaled(displacement, axis)
         return place
 
     @wp.func
-    def translate_any(motion: int, place: Lane, displacement: Lane, axis: Lane):
-        if motion < PRISMATIC or motion == FIXED:
-            return place
-        return place + wp.cw_mul(displacement, axis)
+    def linear_column(motion: int, axis: Vector, r: Vector):
+        """Return how a joint moves the tip, which is at r from it."""
+        if wp.static(any_motion):
+            if motion == FIXED:
+                return Vector()
+            if motion >= PRISMATIC:
+                return axis
+        return cross(axis, r)
 
     @wp.func
-    def column_revolute(motion: int, ax: Lane, ay: Lane, az: Lane, ry: Lane, rz: Lane):
-        """Return the first component of a column of J."""
-        return wp.cw_mul(ay, rz) - wp.cw_mul(az, ry)
+    def angular_column(motion: int, axis: Vector, s: Vector, t: Vector, f: Vector):
+        """Return how much a joint rotates the tool about its own x, y and z, which are s, t and f in the world."""
+        if wp.static(any_motion) and motion >= PRISMATIC:
+            return Vector()
+        return wp.matrix_from_rows(dot(s, axis), dot(t, axis), dot(f, axis))
 
     @wp.func
-    def column_any(motion: int, ax: Lane, ay: Lane, az: Lane, ry: Lane, rz: Lane):
-        if motion < PRISMATIC:
-            return wp.cw_mul(ay, rz) - wp.cw_mul(az, ry)
-        if motion < FIXED:
-            return ax
-        return Lane(zero)
-
-    @wp.func
-    def margin_revolute(motion: int):
+    def margin(motion: int):
         """Return the distance from a limit within which the limit gradient H is constant."""
+        if wp.static(any_motion) and motion >= PRISMATIC:
+            return travel_margin
         return angle_margin
 
     @wp.func
-    def margin_any(motion: int):
-        if motion < PRISMATIC:
-            return angle_margin
-        return travel_margin
-
-    rotate, translate, column, margin = {
-        "revolute": (rotate_revolute, translate_revolute, column_revolute, margin_revolute),
-        "any": (rotate_any, translate_any, column_any, margin_any),
-    }[motions]
-
-    @wp.func
     def at_base(base: Vector3):
-        """Return frame and place of the base, as `advance` takes them."""
+        """Return place and frame of the base, as `advance` takes them."""
+        none, unit = Lane(zero), Lane(one)
         return (
-            Lane(one), Lane(zero), Lane(zero), Lane(zero), Lane(one), Lane(zero), Lane(zero), Lane(zero), Lane(one),
-            Lane(base[0]), Lane(base[1]), Lane(base[2]),
-        )  # fmt: skip
+            wp.matrix_from_rows(Lane(base[0]), Lane(base[1]), Lane(base[2])),
+            wp.matrix_from_rows(unit, none, none),
+            wp.matrix_from_rows(none, unit, none),
+            wp.matrix_from_rows(none, none, unit),
+        )
 
     @wp.func
-    def advance(
-        motion: int, offset: Vector3, q: Lane,
-        xx: Lane, xy: Lane, xz: Lane, yx: Lane, yy: Lane, yz: Lane, zx: Lane, zy: Lane, zz: Lane,
-        px: Lane, py: Lane, pz: Lane,
-    ):  # fmt: skip
-        """Forward kinematics of a joint: return the frame after it, its axis, its place, and the next joint's place.
+    def advance(motion: int, offset: Vector3, q: Lane, p: Vector, x: Vector, y: Vector, z: Vector):
+        """Return the axis of a joint at a value [rad] or [m], its place, that of the next joint, and the frame between.
 
-        xx, xy, xz: the local x axis in the world, and so on. px, py, pz: the place before the joint moves.
+        p: where the joint is at 0.  x, y, z: the frame before it.
         """
         s, c = sine_cosine(q)
-        xx, yx, zx, ax = rotate(motion, xx, yx, zx, s, c)
-        xy, yy, zy, ay = rotate(motion, xy, yy, zy, s, c)
-        xz, yz, zz, az = rotate(motion, xz, yz, zz, s, c)
-        ox = translate(motion, px, q, ax)
-        oy = translate(motion, py, q, ay)
-        oz = translate(motion, pz, q, az)
-        px = ox + (offset[0] * xx + offset[1] * yx + offset[2] * zx)
-        py = oy + (offset[0] * xy + offset[1] * yy + offset[2] * zy)
-        pz = oz + (offset[0] * xz + offset[1] * yz + offset[2] * zz)
-        return xx, xy, xz, yx, yy, yz, zx, zy, zz, ax, ay, az, ox, oy, oz, px, py, pz
-
-    @wp.func
-    def columns(motion: int, ax: Lane, ay: Lane, az: Lane, rx: Lane, ry: Lane, rz: Lane):
-        """Return a column of J, of a joint with this axis and the tip at r."""
-        return (
-            column(motion, ax, ay, az, ry, rz),
-            column(motion, ay, az, ax, rz, rx),
-            column(motion, az, ax, ay, rx, ry),
-        )
+        x, y, z, axis = rotate(motion, x, y, z, s, c)
+        place = translate(motion, p, q, axis)
+        return axis, place, place + in_frame(offset, x, y, z), x, y, z
 
     @wp.func
     def limit(motion: int, lower: real, upper: real, q: Lane, n_before: Lane, d_before: Lane):
@@ -166,4 +137,7 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
         y = -centring_gain * wp.cw_mul(w, wp.cw_mul(share, wp.abs(share)))
         return n, d, w, y
 
-    return SimpleNamespace(Joints=Joints, Arms=Arms, at_base=at_base, advance=advance, columns=columns, limit=limit)
+    return SimpleNamespace(
+        Arms=Arms, at_base=at_base, advance=advance, linear_column=linear_column, angular_column=angular_column,
+        limit=limit,
+    )  # fmt: skip

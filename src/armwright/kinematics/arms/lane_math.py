@@ -1,4 +1,4 @@
-"""Types and Warp functions of numbers in lanes.
+"""Types and Warp functions of numbers and vectors in lanes.
 
 A lane is one target of an arm. What differs between lanes is arithmetic, never a branch: a condition is a mask of zeros
 and ones.
@@ -20,6 +20,7 @@ def lane_math(precision: Precision, lanes: int) -> SimpleNamespace:
     real, Vector3 = {"float32": (wp.float32, wp.vec3f), "float64": (wp.float64, wp.vec3d)}[precision]
     Lane = wp.types.vector(length=lanes, dtype=real)  # one number for each lane
     Wide = wp.types.vector(length=lanes, dtype=wp.float64)
+    Vector = wp.types.matrix(shape=(3, lanes), dtype=real)  # one vector for each lane, in the world
     one = real(1.0)
 
     @wp.func
@@ -75,11 +76,35 @@ def lane_math(precision: Precision, lanes: int) -> SimpleNamespace:
     sine_cosine = polynomial_sine_cosine if precision == "float32" else library_sine_cosine
 
     @wp.func
-    def norm_squared(x: Lane, y: Lane, z: Lane):
-        """Return the square of a vector's length."""
-        return wp.cw_mul(x, x) + wp.cw_mul(y, y) + wp.cw_mul(z, z)
+    def scaled(factor: Lane, v: Vector):
+        """Return a vector times a number."""
+        return wp.matrix_from_rows(wp.cw_mul(factor, v[0]), wp.cw_mul(factor, v[1]), wp.cw_mul(factor, v[2]))
+
+    @wp.func
+    def dot(a: Vector, b: Vector):
+        """Return the scalar product."""
+        return wp.cw_mul(a[0], b[0]) + wp.cw_mul(a[1], b[1]) + wp.cw_mul(a[2], b[2])
+
+    @wp.func
+    def cross(a: Vector, b: Vector):
+        """Return the vector product."""
+        return wp.matrix_from_rows(
+            wp.cw_mul(a[1], b[2]) - wp.cw_mul(a[2], b[1]),
+            wp.cw_mul(a[2], b[0]) - wp.cw_mul(a[0], b[2]),
+            wp.cw_mul(a[0], b[1]) - wp.cw_mul(a[1], b[0]),
+        )
+
+    @wp.func
+    def in_frame(v: Vector3, x: Vector, y: Vector, z: Vector):
+        """Return the world components of a vector that is fixed in a frame with these axes."""
+        return v[0] * x + v[1] * y + v[2] * z
+
+    @wp.func
+    def vector_of(values: wp.array2d(dtype=Lane), group: int, first: int):
+        """Return a vector from three columns of a group of targets."""
+        return wp.matrix_from_rows(values[group, first], values[group, first + 1], values[group, first + 2])
 
     return SimpleNamespace(
-        real=real, Vector3=Vector3, Lane=Lane, Wide=Wide,
-        roots=roots, at_least=at_least, select=select, sine_cosine=sine_cosine, norm_squared=norm_squared,
+        real=real, Vector3=Vector3, Lane=Lane, Wide=Wide, Vector=Vector, roots=roots, at_least=at_least, select=select,
+        sine_cosine=sine_cosine, scaled=scaled, dot=dot, cross=cross, in_frame=in_frame, vector_of=vector_of,
     )  # fmt: skip

@@ -8,16 +8,18 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from armwright.kinematics.arms.arm_arrays import PRISMATIC, Motions, Precision
+from armwright.kinematics.arms.arm_arrays import Precision
 from armwright.kinematics.arms.lane_math import lane_math
 
 
 @cache
-def pose_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespace:
-    """Return the functions for a precision, a number of lanes and joint motions, as in `ik_math`."""
+def pose_math(precision: Precision, lanes: int) -> SimpleNamespace:
+    """Return the variant for a precision and a number of lanes."""
     base = lane_math(precision, lanes)
-    real, Vector3, Lane = base.real, base.Vector3, base.Lane
-    roots, at_least, select, norm_squared = base.roots, base.at_least, base.select, base.norm_squared
+    real, Vector3, Lane, Vector = base.real, base.Vector3, base.Lane, base.Vector
+    roots, at_least, select = base.roots, base.at_least, base.select
+    scaled, dot, in_frame, vector_of = base.scaled, base.dot, base.in_frame, base.vector_of
+    Quaternion = wp.types.matrix(shape=(4, lanes), dtype=real)
 
     zero, one, two = real(0.0), real(1.0), real(2.0)
     max_rotation = real(0.5)  # [rad] of the error that one update tries to close
@@ -51,114 +53,52 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNames
     arctangent = polynomial_arctangent if precision == "float32" else library_arctangent
 
     @wp.func
-    def angular_revolute(motion: int, component: Lane):
-        """Return how much a joint rotates about a direction, its axis having this component along it."""
-        return component
-
-    @wp.func
-    def angular_any(motion: int, component: Lane):
-        if motion < PRISMATIC:
-            return component
-        return Lane(zero)
-
-    angular = {"revolute": angular_revolute, "any": angular_any}[motions]
-
-    @wp.func
-    def along(a: Vector3, x: Lane, y: Lane, z: Lane):
-        """Return a world component of a vector that is fixed in a frame with these components of its axes."""
-        return a[0] * x + a[1] * y + a[2] * z
-
-    @wp.func
-    def dot(ax: Lane, ay: Lane, az: Lane, bx: Lane, by: Lane, bz: Lane):
-        return wp.cw_mul(ax, bx) + wp.cw_mul(ay, by) + wp.cw_mul(az, bz)
-
-    @wp.func
-    def angular_columns(
-        motion: int, has_axis: Lane, has_frame: Lane, sx: Lane, sy: Lane, sz: Lane, tx: Lane, ty: Lane, tz: Lane,
-        fx: Lane, fy: Lane, fz: Lane, ax: Lane, ay: Lane, az: Lane,
-    ):  # fmt: skip
-        """Return how much a joint rotates about the tool's own x, y and z, which are s, t and f in the world."""
-        return (
-            wp.cw_mul(has_axis, angular(motion, dot(sx, sy, sz, ax, ay, az))),
-            wp.cw_mul(has_axis, angular(motion, dot(tx, ty, tz, ax, ay, az))),
-            wp.cw_mul(has_frame, angular(motion, dot(fx, fy, fz, ax, ay, az))),
-        )
-
-    @wp.func
-    def larger_row(
-        most: Lane, diagonal: Lane, w: Lane, x: Lane, y: Lane, z: Lane, a: Lane, b: Lane, c: Lane, d: Lane
-    ):  # fmt: skip
-        """Return the larger diagonal, and its row: w, x, y, z of the diagonal `most`, or a, b, c, d."""
+    def larger_row(most: Lane, q: Quaternion, diagonal: Lane, w: Lane, x: Lane, y: Lane, z: Lane):
+        """Return the larger diagonal, and its row: q of the diagonal `most`, or w, x, y, z."""
         larger = Lane(one) - at_least(most, diagonal)
-        return (
-            wp.max(most, diagonal),
-            select(larger, a, w),
-            select(larger, b, x),
-            select(larger, c, y),
-            select(larger, d, z),
+        return wp.max(most, diagonal), wp.matrix_from_rows(
+            select(larger, w, q[0]), select(larger, x, q[1]), select(larger, y, q[2]), select(larger, z, q[3])
         )
 
     @wp.func
-    def rotation_between(
-        xx: Lane, xy: Lane, xz: Lane, yx: Lane, yy: Lane, yz: Lane, zx: Lane, zy: Lane, zz: Lane,
-        has_axis: Lane, has_frame: Lane,
-    ):  # fmt: skip
-        """Return the angle between tool and target [rad], and the shortened rotation vector about the tool's x, y, z.
+    def tool_frame(axis: Vector3, side: Vector3, x: Vector, y: Vector, z: Vector):
+        """Return the axes of the tool in the world; x, y, z: the last local frame."""
+        return in_frame(side, x, y, z), in_frame(wp.cross(axis, side), x, y, z), in_frame(axis, x, y, z)
 
-        xx to zz: the target's axes x, y, z in the frame of the tool, by component (xy: of the target's y along the
-        tool's x). has_axis: 1 for targets with an axis or orientation, has_frame: 1 for those with an orientation.
+    @wp.func
+    def error_rotation(s: Vector, t: Vector, f: Vector, targets: wp.array2d(dtype=Lane), group: int):
+        """Return the angle between the tool s, t, f and its target [rad], and the shortened rotation vector to it.
 
-        A quaternion needs no division at half a turn. The axis of half a turn is arbitrary: to reach an axis, the
-        rotation is about the tool's own y.
+        The rotation vector is about the tool's own x, y and z. A quaternion needs no division at half a turn. The axis
+        of half a turn is arbitrary: to reach an axis, the rotation is about the tool's own y.
         """
+        u, v, n = vector_of(targets, group, 4), vector_of(targets, group, 7), vector_of(targets, group, 10)
+        has_axis, has_frame = targets[group, 13], targets[group, 14]
+        # xy: of the target's y along the tool's x, and so on
+        xx, xy, xz = dot(s, u), dot(s, v), dot(s, n)
+        yx, yy, yz = dot(t, u), dot(t, v), dot(t, n)
+        zx, zy, zz = dot(f, u), dot(f, v), dot(f, n)
+
         # 4 q qᵀ of the rotation with these entries: the row with the largest diagonal is q, times a number above 0.
-        w, x, y, z = Lane(one) + xx + yy + zz, zy - yz, xz - zx, yx - xy
-        wx, wy, wz, xy2, xz2, yz2 = x, y, z, xy + yx, xz + zx, yz + zy
+        w2, wx, wy, wz = Lane(one) + xx + yy + zz, zy - yz, xz - zx, yx - xy
         x2, y2, z2 = Lane(one) + xx - yy - zz, Lane(one) - xx + yy - zz, Lane(one) - xx - yy + zz
-        most, w, x, y, z = larger_row(w, x2, w, x, y, z, wx, x2, xy2, xz2)
-        most, w, x, y, z = larger_row(most, y2, w, x, y, z, wy, xy2, y2, yz2)
-        _most, w, x, y, z = larger_row(most, z2, w, x, y, z, wz, xz2, yz2, z2)
-        side = two * at_least(w, Lane(zero)) - Lane(one)  # q and -q are one rotation: the one by half a turn at most
+        xy2, xz2, yz2 = xy + yx, xz + zx, yz + zy
+        most, q = larger_row(w2, wp.matrix_from_rows(w2, wx, wy, wz), x2, wx, x2, xy2, xz2)
+        most, q = larger_row(most, q, y2, wy, xy2, y2, yz2)
+        _most, q = larger_row(most, q, z2, wz, xz2, yz2, z2)
+        side = two * at_least(q[0], Lane(zero)) - Lane(one)  # q and -q are one rotation: the one by half a turn at most
 
         # The shortest rotation from the tool's z to the target's.
-        w = select(has_frame, wp.cw_mul(side, w), wp.max(Lane(one) + zz, Lane(zero)))
-        x = select(has_frame, wp.cw_mul(side, x), -yz)
-        y = select(has_frame, wp.cw_mul(side, y), xz)
-        z = wp.cw_mul(has_frame, wp.cw_mul(side, z))
+        w = select(has_frame, wp.cw_mul(side, q[0]), wp.max(Lane(one) + zz, Lane(zero)))
+        x = select(has_frame, wp.cw_mul(side, q[1]), -yz)
+        y = select(has_frame, wp.cw_mul(side, q[2]), xz)
+        z = wp.cw_mul(has_frame, wp.cw_mul(side, q[3]))
         opposite = at_least(Lane(nothing), w + wp.abs(x) + wp.abs(y) + wp.abs(z))
-        y += opposite
+        rotation = wp.matrix_from_rows(x, y + opposite, z)
 
-        length = roots(norm_squared(x, y, z))
+        length = roots(dot(rotation, rotation))
         angle = wp.cw_mul(has_axis, two * arctangent(length, w))
         share = wp.cw_div(wp.min(angle, Lane(max_rotation)), wp.max(length, Lane(least_length)))
-        return angle, wp.cw_mul(share, x), wp.cw_mul(share, y), wp.cw_mul(share, z)
+        return angle, scaled(share, rotation)
 
-    @wp.func
-    def error_rotation(
-        axis: Vector3, side: Vector3, group: int, targets: wp.array2d(dtype=Lane),
-        xx: Lane, xy: Lane, xz: Lane, yx: Lane, yy: Lane, yz: Lane, zx: Lane, zy: Lane, zz: Lane,
-    ):  # fmt: skip
-        """Return the axes of the tool in the world, its angle error [rad], and the rotation to the target.
-
-        xx to zz: the last local frame, as in `advance`.
-        """
-        third = wp.cross(axis, side)
-        sx, sy, sz = along(side, xx, yx, zx), along(side, xy, yy, zy), along(side, xz, yz, zz)
-        tx, ty, tz = along(third, xx, yx, zx), along(third, xy, yy, zy), along(third, xz, yz, zz)
-        fx, fy, fz = along(axis, xx, yx, zx), along(axis, xy, yy, zy), along(axis, xz, yz, zz)
-        angle, rx, ry, rz = rotation_between(
-            dot(sx, sy, sz, targets[group, 4], targets[group, 5], targets[group, 6]),
-            dot(sx, sy, sz, targets[group, 7], targets[group, 8], targets[group, 9]),
-            dot(sx, sy, sz, targets[group, 10], targets[group, 11], targets[group, 12]),
-            dot(tx, ty, tz, targets[group, 4], targets[group, 5], targets[group, 6]),
-            dot(tx, ty, tz, targets[group, 7], targets[group, 8], targets[group, 9]),
-            dot(tx, ty, tz, targets[group, 10], targets[group, 11], targets[group, 12]),
-            dot(fx, fy, fz, targets[group, 4], targets[group, 5], targets[group, 6]),
-            dot(fx, fy, fz, targets[group, 7], targets[group, 8], targets[group, 9]),
-            dot(fx, fy, fz, targets[group, 10], targets[group, 11], targets[group, 12]),
-            targets[group, 13],
-            targets[group, 14],
-        )
-        return sx, sy, sz, tx, ty, tz, fx, fy, fz, angle, rx, ry, rz
-
-    return SimpleNamespace(angular_columns=angular_columns, error_rotation=error_rotation)
+    return SimpleNamespace(tool_frame=tool_frame, error_rotation=error_rotation)

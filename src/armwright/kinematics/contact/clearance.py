@@ -38,13 +38,12 @@ def clearances(
     Returns:
         (N, T) self-clearance and (N, T) obstacle clearance [m].
     """
-    wp, kernels = load_kernels("contact.clearance_kernels", device, arms.precision)
     n, t, _ = q.shape
-    distances = np.full((2, n, t), np.inf)
-    solids = _on_device(tuple(obstacles), arms.precision, device) if obstacles else None
+    distances = np.empty((2, n, t))
+    solids = _solids(tuple(obstacles), arms.precision, device) if obstacles else None
 
     def measure(chunk: slice) -> None:
-        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, wp, kernels, device)
+        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, device)
 
     size = MAX_CHUNK[device] // t
     if device == "cpu":
@@ -63,56 +62,44 @@ def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
     return clearances(motors, straight, device=device)[0][:, 0]
 
 
-def _distances(
-    arms: ArmArrays, q: Array, solids: list[Any] | None, wp: Any, kernels: Any, device: Device
-) -> NDArray[np.floating[Any]]:
+def _distances(arms: ArmArrays, q: Array, solids: Any, device: Device) -> NDArray[np.floating[Any]]:
     """Return the (2, N, T) clearances of a chunk of arms [m]."""
-
-    def on_device(values: NDArray[Any], dtype: Any) -> Any:
-        return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device, copy=False)
-
-    real, vector, dim = kernels.real, kernels.Vector3, q.shape[:2]
-    starts, ends = (wp.empty(q.shape, dtype=vector, device=device) for _ in range(2))
+    dim, links = q.shape[:2], load_kernels("contact.clearance_kernels", device, arms.precision)
+    own, free = (links.array(np.full(dim, np.inf), links.kernels.real) for _ in range(2))
     offset = arms.offset.copy()
     offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
-    base, motion = on_device(arms.base, vector), on_device(arms.motion, wp.int32)
-    posed = [base, motion, on_device(offset, vector), on_device(q.astype(arms.precision), real)]
-    wp.launch(kernels.link_axes, dim, inputs=[*posed, starts, ends], device=device)
-    self_clearance, obstacle_clearance = (on_device(np.full(dim, np.inf, dtype=arms.precision), real) for _ in range(2))
-    links = [starts, ends, on_device(arms.radius, real)]
-    wp.launch(kernels.self_clearance, dim, inputs=[motion, *links, self_clearance], device=device)
+    values = {name: getattr(arms, name) for name in ("base", "motion", "radius")} | {"offset": offset, "q": q}
+    values |= {name: links.empty(q.shape, links.kernels.Vector3) for name in ("starts", "ends")}
+    posed = links.struct("Posed", values)
+    links.launch("link_axes", dim, posed)
+    links.launch("self_clearance", dim, posed, own)
     if solids is not None:
-        wp.launch(kernels.obstacle_clearance, dim, inputs=[*links, *solids, obstacle_clearance], device=device)
-    placed: list[Any] | None = None
-    if arms.motor_bodies is not None:
-        _, motors = load_kernels("contact.motor_kernels", device, arms.precision)
-        bodies = arms.motor_bodies
-        shape, axis = on_device(bodies.shape, wp.int32), on_device(bodies.axis, wp.int32)
-        half, centre = on_device(bodies.half, vector), on_device(bodies.centre, vector)
-        middle, into = wp.empty(q.shape, vector, device=device), wp.empty(q.shape, kernels.Matrix3, device=device)
-        wp.launch(motors.motor_frames, dim, inputs=[*posed, shape, axis, centre, middle, into], device=device)
-        placed = [motion, shape, half, middle, into]
-        wp.launch(motors.self_clearance, dim, inputs=[*placed, *links, self_clearance], device=device)
-        if solids is not None:
-            wp.launch(motors.obstacle_clearance, dim, inputs=[*placed, *solids, obstacle_clearance], device=device)
+        links.launch("obstacle_clearance", dim, posed, solids, free)
     if arms.columns is not None:
-        _, column = load_kernels("contact.column_kernels", device, arms.precision)
-        standing = [base, on_device(arms.columns.half, vector)]
-        wp.launch(column.link_clearance, dim, inputs=[*standing, motion, *links, self_clearance], device=device)
-        if placed is not None:
-            wp.launch(column.motor_clearance, dim, inputs=[*standing, *placed, self_clearance], device=device)
-    return np.stack([self_clearance.numpy(), obstacle_clearance.numpy()])
+        links.launch("column_clearance", dim, posed, arms.columns, own)
+    if (bodies := arms.motor_bodies) is not None:
+        motors = load_kernels("contact.motor_kernels", device, arms.precision)
+        middle, into = motors.empty(q.shape, links.kernels.Vector3), motors.empty(q.shape, motors.kernels.Matrix3)
+        placed = motors.struct("Motors", {"shape": bodies.shape, "half": bodies.half, "middle": middle, "into": into})
+        motors.launch("motor_frames", dim, posed, bodies.axis, bodies.centre, placed)
+        motors.launch("self_clearance", dim, posed, placed, own)
+        if solids is not None:
+            motors.launch("obstacle_clearance", dim, posed, placed, solids, free)
+        if arms.columns is not None:
+            motors.launch("column_clearance", dim, posed, placed, arms.columns, own)
+    return np.stack([own.numpy(), free.numpy()])
 
 
 @cache
-def _on_device(obstacles: tuple[Obstacle, ...], precision: Precision, device: Device) -> list[Any]:
-    """Return shape, centre, rotation into its frame and half sides of each obstacle, as the kernel takes them."""
-    wp, kernels = load_kernels("contact.clearance_kernels", device, precision)
+def _solids(obstacles: tuple[Obstacle, ...], precision: Precision, device: Device) -> Any:
+    """Return the obstacles as the kernels take them."""
     solids = [obstacle.solid for obstacle in obstacles]
-    columns: list[tuple[Any, Any, Any]] = [
-        ([SHAPES.index(solid.shape) for solid in solids], np.int32, wp.int32),
-        ([solid.centre for solid in solids], precision, kernels.Vector3),
-        ([solid.rotation.T for solid in solids], precision, kernels.Matrix3),
-        ([solid.half for solid in solids], precision, kernels.Vector3),
-    ]
-    return [wp.array(np.array(values, dtype=kind), dtype=dtype, device=device) for values, kind, dtype in columns]
+    return load_kernels("contact.clearance_kernels", device, precision).struct(
+        "Solids",
+        {
+            "shape": np.array([SHAPES.index(solid.shape) for solid in solids]),
+            "centre": np.array([solid.centre for solid in solids]),
+            "into": np.array([solid.rotation.T for solid in solids]),
+            "half": np.array([solid.half for solid in solids]),
+        },
+    )

@@ -1,4 +1,4 @@
-"""Warp kernels of clearance: distances of the links of posed arms from each other and from obstacles.
+"""Warp kernels of clearance: distances of the links of posed arms from each other, from obstacles and from the column.
 
 A link is a capsule: all points within its radius of its axis, a segment. A thread takes one arm at one target, and
 branches: a bound excludes distant obstacles. docs/method.md §13 defines the distances.
@@ -14,41 +14,31 @@ import warp as wp
 from armwright.kinematics.arms.arm_arrays import FIXED, Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
-from armwright.kinematics.contact.solid_math import solid_math
+from armwright.kinematics.contact.solid_math import CYLINDER, solid_math
 
 
 @cache
 def clearance_kernels(precision: Precision) -> SimpleNamespace:
     """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
     base = frame_math(precision)
-    real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
-    advance = base.advance
-    solids = solid_math(precision)
-    signed_distance, along_segment = solids.signed_distance, solids.along_segment
+    real, Vector3, advance = base.real, base.Vector3, base.advance
+    solid = solid_math(precision)
+    Posed, Solids = solid.Posed, solid.Solids
+    signed_distance, along_segment, nearer_link = solid.signed_distance, solid.along_segment, solid.nearer_link
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
     tiny = real(1e-30)
     parallel = real(1e-12)  # square of the sine of an angle that is 0 in float32
 
     @kernel
-    def link_axes(
-        base: wp.array(dtype=Vector3),
-        motion: wp.array2d(dtype=int),
-        offset: wp.array2d(dtype=Vector3),
-        q: wp.array3d(dtype=real),
-        starts: wp.array3d(dtype=Vector3),
-        ends: wp.array3d(dtype=Vector3),
-    ):
-        """Compute start and end of the axis of each link by forward kinematics.
-
-        base: (N,) [m].  motion: (N, D).  offset: (N, D) [m].  q: (N, T, D) [rad] or [m].  starts, ends: (N, T, D) [m].
-        """
+    def link_axes(arms: Posed):
+        """Compute start and end of the axis of each link by forward kinematics."""
         arm, target = wp.tid()
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
-        p = base[arm]
-        for j in range(motion.shape[1]):
-            place, p, x, y, z = advance(motion[arm, j], offset[arm, j], q[arm, target, j], p, x, y, z)
-            starts[arm, target, j] = place
-            ends[arm, target, j] = p
+        p = arms.base[arm]
+        for j in range(arms.motion.shape[1]):
+            place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z)
+            arms.starts[arm, target, j] = place
+            arms.ends[arm, target, j] = p
 
     @wp.func
     def to_segment(p: Vector3, a: Vector3, u: Vector3):
@@ -77,37 +67,27 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
         return wp.sqrt(square)
 
     @kernel
-    def self_clearance(
-        motion: wp.array2d(dtype=int),
-        starts: wp.array3d(dtype=Vector3),
-        ends: wp.array3d(dtype=Vector3),
-        radius: wp.array2d(dtype=real),
-        clearance: wp.array2d(dtype=real),
-    ):
-        """Compute the smallest distance between links of an arm that are neither neighbours nor rigidly connected.
-
-        motion: (N, D).  starts, ends: (N, T, D) [m].  radius: (N, D) [m], 0 for links to ignore.  clearance: (N, T)
-        [m], lowered to the distance.
-        """
+    def self_clearance(arms: Posed, clearance: wp.array2d(dtype=real)):
+        """Lower (N, T) clearances to the distance between links that are neither neighbours nor rigidly connected."""
         arm, target = wp.tid()
         nearest = clearance[arm, target]
-        for i in range(radius.shape[1]):
-            r = radius[arm, i]
-            a = starts[arm, target, i]
-            u = ends[arm, target, i] - a
+        for i in range(arms.radius.shape[1]):
+            r = arms.radius[arm, i]
+            a = arms.starts[arm, target, i]
+            u = arms.ends[arm, target, i] - a
             length = wp.length(u)
             links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
             n_joints = int(0)  # noqa: RUF046, UP018
             between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
-            for j in range(i + 1, radius.shape[1]):
-                b = starts[arm, target, j]
-                between += wp.length(b - ends[arm, target, j - 1])  # displacement of a prismatic joint
-                if motion[arm, j] < wp.static(FIXED):
+            for j in range(i + 1, arms.radius.shape[1]):
+                b = arms.starts[arm, target, j]
+                between += wp.length(b - arms.ends[arm, target, j - 1])  # displacement of a prismatic joint
+                if arms.motion[arm, j] < wp.static(FIXED):
                     n_joints += 1
-                v = ends[arm, target, j] - b
+                v = arms.ends[arm, target, j] - b
                 other_length = wp.length(v)
-                radii = r + radius[arm, j]
-                if r > zero and radius[arm, j] > zero:
+                radii = r + arms.radius[arm, j]
+                if r > zero and arms.radius[arm, j] > zero:
                     # Parts of the arm that are this near along it cannot be farther apart, so they are excluded.
                     excluded = half * wp.max(two * radii - between, zero)
                     if links_between > 0 and n_joints > 0 and excluded <= wp.min(length, other_length):
@@ -121,48 +101,62 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
         clearance[arm, target] = nearest
 
     @kernel
-    def obstacle_clearance(
-        starts: wp.array3d(dtype=Vector3),
-        ends: wp.array3d(dtype=Vector3),
-        radius: wp.array2d(dtype=real),
-        shape: wp.array(dtype=int),
-        centre: wp.array(dtype=Vector3),
-        into: wp.array(dtype=Matrix3),
-        size: wp.array(dtype=Vector3),
-        clearance: wp.array2d(dtype=real),
-    ):
-        """Compute the smallest distance of a link of an arm from an obstacle.
-
-        starts, ends: (N, T, D) [m].  radius: (N, D) [m], 0 for links to ignore.  shape, centre, into (rotation into
-        the obstacle's frame), size (half sides or radii): (O,).  clearance: (N, T) [m], lowered to the distance.
-        """
+    def obstacle_clearance(arms: Posed, solids: Solids, clearance: wp.array2d(dtype=real)):
+        """Lower (N, T) clearances to the distance of a link from an obstacle."""
         arm, target = wp.tid()
         nearest = clearance[arm, target]
-        for j in range(radius.shape[1]):
-            r = radius[arm, j]
+        for j in range(arms.radius.shape[1]):
+            r = arms.radius[arm, j]
             if r > zero:
-                a = starts[arm, target, j]
-                along = ends[arm, target, j] - a
+                a = arms.starts[arm, target, j]
+                along = arms.ends[arm, target, j] - a
                 foot = real(0.0)  # share of the first link that is its foot, where the arm is mounted
                 if j == 0:
                     foot = two * r / wp.max(wp.length(along), tiny)
                 if foot < one:
-                    for o in range(shape.shape[0]):
-                        base = into[o] * (a - centre[o])
-                        v = into[o] * along
+                    for o in range(solids.shape.shape[0]):
+                        base = solids.into[o] * (a - solids.centre[o])
+                        v = solids.into[o] * along
                         p = base + foot * v
                         v = (one - foot) * v
                         # No point of the link is nearer than this: distance changes by no more than the path length.
-                        bound = signed_distance(shape[o], p + half * v, size[o]) - half * wp.length(v)
+                        bound = signed_distance(solids.shape[o], p + half * v, solids.half[o]) - half * wp.length(v)
                         if bound - r < nearest:
-                            distance = along_segment(shape[o], p, v, size[o]) - r
-                            mounted = j == 0 and signed_distance(shape[o], base, size[o]) <= r
+                            distance = along_segment(solids.shape[o], p, v, solids.half[o]) - r
+                            mounted = j == 0 and signed_distance(solids.shape[o], base, solids.half[o]) <= r
                             # The first link is always close to what the arm is mounted on: only overlaps count.
                             if not mounted or distance < zero:
                                 nearest = wp.min(nearest, distance)
         clearance[arm, target] = nearest
 
+    @kernel
+    def column_clearance(arms: Posed, column: wp.array(dtype=Vector3), clearance: wp.array2d(dtype=real)):
+        """Lower (N, T) clearances to the distance of a column from links that move, except the first one.
+
+        column: (N,) radius, radius, half the length [m], 0 without one.
+        """
+        arm, target = wp.tid()
+        size = column[arm]
+        if size[2] > zero:
+            middle = arms.base[arm] - Vector3(zero, zero, size[2])
+            nearest = clearance[arm, target]
+            n_links = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
+            n_joints = int(0)  # noqa: RUF046, UP018
+            for j in range(arms.motion.shape[1]):
+                if arms.motion[arm, j] < wp.static(FIXED):
+                    n_joints += 1
+                r = arms.radius[arm, j]
+                if r > zero:
+                    if n_links > 0 and n_joints > 0:
+                        a = arms.starts[arm, target, j]
+                        nearest = nearer_link(
+                            nearest, wp.static(CYLINDER), size, a - middle, arms.ends[arm, target, j] - a, r
+                        )
+                    n_links += 1
+            clearance[arm, target] = nearest
+
     return SimpleNamespace(
-        real=real, Vector3=Vector3, Matrix3=Matrix3,
+        real=real, Vector3=Vector3, Posed=Posed, Solids=Solids,
         link_axes=link_axes, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance,
+        column_clearance=column_clearance,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Warp functions of the signed distance of points and segments from solids, in the frame of the solid.
+"""Warp functions of the signed distance of points and segments from solids, in the frame of the solid; and what moves.
 
 docs/method.md §13 defines the distances.
 """
@@ -22,9 +22,39 @@ BOX, SPHERE, CYLINDER, GROUND = map(SHAPES.index, ("box", "sphere", "cylinder", 
 def solid_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
     base = frame_math(precision)
-    real, Vector3 = base.real, base.Vector3
+    real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
     zero, half = real(0.0), real(0.5)
     tiny = real(1e-30)
+
+    @wp.struct
+    class Posed:
+        """The links of N arms of up to D joints at T targets."""
+
+        base: wp.array(dtype=Vector3)  # (N,) [m]
+        motion: wp.array2d(dtype=int)  # (N, D)
+        offset: wp.array2d(dtype=Vector3)  # (N, D) [m]
+        q: wp.array3d(dtype=real)  # (N, T, D) [rad] or [m]
+        radius: wp.array2d(dtype=real)  # (N, D) [m], 0 for links to ignore
+        starts: wp.array3d(dtype=Vector3)  # (N, T, D) of their axes [m]
+        ends: wp.array3d(dtype=Vector3)  # (N, T, D) [m]
+
+    @wp.struct
+    class Motors:
+        """The bodies of their actuators."""
+
+        shape: wp.array2d(dtype=int)  # (N, D)
+        half: wp.array2d(dtype=Vector3)  # (N, D) [m]
+        middle: wp.array3d(dtype=Vector3)  # (N, T, D) [m]
+        into: wp.array3d(dtype=Matrix3)  # (N, T, D) rotation into the body's frame
+
+    @wp.struct
+    class Solids:
+        """O obstacles."""
+
+        shape: wp.array(dtype=int)  # (O,)
+        centre: wp.array(dtype=Vector3)  # (O,) [m]
+        into: wp.array(dtype=Matrix3)  # (O,) rotation into the obstacle's frame
+        half: wp.array(dtype=Vector3)  # (O,) half sides or radii [m]
 
     @wp.func
     def signed_distance(shape: int, p: Vector3, size: Vector3):
@@ -89,4 +119,7 @@ def solid_math(precision: Precision) -> SimpleNamespace:
             return wp.min(nearest, along_segment(shape, p, v, size) - radius)
         return nearest
 
-    return SimpleNamespace(signed_distance=signed_distance, along_segment=along_segment, nearer_link=nearer_link)
+    return SimpleNamespace(
+        Posed=Posed, Motors=Motors, Solids=Solids, signed_distance=signed_distance, along_segment=along_segment,
+        nearer_link=nearer_link,
+    )  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.line_following import BlockPaths, IndexArray, follow_lines
 from armwright.kinematics.devices import Device
@@ -86,9 +86,7 @@ def _block_costs(arms: ArmArrays, lines: BlockPaths, samples: LineSamples, speed
     change = np.zeros(lines.q.shape)
     change[:, :, 1:] = np.abs(np.diff(lines.q, axis=2))
     change[:, :, first] = 0.0
-    lower, upper = arms.lower[:, None, None], arms.upper[:, None, None]
-    on_limit = np.minimum(lines.q - lower, upper - lines.q) <= ON_LIMIT
-    on_limit = np.any(on_limit & (arms.motion < FIXED)[:, None, None], axis=-1)
+    on_limit = arms.limit_distance(lines.q) <= ON_LIMIT
     on_limit[:, :, first] = False
     blocked = BLOCKED * on_limit + SUSPECT * (change.max(axis=-1) > LARGE_STEP)
     step = (change / speed[:, None, None]).max(axis=-1)

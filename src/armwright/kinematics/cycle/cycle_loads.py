@@ -128,18 +128,23 @@ def _load(terms: TorqueTerms, arms: ArmArrays, instants: int, density: int) -> M
     return motion_load(gravity, inertial, velocity, q_ss * rate**2 + q_s * change, replace(drives, **known))
 
 
+def quintic(t: Array) -> tuple[Array, Array, Array]:
+    """Return s, s_τ and s_ττ of the profile at shares of the duration."""
+    s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    return s, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
+
+
 @cache
 def _instants(samples: int, instants: int, density: int) -> tuple[Array, Array, Array]:
     """Return (F, R) weights that interpolate between R samples at F instants, and s_τ and s_ττ there (F,)."""
-    t = np.linspace(0.0, 1.0, density * (instants - 1) + 1)
-    s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    s, rate, change = quintic(np.linspace(0.0, 1.0, density * (instants - 1) + 1))
     at = s * (samples - 1)
     before = np.minimum(at.astype(np.intp), samples - 2)
-    weights = np.zeros((len(t), samples))
-    rows = np.arange(len(t))
+    weights = np.zeros((len(s), samples))
+    rows = np.arange(len(s))
     weights[rows, before] = 1.0 - (at - before)
     weights[rows, before + 1] += at - before
-    return weights, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
+    return weights, rate, change
 
 
 def check_durations(drives: Actuation | None, plan: CyclePlan) -> Actuation | None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_choice import CLOSED, JOINT_STEPS, MAX_SLIDE, MAX_STEP, ON_LIMIT, choose_postures
 from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures, postures_near
@@ -216,8 +216,7 @@ def _measure(
         errors = _line_errors(group, plan, device, between)
         q = np.concatenate([path.q for path in group.paths], axis=1)
         clearance = np.stack(clearances(group.arms, q, obstacles, device))  # (2, n, R)
-        margin = np.minimum(q - group.arms.lower[:, None], group.arms.upper[:, None] - q)
-        margin = np.where(group.arms.motion[:, None] == FIXED, np.inf, margin).min(axis=2)
+        margin = group.arms.limit_distance(q)
         at = 0
         for i, path in enumerate(group.paths):
             end = at + path.q.shape[1]

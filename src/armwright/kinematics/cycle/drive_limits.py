@@ -60,24 +60,6 @@ def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: 
     )
 
 
-def available_torque(torque: Array, velocity: Array, drives: Actuation) -> Array:
-    """Return how much torque drives can deliver in the direction of the torques that are required.
-
-    Args:
-        torque: (N, K, D) of which the direction counts [N m].
-        velocity: (N, K, D) [rad/s].
-        drives: Actuation of the N arms.
-
-    Returns:
-        (N, K, D) absolute torques [N m].
-    """
-    peak, no_load = drives.peak[:, None], drives.no_load_speed[:, None]
-    gap, speed = _falling_range(drives)[:, None], np.abs(velocity)
-    share = np.where(gap == 0.0, speed <= no_load, (no_load - speed) / np.where(gap == 0.0, 1.0, gap))
-    motoring = torque * velocity > 0.0
-    return np.where(motoring, peak * np.clip(np.where(motoring, share, 1.0), 0.0, 1.0), peak)
-
-
 def torque_speed_utilisation(torque: Array, velocity: Array, drives: Actuation) -> Array:
     """Return the factor by which torque and speed together exceed what drives can deliver.
 

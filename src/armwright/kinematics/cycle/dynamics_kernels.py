@@ -48,6 +48,23 @@ def dynamics_kernels() -> SimpleNamespace:
     def row(values: Vectors, j: int):
         return Vector3(values[j, 0], values[j, 1], values[j, 2])
 
+    @wp.func
+    def accelerated(acceleration: Vector3, alpha: Vector3, omega: Vector3, lever: Vector3):
+        """Return the acceleration of a point of a body, from that of another point at a lever."""
+        return acceleration + wp.cross(alpha, lever) + wp.cross(omega, wp.cross(omega, lever))
+
+    @wp.func
+    def wrench(
+        mass: real, inertia: Matrix3, frame: Matrix3, lever: Vector3, acceleration: Vector3, alpha: Vector3,
+        omega: Vector3,
+    ):  # fmt: skip
+        """Return the force and the moment about a joint that move a body with its centre of mass at a lever."""
+        force = mass * accelerated(acceleration, alpha, omega, lever)
+        local = wp.transpose(frame)
+        spin = local * omega
+        moment = frame * (inertia * (local * alpha) + wp.cross(spin, inertia * spin))
+        return force, moment + wp.cross(lever, force)
+
     @kernel
     def torque_terms(
         bodies: Bodies,
@@ -97,7 +114,7 @@ def dynamics_kernels() -> SimpleNamespace:
                     change = q_s[arm, sample, j]
                 here = row(place, j)
                 lever = here - before
-                acceleration = acceleration + wp.cross(alpha, lever) + wp.cross(omega, wp.cross(omega, lever))
+                acceleration = accelerated(acceleration, alpha, omega, lever)
                 if motion < wp.static(PRISMATIC):
                     alpha = alpha + change * a + rate * wp.cross(omega, a)
                     omega = omega + rate * a
@@ -108,27 +125,15 @@ def dynamics_kernels() -> SimpleNamespace:
                 ly = row(along_y, j)
                 frame = wp.matrix_from_cols(lx, ly, wp.cross(lx, ly))
                 lever = frame * bodies.com[arm, j]
-                f = bodies.mass[arm, j] * (
-                    acceleration + wp.cross(alpha, lever) + wp.cross(omega, wp.cross(omega, lever))
-                )
-                local = wp.transpose(frame)
-                inertia = bodies.inertia[arm, j]
-                spin = local * omega
-                n = frame * (inertia * (local * alpha) + wp.cross(spin, inertia * spin)) + wp.cross(lever, f)
+                f, n = wrench(bodies.mass[arm, j], bodies.inertia[arm, j], frame, lever, acceleration, alpha, omega)
                 for i in range(3):
                     force[j, i] = f[i]
                     moment[j, i] = n[i]
             # The payload moves with the last link; x, y, z are its axes.
             frame = wp.matrix_from_cols(x, y, z)
             lever = tip - before + frame * bodies.payload_com[arm]
-            total_force = (carried[sample] * bodies.payload_mass) * (
-                acceleration + wp.cross(alpha, lever) + wp.cross(omega, wp.cross(omega, lever))
-            )
-            local = wp.transpose(frame)
-            inertia = carried[sample] * bodies.payload_inertia[arm]
-            spin = local * omega
-            total_moment = frame * (inertia * (local * alpha) + wp.cross(spin, inertia * spin))
-            total_moment = total_moment + wp.cross(lever, total_force)
+            mass, inertia = carried[sample] * bodies.payload_mass, carried[sample] * bodies.payload_inertia[arm]
+            total_force, total_moment = wrench(mass, inertia, frame, lever, acceleration, alpha, omega)
             after = before
             for step in range(bodies.dof):
                 j = bodies.dof - 1 - step

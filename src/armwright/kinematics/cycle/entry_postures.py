@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import FIXED, MAX_JOINTS, ArmArrays
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_choice import DEPTH, DISTINCT, cost_of
 from armwright.kinematics.devices import Device
@@ -33,10 +33,8 @@ def entry_postures(
     poses = plan.poses[[block.entry for block in plan.blocks]]
     n, b, starts = len(arms), len(poses), max(STARTS, candidates)
     lower, upper = arms.lower.astype(np.float64), arms.upper.astype(np.float64)
-    shares = np.random.default_rng(0).uniform(size=(starts, MAX_JOINTS))[:, : arms.dof]
-    start = lower[:, None] + shares * (upper - lower)[:, None]  # (N, S, D)
+    start = arms.random_postures(starts).swapaxes(0, 1)  # (N, S, D)
     start[:, 0] = 0.0
-    start = np.where(arms.motion[:, None] == FIXED, 0.0, start)
     q, off = _solve(arms, poses[np.repeat(np.arange(b), starts)], np.tile(start, (1, b, 1)), device)
     depth = np.maximum(0.0, -np.minimum(*clearances(arms, q, obstacles, device)))
     room = np.minimum(q - lower[:, None], upper[:, None] - q) / (upper - lower)[:, None]
@@ -78,6 +76,5 @@ def _solve(arms: ArmArrays, poses: Poses, start: Array, device: Device) -> tuple
         precision=arms.precision,
         device=device,
     )
-    distance = np.linalg.norm(solved.reached - poses.position, axis=-1)
-    off = np.maximum(distance / poses.tolerance, solved.angle / poses.angle_tolerance)
+    off = np.maximum(solved.distance(poses.position) / poses.tolerance, solved.angle / poses.angle_tolerance)
     return solved.q.astype(np.float64), off

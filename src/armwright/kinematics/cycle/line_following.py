@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
-from armwright.kinematics.devices import Device, load_kernels
+from armwright.kinematics.devices import Device, Loaded, load_kernels
 from armwright.tasks.motions import LineSamples, Poses
 
 IndexArray = NDArray[np.intp]
@@ -43,19 +43,14 @@ def follow_lines(arms: ArmArrays, samples: LineSamples, entry: Array, device: De
         entry: (N, B, K, D) postures at the first sample of each block.
         device: The device to solve on.
     """
-    wp, kernels = load_kernels("cycle.path_kernels", device)
+    loaded = load_kernels("cycle.path_kernels", device)
     n, b, k, dof = entry.shape
     s = len(samples.poses)
     paths = BlockPaths(np.empty((n, k, s, dof)), np.empty((n, k, s)), np.empty((n, k, s)))
 
     def solve(chunk: slice) -> None:
-        part = arms[chunk]
-        path = _on_device(part, samples.poses, samples.first, wp, kernels, device)
-        start = _array(entry[chunk].reshape(len(part), b * k, dof), kernels.real, wp, device)
-        results = [wp.empty((len(part), *v.shape[1:]), dtype=kernels.real, device=device) for v in vars(paths).values()]
-        wp.launch(kernels.follow, (len(part), b * k), inputs=[path, start, *results], device=device)
-        for values, result in zip(vars(paths).values(), results, strict=True):
-            values[chunk] = result.numpy()
+        start, found = entry[chunk].reshape(-1, b * k, dof), [values[chunk] for values in vars(paths).values()]
+        loaded.launch("follow", start.shape[:2], _path(arms[chunk], samples, loaded), start, outputs=found)
 
     in_chunks(solve, n, max(1, SAMPLES[device] // (s * k)), device)
     return paths
@@ -63,36 +58,21 @@ def follow_lines(arms: ArmArrays, samples: LineSamples, entry: Array, device: De
 
 def tool_errors(arms: ArmArrays, poses: Poses, q: Array, device: Device = "cpu") -> Array:
     """Return (N, S, 2) distance of the tip [m] and angle of the tool [rad] from poses; q: (N, S, D)."""
-    wp, kernels = load_kernels("cycle.path_kernels", device)
+    loaded = load_kernels("cycle.path_kernels", device)
     errors = np.empty((*q.shape[:2], 2))
+    samples = LineSamples(poses, np.array([0, len(poses)]), ())
 
     def solve(chunk: slice) -> None:
-        part = arms[chunk]
-        path = _on_device(part, poses, np.array([0, len(poses)]), wp, kernels, device)
-        found = wp.empty((len(part), len(poses), 2), dtype=kernels.real, device=device)
-        inputs = [path, _array(q[chunk], kernels.real, wp, device), found]
-        wp.launch(kernels.tool_errors, (len(part), len(poses)), inputs=inputs, device=device)
-        errors[chunk] = found.numpy()
+        path, found = _path(arms[chunk], samples, loaded), errors[chunk]
+        loaded.launch("tool_errors", found.shape[:2], path, q[chunk], outputs=[found])
 
     in_chunks(solve, len(arms), max(1, SAMPLES[device] // len(poses)), device)
     return errors
 
 
-def _on_device(arms: ArmArrays, poses: Poses, first: IndexArray, wp: Any, kernels: Any, device: Device) -> Any:
-    """Return arms and poses as the kernels take them; first: (B + 1,) index of each block's first pose."""
-    values: dict[str, Any] = {
-        name: getattr(arms, name).astype(np.float64)
-        for name in ("base", "lower", "upper", "offset", "tool_axis", "tool_side")
-    }
-    values |= {"motion": arms.motion, "first": first.astype(np.int32)}
-    values |= {"n_angular": poses.n_angular.astype(np.int32), "position": poses.position}
-    values |= {axis: poses.rotation[:, :, i] for i, axis in enumerate("xyz")}
-    path = kernels.Path()
-    path.dof = arms.dof
-    for name, array in values.items():
-        setattr(path, name, _array(array, kernels.Path.vars[name].type.dtype, wp, device))
-    return path
-
-
-def _array(values: NDArray[Any], dtype: Any, wp: Any, device: Device) -> Any:
-    return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device, copy=False)
+def _path(arms: ArmArrays, samples: LineSamples, loaded: Loaded) -> Any:
+    """Return arms and samples as the kernels take them."""
+    poses, names = samples.poses, ("dof", "base", "motion", "lower", "upper", "offset", "tool_axis", "tool_side")
+    values = {name: getattr(arms, name) for name in names}
+    values |= {"first": samples.first, "n_angular": poses.n_angular, "position": poses.position}
+    return loaded.struct("Path", values | {axis: poses.rotation[:, :, i] for i, axis in enumerate("xyz")})

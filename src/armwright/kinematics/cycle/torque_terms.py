@@ -88,28 +88,18 @@ def _values(path: MotionPath, order: int) -> Array:
 
 def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device) -> Array:
     """Return (3, N, S, D) gravity, drag and push of N arms at S samples."""
-    wp, kernels = load_kernels("cycle.dynamics_kernels", device)
+    loaded = load_kernels("cycle.dynamics_kernels", device)
     terms = np.empty((3, *q.shape))
 
     def solve(chunk: slice) -> None:
         part = arms[chunk]
-        bodies = kernels.Bodies()
-        bodies.dof, bodies.payload_mass = arms.dof, wp.float64(payload)
-        values: dict[str, Any] = {name: getattr(part, name).astype(np.float64) for name in ("base", "offset")}
-        values |= {"motion": part.motion} | vars(part.rigid_bodies)
-        values |= {"payload_com": part.payload_center.astype(np.float64)}
-        values |= {"payload_inertia": payload * part.payload_gyration}
-
-        def on_device(array: Array, dtype: Any) -> Any:
-            return wp.array(np.ascontiguousarray(array), dtype=dtype, device=device, copy=False)
-
-        for name, array in values.items():
-            setattr(bodies, name, on_device(array, kernels.Bodies.vars[name].type.dtype))
-        inputs = [on_device(array[chunk], kernels.real) for array in (q, q_s, q_ss)]
-        found = wp.empty((3, *q[chunk].shape), dtype=kernels.real, device=device)
-        inputs = [bodies, *inputs, on_device(carried, kernels.real), found]
-        wp.launch(kernels.torque_terms, q[chunk].shape[:2], inputs=inputs, device=device)
-        terms[:, chunk] = found.numpy()
+        values: dict[str, Any] = {name: getattr(part, name) for name in ("dof", "base", "motion", "offset")}
+        values |= vars(part.rigid_bodies) | {"payload_mass": loaded.warp.float64(payload)}
+        values |= {"payload_com": part.payload_center, "payload_inertia": payload * part.payload_gyration}
+        bodies, found = loaded.struct("Bodies", values), np.empty((3, *q[chunk].shape))
+        states = (q[chunk], q_s[chunk], q_ss[chunk])
+        loaded.launch("torque_terms", found.shape[1:3], bodies, *states, carried, outputs=[found])
+        terms[:, chunk] = found
 
     in_chunks(solve, len(arms), max(1, SAMPLES[device] // q.shape[1]), device)
     return terms

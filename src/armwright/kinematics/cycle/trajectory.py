@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.cycle.cycle_loads import quintic
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.cycle.torque_terms import inverse_dynamics_torques
 from armwright.tasks.motions import CyclePlan
@@ -61,10 +62,8 @@ def sample_trajectory(
 
 def _states(path: MotionPath, time: Array, duration: float) -> tuple[Array, Array, Array]:
     """Return (F, D) joint values, speeds and accelerations at times (F,) from the start of a motion [s]."""
-    t = np.clip(time / duration, 0.0, 1.0)
-    s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
-    rate = (30.0 * t**2 * (1.0 - t) ** 2 / duration)[:, None]
-    change = (60.0 * t * (1.0 - t) * (1.0 - 2.0 * t) / duration**2)[:, None]
+    s, s_t, s_tt = quintic(np.clip(time / duration, 0.0, 1.0))
+    rate, change = (s_t / duration)[:, None], (s_tt / duration**2)[:, None]
     q, q_s, q_ss = (path.at(s, order)[0] for order in range(3))
     qd = q_s * rate
     return q, np.where(np.abs(qd) < STILL, 0.0, qd), q_ss * rate**2 + q_s * change

@@ -26,7 +26,7 @@ from armwright.kinematics.arms.arm_arrays import (
     check_precision,
 )
 from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.devices import Device, cores, load_kernels, resolve_device
+from armwright.kinematics.devices import Device, Loaded, cores, load_kernels, resolve_device
 from armwright.tasks.targets import ORIENTATION, TargetArrays
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
@@ -49,6 +49,17 @@ class Postures:
     torque: Floats  # (N, T, D) that holds the posture against gravity, +dV/dq [N m] or [N]
     angle: Floats  # (N, T) by which the tool is off the target's axis or orientation [rad]; 0 where it has none
 
+    def distance(self, points: Array) -> Array:
+        """Return the (N, T) distances of the tip from points (T, 3) [m]."""
+        return np.linalg.norm(self.reached.astype(np.float64) - points, axis=-1)
+
+    def nearer(self, other: "Postures", points: Array, metres_per_radian: Array | float) -> "Postures":
+        """Return, per arm and target, the posture with the smaller distance, angles included; of equals this one."""
+        mine, others = (np.hypot(each.distance(points), metres_per_radian * each.angle) for each in (self, other))
+        better, pairs = others < mine, zip(vars(self).values(), vars(other).values(), strict=True)
+        kept: list[Any] = [np.where(better[..., None] if a.ndim > better.ndim else better, b, a) for a, b in pairs]
+        return Postures(*kept)
+
 
 def solve_postures(
     arms: ArmArrays,
@@ -58,6 +69,7 @@ def solve_postures(
     initial_q: ArrayLike | None = None,
     payload: Array | None = None,
     target_arrays: TargetArrays | None = None,
+    restarts: int = 0,
     precision: Precision = "float32",
     device: Device = "cpu",
 ) -> Postures:
@@ -73,6 +85,7 @@ def solve_postures(
             None for 0. Fixed joints stay at 0.
         payload: (T,) masses of payloads [kg]; None for no payload.
         target_arrays: The axes and orientations of the T targets; None for points alone.
+        restarts: The number of further, random starts, of which the best posture is kept.
         precision: The precision of the results. Arms in float32 can be solved in float64, not the reverse.
         device: The device to solve on.
     """
@@ -80,14 +93,27 @@ def solve_postures(
         raise SettingsError(f"updates = {updates} is outside 0 <= updates")
     arms = _in_precision(arms, check_precision(precision))
     device = resolve_device(device, many=True)
-    n, t, dof = len(arms), len(points), arms.dof
-    initial = None
-    if initial_q is not None or not arms.ranges_include_zero:
-        angles = _broadcast(0.0 if initial_q is None else initial_q, (n, t, dof))
-        initial = np.where(arms.motion[:, None] == FIXED, 0.0, angles)
     kind = _kind_of(target_arrays)
-    columns = _target_columns(points, np.zeros(t) if payload is None else payload, target_arrays)
-    whole = [np.empty((n, t, size), dtype=precision) for size in _result_sizes(dof)]
+    columns = _target_columns(points, np.zeros(len(points)) if payload is None else payload, target_arrays)
+    if initial_q is None and not arms.ranges_include_zero:
+        initial_q = 0.0
+    best = _solve_all(arms, columns, updates, initial_q, kind, device)
+    metres_per_radian = 0.0 if target_arrays is None else target_arrays.metres_per_radian
+    for start in arms.random_postures(restarts):
+        other = _solve_all(arms, columns, updates, start[:, None], kind, device)
+        best = best.nearer(other, points, metres_per_radian)
+    return best
+
+
+def _solve_all(
+    arms: ArmArrays, columns: Array, updates: int, initial_q: ArrayLike | None, kind: TargetKind, device: Device
+) -> Postures:
+    """Solve all arms at the targets (T, C), in chunks."""
+    n, t, dof = len(arms), len(columns), arms.dof
+    initial = None
+    if initial_q is not None:
+        initial = np.where(arms.motion[:, None] == FIXED, 0.0, _broadcast(initial_q, (n, t, dof)))
+    whole = [np.empty((n, t, size), dtype=arms.precision) for size in _result_sizes(dof)]
     parts = _parts(n, t, LANES[device])
 
     def solve(chunk: slice) -> None:
@@ -143,25 +169,34 @@ def _solve(
     grouped = _in_lanes(columns[None], lanes)[0]
     if initial_q is not None:
         initial_q = _in_lanes(np.clip(initial_q, arms.lower[:, None], arms.upper[:, None]), lanes)
+    loaded = load_kernels("ik.ik_kernels", device, arms.precision, lanes, arms.motions, kind)
     if device == "cpu" and len(arms) <= _buffered_arms(arms, len(grouped), lanes):
-        results = _thread_buffers(arms, grouped, updates, kind, lanes).solve(arms, grouped, initial_q)
+        results = _thread_buffers(arms, grouped, updates, loaded).solve(arms, grouped, initial_q)
     else:
-        wp, kernels = load_kernels("ik.ik_kernels", device, arms.precision, lanes, arms.motions, kind)
-        columns_ = wp.array(grouped, dtype=kernels.Lane, device=device, copy=False)
-        q_last = wp.zeros((len(arms), len(grouped), arms.dof), dtype=kernels.Lane, device=device)
-        if initial_q is not None:
-            q_last = wp.array(initial_q, dtype=kernels.Lane, shape=initial_q.shape[:-1], device=device, copy=False)
-        h_last = wp.full(q_last.shape, INITIAL_GRADIENT, dtype=kernels.Lane, device=device)
-        results = [values.numpy() for values in _launch(arms, columns_, updates, q_last, h_last, wp, kernels)]
+        results = _solve_once(arms, grouped, updates, initial_q, loaded)
     return [_from_lanes(values)[:, : len(columns)] for values in results]
+
+
+def _solve_once(
+    arms: ArmArrays, columns: NDArray[Any], updates: int, initial_q: NDArray[Any] | None, loaded: Loaded
+) -> list[NDArray[Any]]:
+    """Return the results (N, G, ...) in lanes of a chunk too large for buffers."""
+    lane, dim = loaded.kernels.Lane, (len(arms), len(columns))
+    shape = (*dim, arms.dof)
+    start = loaded.warp.zeros(shape, lane, device=loaded.device) if initial_q is None else loaded.array(initial_q, lane)
+    gradients = loaded.warp.full(shape, INITIAL_GRADIENT, lane, device=loaded.device)
+    results = [loaded.empty((*dim, size), lane) for size in _result_sizes(arms.dof)]
+    for kernel, inputs in _steps(arms, loaded.array(columns, lane), updates, start, gradients, results, loaded):
+        loaded.warp.launch(kernel, dim, inputs=inputs, device=loaded.device)
+    return [values.numpy() for values in results]
 
 
 class _Buffers:
     """Arrays that the kernels read and write on the CPU, filled again for each chunk of arms."""
 
-    def __init__(self, arms: ArmArrays, columns: NDArray[Any], updates: int, kind: TargetKind, lanes: int) -> None:
-        wp, kernels = load_kernels("ik.ik_kernels", "cpu", arms.precision, lanes, arms.motions, kind)
-        n, groups, dof = _buffered_arms(arms, len(columns), lanes), len(columns), arms.dof
+    def __init__(self, arms: ArmArrays, columns: NDArray[Any], updates: int, loaded: Loaded) -> None:
+        (groups, _, lanes), dof = columns.shape, arms.dof
+        n = _buffered_arms(arms, groups, lanes)
         read = {name: getattr(arms, name) for name in ARRAYS}
         self._arms = {name: np.zeros((n, *values.shape[1:]), dtype=values.dtype) for name, values in read.items()}
         self._columns = np.zeros(columns.shape, dtype=arms.precision)
@@ -169,11 +204,11 @@ class _Buffers:
             np.zeros((n, groups, size, lanes), dtype=arms.precision) for size in (dof, dof, *_result_sizes(dof))
         )
         columns_, q_last, h_last, *results = (
-            wp.array(values, dtype=kernels.Lane, shape=values.shape[:-1], device="cpu", copy=False)
+            loaded.array(values, loaded.kernels.Lane)
             for values in (self._columns, self._q_last, self._h_last, *self._results)
         )
-        self._launch = wp.launch
-        self._steps = _steps(replace(arms, **self._arms), columns_, updates, q_last, h_last, results, wp, kernels)
+        self._launch = loaded.warp.launch
+        self._steps = _steps(replace(arms, **self._arms), columns_, updates, q_last, h_last, results, loaded)
 
     def solve(self, arms: ArmArrays, columns: NDArray[Any], initial_q: NDArray[Any] | None) -> list[NDArray[Any]]:
         """Return the results (N, G, ...) in lanes; the next call overwrites them."""
@@ -191,14 +226,14 @@ class _Buffers:
 _local = threading.local()
 
 
-def _thread_buffers(arms: ArmArrays, columns: NDArray[Any], updates: int, kind: TargetKind, lanes: int) -> _Buffers:
-    """Return the buffers of this thread for arms of this size and targets of this kind."""
+def _thread_buffers(arms: ArmArrays, columns: NDArray[Any], updates: int, loaded: Loaded) -> _Buffers:
+    """Return the buffers of this thread for arms of this size and as many targets."""
     buffers: dict[tuple[Any, ...], _Buffers] = _local.__dict__.setdefault("buffers", {})
-    key = (arms.dof, arms.precision, arms.motions, len(columns), updates, kind, lanes)
+    key = (loaded, arms.dof, len(columns), updates)
     if key not in buffers:
         if len(buffers) == MAX_BUFFERS:
             buffers.clear()
-        buffers[key] = _Buffers(arms, columns, updates, kind, lanes)
+        buffers[key] = _Buffers(arms, columns, updates, loaded)
     return buffers[key]
 
 
@@ -212,42 +247,24 @@ def _bytes_of_one(arms: ArmArrays, groups: int, lanes: int) -> int:
     return ((4 * arms.dof + 3) * groups * lanes + 10 * arms.dof + 3) * arms.base.itemsize
 
 
-def _launch(arms: ArmArrays, columns: Any, updates: int, q_last: Any, h_last: Any, wp: Any, kernels: Any) -> list[Any]:
-    """Run the kernels and return their results (N, G, ...) in lanes, on the same device.
-
-    columns: (G, C) targets in lanes.  q_last, h_last: (N, G, D) in lanes, updated in place.
-    """
-    device, dim = q_last.device, (len(arms), len(columns))
-    results = [wp.empty((*dim, n), dtype=kernels.Lane, device=device) for n in _result_sizes(arms.dof)]
-    for kernel, inputs in _steps(arms, columns, updates, q_last, h_last, results, wp, kernels):
-        wp.launch(kernel, dim, inputs=inputs, device=device)
-    return results
-
-
 def _result_sizes(dof: int) -> tuple[int, ...]:
     """Return the sizes of the results: joint angles, tip position, torques and angle error."""
     return (dof, 3, dof, 1)
 
 
 def _steps(
-    arms: ArmArrays, columns: Any, updates: int, q_last: Any, h_last: Any, results: list[Any], wp: Any, kernels: Any
+    arms: ArmArrays, columns: Any, updates: int, q_last: Any, h_last: Any, results: list[Any], loaded: Loaded
 ) -> tuple[tuple[Any, list[Any]], ...]:
-    """Return the kernels in their order, each with its inputs; results: of the sizes `_result_sizes`."""
-    on_device = _on_device(arms, wp, kernels, q_last.device)
+    """Return the kernels in their order, each with its inputs.
+
+    columns: (G, C) targets in lanes.  q_last, h_last: (N, G, D) in lanes, updated in place.  results: of the sizes
+    `_result_sizes`.
+    """
+    on_device = loaded.struct("Arms", {name: getattr(arms, name) for name in ("dof", *ARRAYS)})
     return (
-        (kernels.solve_ik, [on_device, columns, updates, q_last, h_last, results[0]]),
-        (kernels.static_torque, [on_device, columns, q_last, *results]),
+        (loaded.kernels.solve_ik, [on_device, columns, updates, q_last, h_last, results[0]]),
+        (loaded.kernels.static_torque, [on_device, columns, q_last, *results]),
     )
-
-
-def _on_device(arms: ArmArrays, wp: Any, kernels: Any, device: Any) -> Any:
-    """Return the arms as a Warp struct; on the CPU without copies, which saves a quarter of a single design's time."""
-    on_device = kernels.Arms()
-    on_device.dof = arms.dof
-    for name in ARRAYS:
-        dtype = kernels.Arms.vars[name].type.dtype
-        setattr(on_device, name, wp.array(getattr(arms, name), dtype=dtype, device=device, copy=False))
-    return on_device
 
 
 def _in_precision(arms: ArmArrays, precision: Precision) -> ArmArrays:

@@ -48,27 +48,30 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from armwright.kinematics.arms.arm_arrays import Motions, Precision, TargetKind
+from armwright.kinematics.arms.arm_arrays import FIXED, MAX_JOINTS, PRISMATIC, Motions, Precision, TargetKind
 from armwright.kinematics.arms.ik_math import ik_math, kernel
 from armwright.kinematics.arms.lane_math import lane_math
 from armwright.kinematics.arms.pose_math import pose_math
 from armwright.kinematics.ik.normal_equations import normal_equations
-from armwright.kinematics.ik.static_torque import static_torque_kernel
+from armwright.robot.arm import GRAVITY
 
 
 @cache
 def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetKind) -> SimpleNamespace:
     """Return the kernels that solve `lanes` targets per thread in this precision, for these motions and targets."""
     base, chain = lane_math(precision, lanes), ik_math(precision, lanes, motions)
-    rotations, equations = pose_math(precision, lanes, motions), normal_equations(precision, lanes)
-    real, Lane, Wide, Joints, Arms = base.real, base.Lane, base.Wide, chain.Joints, chain.Arms
-    at_least, select, norm_squared = base.at_least, base.select, base.norm_squared
-    at_base, advance, columns, limit = chain.at_base, chain.advance, chain.columns, chain.limit
-    angular_columns, error_rotation = rotations.angular_columns, rotations.error_rotation
-    shortened, no_rows, pose_step = equations.shortened, equations.no_rows, equations.pose_step
-    add_linear, add_angular, point_step = equations.add_linear, equations.add_angular, equations.point_step
-    static_torque = static_torque_kernel(precision, lanes, motions, kind)
-    pose, one, infinity = kind == "pose", real(1.0), real(1e30)
+    rotations, equations = pose_math(precision, lanes), normal_equations(precision, lanes)
+    real, Lane, Wide, Vector, Arms = base.real, base.Lane, base.Wide, base.Vector, chain.Arms
+    at_least, select, scaled = base.at_least, base.select, base.scaled
+    dot, in_frame, vector_of = base.dot, base.in_frame, base.vector_of
+    at_base, advance, limit = chain.at_base, chain.advance, chain.limit
+    linear_column, angular_column = chain.linear_column, chain.angular_column
+    tool_frame, error_rotation = rotations.tool_frame, rotations.error_rotation
+    Square, Rows, pose_step = equations.Square, equations.Rows, equations.pose_step
+    shortened, point_step = equations.shortened, equations.point_step
+    Joints = wp.types.matrix(shape=(MAX_JOINTS, lanes), dtype=real)  # row j is joint j
+    Vectors = wp.types.matrix(shape=(3 * MAX_JOINTS, lanes), dtype=real)  # three rows for each joint
+    pose, zero, one, infinity, gravity = kind == "pose", real(0.0), real(1.0), real(1e30), real(GRAVITY)
 
     @kernel
     def solve_ik(
@@ -87,13 +90,13 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
         arm, group = wp.tid()
         if wp.static(pose):
             has_axis, has_frame, metres_per_radian = targets[group, 13], targets[group, 14], targets[group, 15]
-            axis, side = arms.tool_axis[arm], arms.tool_side[arm]
-            no_xy, no_z = Wide(Lane(one) - has_axis), Wide(Lane(one) - has_frame)
+            counted = wp.matrix_from_rows(has_axis, has_axis, has_frame)  # angles of the tool
+            unused = wp.matrix_from_rows(Lane(one) - has_axis, Lane(one) - has_axis, Lane(one) - has_frame)
         q, kept = Joints(), Joints()
         limit_n, limit_d = Joints(), Joints()  # H of the update before, n / d: fractions compare without division
-        ux, uy, uz = Joints(), Joints(), Joints()  # joint axes, then the position's columns of J
-        vx, vy, vz = Joints(), Joints(), Joints()  # joint positions, then the angles' columns of J
         weight, pull = Joints(), Joints()
+        linear = Vectors()  # joint axes, then the position's columns of J
+        angular = Vectors()  # joint positions, then the angles' columns of J
         for j in range(arms.dof):
             q[j] = q_last[arm, group, j]
             kept[j] = q[j]
@@ -101,29 +104,20 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
             limit_d[j] = Lane(one)
         nearest = Lane(infinity)
         for _ in range(updates):
-            # Forward kinematics. xx, xy, xz: the local x axis in the world, and so on.
-            xx, xy, xz, yx, yy, yz, zx, zy, zz, px, py, pz = at_base(arms.base[arm])
+            p, x, y, z = at_base(arms.base[arm])
             for j in range(arms.dof):
-                xx, xy, xz, yx, yy, yz, zx, zy, zz, ax, ay, az, ox, oy, oz, px, py, pz = advance(
-                    arms.motion[arm, j], arms.offset[arm, j], q[j], xx, xy, xz, yx, yy, yz, zx, zy, zz, px, py, pz
-                )  # fmt: skip
-                ux[j] = ax
-                vx[j] = ox
-                uy[j] = ay
-                vy[j] = oy
-                uz[j] = az
-                vz[j] = oz
+                axis, place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], q[j], p, x, y, z)
+                for i in range(3):
+                    linear[3 * j + i] = axis[i]
+                    angular[3 * j + i] = place[i]
 
             # The posture nearest to the target is kept, the earliest of equals.
-            ex = targets[group, 0] - px
-            ey = targets[group, 1] - py
-            ez = targets[group, 2] - pz
-            square = norm_squared(ex, ey, ez)
+            error = vector_of(targets, group, 0) - p
+            square = dot(error, error)
             far = square
             if wp.static(pose):
-                sx, sy, sz, tx, ty, tz, fx, fy, fz, angle, rotation_x, rotation_y, rotation_z = error_rotation(
-                    axis, side, group, targets, xx, xy, xz, yx, yy, yz, zx, zy, zz
-                )  # fmt: skip
+                s, t, f = tool_frame(arms.tool_axis[arm], arms.tool_side[arm], x, y, z)
+                angle, rotation = error_rotation(s, t, f, targets, group)
                 off = wp.cw_mul(metres_per_radian, angle)
                 far = square + wp.cw_mul(off, off)
             nearer = Lane(one) - at_least(far, nearest)
@@ -132,78 +126,136 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                 kept[j] = select(nearer, q[j], kept[j])
 
             # dx, shortened; the pull y is taken out of dx, because J# dx + (I - J# J) y = y + J# (dx - J y).
-            d1, d2, d3 = shortened(ex, ey, ez, square)
+            dx = shortened(error, square)
+            if wp.static(pose):
+                turn = wp.cw_mul(counted, rotation)
+                jjt, jwjt, column, weighted = Square(), Square(), Rows(), Rows()
+            # The same of points alone, for which separate variables take a tenth less time.
             a11, a21, a22, a31, a32, a33 = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
             b11, b21, b22, b31, b32, b33 = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
-            if wp.static(pose):
-                d4, d5 = wp.cw_mul(has_axis, rotation_x), wp.cw_mul(has_axis, rotation_y)
-                d6 = wp.cw_mul(has_frame, rotation_z)
-                a41, a42, a43, a44, a51, a52, a53, a54, a55, a61, a62, a63, a64, a65, a66 = no_rows()
-                b41, b42, b43, b44, b51, b52, b53, b54, b55, b61, b62, b63, b64, b65, b66 = no_rows()
             for j in range(arms.dof):
                 motion = arms.motion[arm, j]
-                n, d, w, y = limit(motion, arms.lower[arm, j], arms.upper[arm, j], q[j], limit_n[j], limit_d[j])
+                n, d, w, y_j = limit(motion, arms.lower[arm, j], arms.upper[arm, j], q[j], limit_n[j], limit_d[j])
                 limit_n[j] = n
                 limit_d[j] = d
-                ax, ay, az = ux[j], uy[j], uz[j]
-                jx, jy, jz = columns(motion, ax, ay, az, px - vx[j], py - vy[j], pz - vz[j])
-                d1 -= wp.cw_mul(jx, y)
-                d2 -= wp.cw_mul(jy, y)
-                d3 -= wp.cw_mul(jz, y)
-                ux[j] = jx
-                uy[j] = jy
-                uz[j] = jz
                 weight[j] = w
-                pull[j] = y
-                ww, c1, c2, c3 = Wide(w), Wide(jx), Wide(jy), Wide(jz)
-                w1, w2, w3 = wp.cw_mul(ww, c1), wp.cw_mul(ww, c2), wp.cw_mul(ww, c3)
-                a11, a21, a22, a31, a32, a33 = add_linear(c1, c2, c3, c1, c2, c3, a11, a21, a22, a31, a32, a33)
+                pull[j] = y_j
+                axis = wp.matrix_from_rows(linear[3 * j], linear[3 * j + 1], linear[3 * j + 2])
+                place = wp.matrix_from_rows(angular[3 * j], angular[3 * j + 1], angular[3 * j + 2])
+                moved = linear_column(motion, axis, p - place)
+                dx -= scaled(y_j, moved)
+                for i in range(3):
+                    linear[3 * j + i] = moved[i]
                 if wp.static(pose):
-                    b11, b21, b22, b31, b32, b33 = add_linear(w1, w2, w3, c1, c2, c3, b11, b21, b22, b31, b32, b33)
-                    gx, gy, gz = angular_columns(
-                        motion, has_axis, has_frame, sx, sy, sz, tx, ty, tz, fx, fy, fz, ax, ay, az
-                    )
-                    d4 -= wp.cw_mul(gx, y)
-                    d5 -= wp.cw_mul(gy, y)
-                    d6 -= wp.cw_mul(gz, y)
-                    vx[j] = gx
-                    vy[j] = gy
-                    vz[j] = gz
-                    c4, c5, c6 = Wide(gx), Wide(gy), Wide(gz)
-                    w4, w5, w6 = wp.cw_mul(ww, c4), wp.cw_mul(ww, c5), wp.cw_mul(ww, c6)
-                    a41, a42, a43, a44, a51, a52, a53, a54, a55, a61, a62, a63, a64, a65, a66 = add_angular(
-                        c4, c5, c6, c1, c2, c3, c4, c5, c6,
-                        a41, a42, a43, a44, a51, a52, a53, a54, a55, a61, a62, a63, a64, a65, a66,
-                    )  # fmt: skip
-                    b41, b42, b43, b44, b51, b52, b53, b54, b55, b61, b62, b63, b64, b65, b66 = add_angular(
-                        w4, w5, w6, c1, c2, c3, c4, c5, c6,
-                        b41, b42, b43, b44, b51, b52, b53, b54, b55, b61, b62, b63, b64, b65, b66,
-                    )  # fmt: skip
+                    turned = wp.cw_mul(counted, angular_column(motion, axis, s, t, f))
+                    turn -= scaled(y_j, turned)
+                    for i in range(3):
+                        angular[3 * j + i] = turned[i]
+                        column[i] = Wide(moved[i])
+                        column[i + 3] = Wide(turned[i])
+                    for i in range(6):
+                        weighted[i] = wp.cw_mul(Wide(w), column[i])
+                        for k in range(wp.static(i + 1)):
+                            jjt[6 * i + k] += wp.cw_mul(column[i], column[k])
+                            jwjt[6 * i + k] += wp.cw_mul(weighted[i], column[k])
                 else:
-                    b11, b21, b22, b31, b32, b33 = add_linear(c1, c2, c3, w1, w2, w3, b11, b21, b22, b31, b32, b33)
+                    c1, c2, c3 = Wide(moved[0]), Wide(moved[1]), Wide(moved[2])
+                    w1, w2, w3 = wp.cw_mul(Wide(w), c1), wp.cw_mul(Wide(w), c2), wp.cw_mul(Wide(w), c3)
+                    a11 += wp.cw_mul(c1, c1)
+                    a21 += wp.cw_mul(c2, c1)
+                    a22 += wp.cw_mul(c2, c2)
+                    a31 += wp.cw_mul(c3, c1)
+                    a32 += wp.cw_mul(c3, c2)
+                    a33 += wp.cw_mul(c3, c3)
+                    b11 += wp.cw_mul(c1, w1)
+                    b21 += wp.cw_mul(c2, w1)
+                    b22 += wp.cw_mul(c2, w2)
+                    b31 += wp.cw_mul(c3, w1)
+                    b32 += wp.cw_mul(c3, w2)
+                    b33 += wp.cw_mul(c3, w3)
 
             if wp.static(pose):
-                s1, s2, s3, s4, s5, s6 = pose_step(
-                    a11, a21, a22, a31, a32, a33, a41, a42, a43, a44, a51, a52, a53, a54, a55,
-                    a61, a62, a63, a64, a65, a66,
-                    b11, b21, b22, b31, b32, b33, b41, b42, b43, b44, b51, b52, b53, b54, b55,
-                    b61, b62, b63, b64, b65, b66,
-                    no_xy, no_z, Wide(d1), Wide(d2), Wide(d3), Wide(d4), Wide(d5), Wide(d6),
-                )  # fmt: skip
+                along, about = pose_step(jjt, jwjt, dx, turn, unused)
             else:
-                s1, s2, s3 = point_step(
-                    a11, a21, a22, a31, a32, a33, b11, b21, b22, b31, b32, b33, Wide(d1), Wide(d2), Wide(d3)
-                )
+                along = point_step(a11, a21, a22, a31, a32, a33, b11, b21, b22, b31, b32, b33, dx)
             for j in range(arms.dof):
-                step = wp.cw_mul(ux[j], s1) + wp.cw_mul(uy[j], s2) + wp.cw_mul(uz[j], s3)
+                step = dot(wp.matrix_from_rows(linear[3 * j], linear[3 * j + 1], linear[3 * j + 2]), along)
                 if wp.static(pose):
-                    step += wp.cw_mul(vx[j], s4) + wp.cw_mul(vy[j], s5) + wp.cw_mul(vz[j], s6)
-                moved = q[j] + pull[j] + wp.cw_mul(weight[j], step)
-                q[j] = wp.min(wp.max(moved, Lane(arms.lower[arm, j])), Lane(arms.upper[arm, j]))
+                    step += dot(wp.matrix_from_rows(angular[3 * j], angular[3 * j + 1], angular[3 * j + 2]), about)
+                to = q[j] + pull[j] + wp.cw_mul(weight[j], step)
+                q[j] = wp.min(wp.max(to, Lane(arms.lower[arm, j])), Lane(arms.upper[arm, j]))
 
         for j in range(arms.dof):
             q_last[arm, group, j] = q[j]
             h_last[arm, group, j] = wp.cw_div(limit_n[j], limit_d[j])
             q_kept[arm, group, j] = kept[j]
+
+    @wp.func
+    def tip_error(arms: Arms, arm: int, group: int, targets: wp.array2d(dtype=Lane), q: wp.array3d(dtype=Lane)):
+        """Return distance² + (angle error in metres)² at angles q (N, G, D), and the angle error [rad]."""
+        p, x, y, z = at_base(arms.base[arm])
+        for j in range(arms.dof):
+            _axis, _place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], q[arm, group, j], p, x, y, z)
+        error = vector_of(targets, group, 0) - p
+        square = dot(error, error)
+        if wp.static(pose):
+            s, t, f = tool_frame(arms.tool_axis[arm], arms.tool_side[arm], x, y, z)
+            angle, _rotation = error_rotation(s, t, f, targets, group)
+            off = wp.cw_mul(targets[group, 15], angle)
+            return square + wp.cw_mul(off, off), angle
+        return square, Lane(zero)
+
+    @wp.func
+    def gravity_load(motion: int, axis: Vector, lever: Vector, mass: Lane):
+        """Return the derivative of mass times height by a joint with this axis."""
+        if motion < PRISMATIC:
+            return wp.cw_mul(axis[0], lever[1]) - wp.cw_mul(axis[1], lever[0])
+        if motion < FIXED:
+            return wp.cw_mul(mass, axis[2])
+        return Lane(zero)
+
+    @kernel
+    def static_torque(
+        arms: Arms,
+        targets: wp.array2d(dtype=Lane),
+        q_last: wp.array3d(dtype=Lane),
+        q_kept: wp.array3d(dtype=Lane),
+        reached: wp.array3d(dtype=Lane),
+        torque: wp.array3d(dtype=Lane),
+        angle_error: wp.array3d(dtype=Lane),
+    ):
+        """Keep the last posture if it is nearer, and compute its tip position and its torque against gravity.
+
+        q_last, q_kept: (N, G, D) [rad] or [m].  reached: (N, G, 3) [m].
+        torque: (N, G, D), +dV/dq [N m] or [N].  angle_error: (N, G, 1) [rad], 0 for points.
+        """
+        arm, group = wp.tid()
+        last, last_angle = tip_error(arms, arm, group, targets, q_last)
+        kept, kept_angle = tip_error(arms, arm, group, targets, q_kept)
+        is_kept = at_least(last, kept)
+        angle_error[arm, group, 0] = select(is_kept, kept_angle, last_angle)
+
+        axes, places = wp.zeros(MAX_JOINTS, dtype=Vector), wp.zeros(MAX_JOINTS, dtype=Vector)
+        moments = wp.zeros(MAX_JOINTS, dtype=Vector)  # mass times position of what joint j carries up to the next
+        p, x, y, z = at_base(arms.base[arm])
+        for j in range(arms.dof):
+            q = select(is_kept, q_kept[arm, group, j], q_last[arm, group, j])
+            q_kept[arm, group, j] = q
+            axis, place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], q, p, x, y, z)
+            axes[j] = axis
+            places[j] = place
+            com = arms.com[arm, j]
+            moments[j] = arms.mass[arm, j] * (place + com[0] * x + com[1] * y + com[2] * z)
+        for i in range(3):
+            reached[arm, group, i] = p[i]
+
+        mass_beyond = targets[group, 3]
+        beyond = scaled(mass_beyond, p + in_frame(arms.payload_center[arm], x, y, z))  # mass times position
+        for step in range(arms.dof):
+            j = arms.dof - 1 - step
+            mass_beyond += Lane(arms.mass[arm, j])
+            beyond += moments[j]
+            lever = beyond - scaled(mass_beyond, places[j])
+            torque[arm, group, j] = gravity * gravity_load(arms.motion[arm, j], axes[j], lever, mass_beyond)
 
     return SimpleNamespace(Lane=Lane, Arms=Arms, solve_ik=solve_ik, static_torque=static_torque)

@@ -10,7 +10,6 @@ from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError, TaskError
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.ik.ik import Postures, solve_postures
-from armwright.kinematics.ik.restarts import nearer_postures, random_starts
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.tasks.motions import Poses
@@ -83,10 +82,7 @@ def solve(
     for arm in given:
         if not isinstance(arm, (Arm, UrdfArm)):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise ArmError(f"expected arms, got {arm!r:.80}; try aw.read_urdf for a file, space.arm for a design")
-    if not 0.0 < tolerance < np.inf or not 0.0 < angle_tolerance <= np.pi:
-        raise SettingsError(
-            f"expected tolerance > 0 m and 0 < angle_tolerance <= π rad, got {tolerance} and {angle_tolerance}"
-        )
+    check_tolerances(tolerance, angle_tolerance)
     if restarts < 0:
         raise SettingsError(f"restarts = {restarts} is below 0")
     arrays = stack_arms([arm.arm if isinstance(arm, UrdfArm) else arm for arm in given])
@@ -100,6 +96,14 @@ def solve(
     return Solutions(q, *_errors(postures, poses))
 
 
+def check_tolerances(tolerance: float, angle_tolerance: float) -> None:
+    """Raise SettingsError for a distance [m] or an angle [rad] that is no tolerance."""
+    if not 0.0 < tolerance < np.inf or not 0.0 < angle_tolerance <= np.pi:
+        raise SettingsError(
+            f"expected tolerance > 0 m and 0 < angle_tolerance <= π rad, got {tolerance} and {angle_tolerance}"
+        )
+
+
 def _best_postures(arrays: ArmArrays, poses: Poses, restarts: int) -> Postures:
     """Return the first postures that reach their poses, else the nearest ones."""
 
@@ -107,14 +111,14 @@ def _best_postures(arrays: ArmArrays, poses: Poses, restarts: int) -> Postures:
         return solve_postures(arrays, some.position, initial_q=initial_q, target_arrays=some.arrays)
 
     best = solved(poses)
-    for start in random_starts(arrays, restarts):
+    for start in arrays.random_postures(restarts):
         missed = ~_errors(best, poses)[2]
         again = np.flatnonzero(missed.any(axis=0))  # of all arms, though some may have reached these poses
         if not len(again):
             break
         some = poses[again]
         before = Postures(*(values[:, again] for values in vars(best).values()))
-        nearer = nearer_postures(before, solved(some, start), some.position, some.arrays)
+        nearer = before.nearer(solved(some, start[:, None]), some.position, some.arrays.metres_per_radian)
         changed = missed[:, again]
         arm, pose = np.nonzero(changed)
         for name, values in vars(best).items():
@@ -124,7 +128,7 @@ def _best_postures(arrays: ArmArrays, poses: Poses, restarts: int) -> Postures:
 
 def _errors(postures: Postures, poses: Poses) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return (m, n) distances [m], angles [rad], and whether both are below their tolerances."""
-    distance = np.linalg.norm(postures.reached.astype(np.float64) - poses.position, axis=-1)
+    distance = postures.distance(poses.position)
     angle = postures.angle.astype(np.float64)
     return distance, angle, (distance < poses.tolerance) & (angle < poses.angle_tolerance)
 

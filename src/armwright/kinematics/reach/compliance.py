@@ -20,8 +20,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.arms.forward import Frames, forward_kinematics
-from armwright.kinematics.arms.jacobian import jacobian_of
+from armwright.kinematics.arms.forward import Frames, forward_kinematics, jacobian_of
 from armwright.kinematics.reach.reach_postures import ReachPostures
 from armwright.robot.arm import GRAVITY
 
@@ -54,7 +53,7 @@ def own_loads(arms: ArmArrays, frames: Frames) -> Loads:
     link_mass, end_mass = bodies.mass[:, None], bodies.end_mass[:, None]  # (N, 1, D)
     of_link = link_mass[..., None] * _in_world(frames, bodies.com)
     of_end = end_mass[..., None] * _in_world(frames, bodies.end_mass_position)
-    tool_com = frames.tip + (frames.rotation[:, :, -1] @ (tool.com - tool.tip)[:, None, :, None])[..., 0]
+    tool_com = frames.from_tip(tool.com - tool.tip)
     after = np.zeros((n, k, dof + 1)), np.zeros((n, k, dof + 1, 3))
     after[0][:, :, 1:-1], after[1][:, :, 1:-1] = (link_mass + end_mass)[:, :, 1:], (of_link + of_end)[:, :, 1:]
     after[0][:, :, -1], after[1][:, :, -1] = tool.mass[:, None], tool.mass[:, None, None] * tool_com
@@ -64,7 +63,7 @@ def own_loads(arms: ArmArrays, frames: Frames) -> Loads:
 
 def unit_payload(arms: ArmArrays, frames: Frames) -> Loads:
     """Return the mass of a payload of 1 kg, alone."""
-    center = frames.tip + (frames.rotation[:, :, -1] @ arms.payload_center.astype(np.float64)[:, None, :, None])[..., 0]
+    center = frames.from_tip(arms.payload_center)
     shape = frames.position.shape
     nothing = np.zeros((len(arms), 1, shape[2]))
     return Loads(nothing, np.zeros(shape), np.ones(shape[:3]), np.broadcast_to(center[:, :, None], shape))

@@ -1,6 +1,5 @@
 """Payloads that motors hold at rest, in known postures and over the reach of an arm."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +7,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.arms.forward import Frames, forward_kinematics
-from armwright.kinematics.reach.reach_postures import ReachPostures, postures_over_reach
-from armwright.robot.arm import GRAVITY, Arm
+from armwright.kinematics.reach.reach_postures import ReachPostures
+from armwright.robot.arm import GRAVITY
 from armwright.tasks.moments import MAX_MASS
 
 
@@ -44,26 +43,17 @@ def payload_limits(arms: ArmArrays, frames: Frames, torques: Array, peak: Array)
 
 def torques_by_payload(arms: ArmArrays, frames: Frames) -> Array:
     """Return the (N, K, D) torques that hold a payload, by its mass [N m/kg], or forces [N/kg]."""
-    center = frames.tip + (frames.rotation[:, :, -1] @ arms.payload_center.astype(np.float64)[:, None, :, None])[..., 0]
+    center = frames.from_tip(arms.payload_center)
     rises = np.cross(frames.axis, center[:, :, None] - frames.position)[..., 2]
     return GRAVITY * np.where(arms.prismatic[:, None], frames.axis[..., 2], rises)
 
 
-def payloads_over_reach(arm: Arm, fractions: Sequence[float] = (0.5, 1.0)) -> ReachPayloads:
-    """Return the payloads that an arm holds at fractions of its horizontal reach, with its safety factor.
+def held_payloads(postures: ReachPostures) -> ReachPayloads:
+    """Return the payloads that an arm with actuators holds in postures over its reach, with its safety factor.
 
     The least payload of all postures found is the one that the arm holds however it gets there. The payload is a point
     at the tip.
-
-    Args:
-        arm: An arm with actuators.
-        fractions: Of the reach, each above 0 and at most 1.
     """
-    return held_payloads(postures_over_reach(arm, fractions))
-
-
-def held_payloads(postures: ReachPostures) -> ReachPayloads:
-    """Return the payloads that an arm with actuators holds in postures over its reach, as `payloads_over_reach`."""
     drives = postures.arms.actuation
     assert drives is not None, "expected an arm with actuators"
     allowed = drives.peak / drives.safety_factor[:, None]

@@ -19,13 +19,12 @@ from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError
 from armwright.files import naming_write_errors, replace_file
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
-from armwright.kinematics.ik.solve import ANGLE_REACHED
+from armwright.kinematics.ik.solve import ANGLE_REACHED, check_tolerances
 from armwright.kinematics.reach.reachable_poses import (
     FoundPoses,
     PoseSearch,
     PostureConditions,
     PostureSamples,
-    Tolerances,
     sample_postures,
 )
 from armwright.robot.arm import Arm
@@ -169,17 +168,14 @@ def reach_map(
     """
     if not isinstance(arm, (Arm, UrdfArm)):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise ArmError(f"expected an arm, got {arm!r:.80}; try aw.read_urdf for a file, space.arm for a design")
-    if not 0.0 < tolerance < math.inf or not 0.0 < angle_tolerance <= math.pi:
-        raise SettingsError(
-            f"expected tolerance > 0 m and 0 < angle_tolerance <= π rad, got {tolerance} and {angle_tolerance}"
-        )
+    check_tolerances(tolerance, angle_tolerance)
     directions = _directions(axis, half_angle, n_directions)
     arrays = stack_arms([arm.arm if isinstance(arm, UrdfArm) else arm])
     conditions = _conditions(arrays, payload, clearance, obstacles)
     samples = sample_postures(arrays)
     low, high = _corners(box, samples)
     points, shape, spacing = _grid(low, high, spacing, len(directions))
-    search = PoseSearch(arrays, samples, points, directions, Tolerances(tolerance, angle_tolerance))
+    search = PoseSearch(arrays, samples, points, directions, tolerance, angle_tolerance)
     bare = search.find()
     usable = bare if conditions is None else search.find_usable(bare, conditions)
     coverage = _coverage(bare, arm, spacing**3)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.ik.ik import Postures, solve_postures
-from armwright.kinematics.ik.restarts import random_starts
 from armwright.robot.arm import Arm
 
 N_DIRECTIONS, N_STARTS = 16, 16  # horizontal directions, and random starts, that are searched for postures
@@ -35,7 +34,7 @@ class ReachPostures:
     def found(self) -> Iterator[tuple[Postures, NDArray[np.bool_]]]:
         """Yield the postures from each start, and (K,) whether the tip is where it should be."""
         for postures in self.starts:
-            yield postures, np.linalg.norm(postures.reached[0] - self.targets, axis=1) < NEAR * self.reach
+            yield postures, postures.distance(self.targets)[0] < NEAR * self.reach
 
     def by_fraction(self, values: Array) -> Array:
         """Return (F, W) of (K,) values: of the W directions at each fraction."""
@@ -47,7 +46,7 @@ def postures_over_reach(arm: Arm, fractions: Sequence[float]) -> ReachPostures:
     arms = stack_arms([arm])
     # From the first joint at the origin, so that far points keep their precision.
     arms = replace(arms, base=np.zeros_like(arms.base))
-    starts = [np.zeros((1, 1, arms.dof)), *random_starts(arms, N_STARTS)]
+    starts = [np.zeros((1, 1, arms.dof)), *arms.random_postures(N_STARTS)[:, :, None]]
     widest, stretched = _stretched(arms, FAR * arm.reach, starts)
     reach = np.hypot(widest[:, 0], widest[:, 1])
     counts = reach >= WIDE * reach.max()

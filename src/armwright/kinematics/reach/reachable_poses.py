@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import FIXED, MAX_JOINTS, ArmArrays
+from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.contact.clearance import clearances
@@ -31,14 +31,6 @@ RADIAN = 0.3  # of the reach: a distance that counts as much as one radian
 
 
 @dataclass(frozen=True)
-class Tolerances:
-    """Errors below which a pose is reached."""
-
-    position: float  # [m]
-    angle: float  # [rad]
-
-
-@dataclass(frozen=True)
 class PostureConditions:
     """What a posture has to satisfy besides its pose."""
 
@@ -47,6 +39,18 @@ class PostureConditions:
     clearance: float | None = None
     """Least distance of links and motors from each other and from obstacles [m]; None to ignore it."""
     obstacles: tuple[Obstacle, ...] = ()  # the obstacles
+
+    def hold(self, arm: ArmArrays, q: NDArray[np.floating], torque: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Return whether (K, D) postures of one arm with these holding torques [N m] or [N] satisfy them."""
+        satisfied = np.ones(len(q), dtype=np.bool_)
+        if self.payload is not None:
+            assert arm.actuation is not None, "expected an arm with actuators"
+            allowed = arm.actuation.peak / arm.actuation.safety_factor[:, None]  # (1, D)
+            satisfied &= (np.abs(torque) <= allowed).all(axis=1)
+        if self.clearance is not None:
+            own, free = clearances(arm, q[None].astype(np.float64), self.obstacles)
+            satisfied &= np.minimum(own[0], free[0]) >= self.clearance
+        return satisfied
 
 
 @dataclass(frozen=True)
@@ -69,9 +73,7 @@ class PostureSamples:
 
 def sample_postures(arm: ArmArrays, n: int = N_SAMPLES) -> PostureSamples:
     """Return random postures of one arm."""
-    shares = np.random.default_rng(0).uniform(size=(n, MAX_JOINTS))[:, : arm.dof]  # equal for padded arms
-    lower, upper = arm.lower[0].astype(np.float64), arm.upper[0].astype(np.float64)
-    q = np.where(arm.motion[0] == FIXED, 0.0, lower + shares * (upper - lower))
+    q = arm.random_postures(n)[:, 0]
     frames = forward_kinematics(arm, q[None])
     axis = frames.rotation[0, :, -1] @ arm.tool_axis[0].astype(np.float64)
     return PostureSamples(q, frames.tip[0], axis)
@@ -85,7 +87,8 @@ class PoseSearch:
     samples: PostureSamples  # random postures of it
     points: Array  # (P, 3) positions of the tip [m]
     directions: Array  # (M, 3) unit vectors along the tool's z axis
-    tolerances: Tolerances  # errors below which a pose is reached
+    tolerance: float  # distance below which a pose is reached [m]
+    angle_tolerance: float  # angle likewise [rad]
     n_starts: int = N_STARTS  # number of the nearest samples from which a pose is tried
 
     def find(self) -> FoundPoses:
@@ -135,7 +138,7 @@ class PoseSearch:
 
         def attempt(poses: NDArray[np.intp], start: Array, updates: int) -> None:
             there = None if directions is None else directions[poses % m]
-            solved, valid = _solve(self.arm, points[poses // m], there, start, updates, self.tolerances, conditions)
+            solved, valid = self._solve(points[poses // m], there, start, updates, conditions)
             q[poses[valid]], reached[poses[valid]] = solved[valid], True
 
         def spread(updates: int) -> None:
@@ -157,61 +160,43 @@ class PoseSearch:
         spread(UPDATES_IN_GAPS)
         return reached.reshape(-1, m), q.reshape(-1, m, self.arm.dof)
 
+    def _solve(
+        self,
+        points: Array,
+        directions: Array | None,
+        start: Array,
+        updates: int,
+        conditions: PostureConditions | None,
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return (K, D) postures at K poses [rad] or [m], and whether each is reached and satisfies the conditions."""
+        arm, k = self.arm, len(points)
+        q, valid = np.zeros((k, arm.dof)), np.zeros(k, dtype=np.bool_)
+        rotation = np.tile(np.eye(3), (k, 1, 1))
+        if directions is not None:
+            rotation[:, :, 2] = directions  # x and y do not count
+        limits = (np.full(k, self.tolerance), np.full(k, self.angle_tolerance))
+        poses = Poses(points, rotation, np.full(k, 0 if directions is None else AXIS), *limits)
+        load = 0.0 if conditions is None else conditions.payload or 0.0
 
-def _solve(
-    arm: ArmArrays,
-    points: Array,
-    directions: Array | None,
-    start: Array,
-    updates: int,
-    tolerances: Tolerances,
-    conditions: PostureConditions | None,
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return (K, D) postures at K poses [rad] or [m], and whether each is reached and satisfies the conditions."""
-    k = len(points)
-    q, valid = np.zeros((k, arm.dof)), np.zeros(k, dtype=np.bool_)
-    rotation = np.tile(np.eye(3), (k, 1, 1))
-    if directions is not None:
-        rotation[:, :, 2] = directions  # x and y do not count
-    limits = (np.full(k, tolerances.position), np.full(k, tolerances.angle))
-    poses = Poses(points, rotation, np.full(k, 0 if directions is None else AXIS), *limits)
-    load = 0.0 if conditions is None else conditions.payload or 0.0
+        def solve(chunk: slice) -> None:
+            some = poses[np.arange(k)[chunk]]
+            found = solve_postures(
+                arm,
+                some.position,
+                updates,
+                initial_q=start[None, chunk],
+                payload=np.full(len(some), load),
+                target_arrays=some.arrays,
+                precision=arm.precision,
+            )
+            q[chunk] = found.q[0]
+            there = (found.distance(some.position)[0] < self.tolerance) & (found.angle[0] < self.angle_tolerance)
+            if conditions is not None and there.any():
+                there[there] = conditions.hold(arm, found.q[0][there], found.torque[0][there])
+            valid[chunk] = there
 
-    def solve(chunk: slice) -> None:
-        some = poses[np.arange(k)[chunk]]
-        found = solve_postures(
-            arm,
-            some.position,
-            updates,
-            initial_q=start[None, chunk],
-            payload=np.full(len(some.position), load),
-            target_arrays=some.arrays,
-            precision=arm.precision,
-        )
-        q[chunk] = found.q[0]
-        distance = np.linalg.norm(found.reached[0].astype(np.float64) - some.position, axis=-1)
-        there = (distance < tolerances.position) & (found.angle[0] < tolerances.angle)
-        if conditions is not None and there.any():
-            there[there] = _satisfied(arm, found.q[0][there], found.torque[0][there], conditions)
-        valid[chunk] = there
-
-    in_chunks(solve, k, CHUNK, "cpu")
-    return q, valid
-
-
-def _satisfied(
-    arm: ArmArrays, q: NDArray[np.floating], torque: NDArray[np.floating], conditions: PostureConditions
-) -> NDArray[np.bool_]:
-    """Return whether (K, D) postures with these holding torques [N m] or [N] satisfy the conditions."""
-    satisfied = np.ones(len(q), dtype=np.bool_)
-    if conditions.payload is not None:
-        assert arm.actuation is not None, "expected an arm with actuators"
-        allowed = arm.actuation.peak / arm.actuation.safety_factor[:, None]  # (1, D)
-        satisfied &= (np.abs(torque) <= allowed).all(axis=1)
-    if conditions.clearance is not None:
-        own, free = clearances(arm, q[None].astype(np.float64), conditions.obstacles)
-        satisfied &= np.minimum(own[0], free[0]) >= conditions.clearance
-    return satisfied
+        in_chunks(solve, k, CHUNK, "cpu")
+        return q, valid
 
 
 def _nearest_samples(samples: PostureSamples, points: Array, directions: Array | None, n: int) -> NDArray[np.intp]:
