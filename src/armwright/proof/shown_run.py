@@ -238,7 +238,7 @@ def _designs(history: History, numbers: range) -> Arrays:
         shape = bodies.shape.astype(np.uint8)  # 255 without a body
         arrays |= {"body_shape": shape, "body_half": bodies.half, "body_centre": bodies.centre}
     if arms.columns is not None:
-        arrays["column_half"] = arms.columns.half
+        arrays["column_half"] = arms.columns
     return arrays
 
 
