@@ -1,9 +1,10 @@
-"""HTML of data sheets: nothing is run."""
+"""HTML of data sheets: two printed pages, nothing is cut, nothing is run."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
 from armwright.problem.facts import ASKED
 from armwright.robot.arm import Arm, Joint, uniform_link
@@ -50,6 +51,21 @@ def large_sheet() -> DataSheet:
 @pytest.fixture(scope="module", params=[small_sheet, large_sheet])
 def sheet(request: pytest.FixtureRequest) -> DataSheet:
     return request.param()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("paper", ["A4", "Letter"])
+def test_sheet_prints_on_two_pages(sheet: DataSheet, browser: Browser, tmp_path: Path, paper: str) -> None:
+    (tmp_path / "sheet.html").write_text(to_html(sheet), encoding="utf-8")
+    page = browser.new_page()
+    page.goto((tmp_path / "sheet.html").as_uri())
+    printed = page.pdf(format=paper, prefer_css_page_size=paper == "A4")
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": 703, "height": 1032})  # what the margins leave of A4, at 96 dpi
+    wide = page.evaluate("[...document.querySelectorAll('table')].filter(e => e.scrollWidth > 703).length")
+    page.close()
+    assert printed.count(b"/Type /Page\n") == 2
+    assert not wide, "tables are cut off"
 
 
 def test_same_sheet_gives_the_same_files(sheet: DataSheet, tmp_path: Path) -> None:

@@ -3,14 +3,15 @@
 import base64
 import html
 import io
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
 
 from armwright.pictures.style import RC
-from armwright.sheet import tables
+from armwright.sheet import tables as tables
 from armwright.sheet.drawings import draw_errors, draw_payload, draw_side, draw_top
 from armwright.sheet.record import DataSheet
 from armwright.sheet.tables import Table
@@ -28,43 +29,61 @@ th, td { padding: 0.15em 0.6em 0.15em 0; border-bottom: 1px solid #ddd; text-ali
 th { border-bottom-color: #111; } .left { text-align: left; } p, li { font-size: 0.85em; overflow-wrap: anywhere; }
 @page { size: A4; margin: 12mm; }
 @media print {
-  body { margin: 0; max-width: none; padding: 0; line-height: 1.25; } section { font-size: 7.5pt; }
+  body { margin: 0; max-width: none; padding: 0; line-height: 1.25; } section { font-size: var(--size); }
   section + section { break-before: page; } h1 { margin: 0; } h2 { margin: 0.8em 0 0.2em; break-after: avoid; }
   tr, img { break-inside: avoid; } .wide { overflow-x: visible; } .pair > * { flex-basis: 40%; }
   img { width: 100%; max-height: 80mm; } ul { margin: 0.2em 0; padding-left: 1.2em; } p { margin: 0.3em 0; }
 }
 """
+SIZES = (9.5, 9.0, 8.5, 8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0, 4.5, 4.0)  # of printed text [pt]; the largest that fits
+PAGE = 560.0  # lines of 1 pt on a page of A4
+WIDTH = 1150.0  # letters of 1 pt in a line
+DRAWN = 330.0  # lines of 1 pt that the drawings take
 
 
 def to_html(sheet: DataSheet) -> str:
-    """Return the data sheet as HTML, which prints on A4; the same sheet gives the same text."""
-    title, verdict = html.escape(f"Data sheet: {tables.title_of(sheet)}"), tables.verdict_of(sheet)
-    left, right = (
-        "".join(_table(make(sheet)) for make in makers)
-        for makers in ((tables.key_figures, tables.reach_table), (tables.link_table, tables.mass_table))
-    )
+    """Return the data sheet as HTML, which prints on two pages of A4; the same sheet gives the same text."""
+    title = html.escape(f"Data sheet: {tables.title_of(sheet)}")
+    verdict = tables.verdict_of(sheet)
+    left, right = (tables.key_figures, tables.reach_table), (tables.link_table, tables.mass_table)
+    columns = [[make(sheet) for make in makers] for makers in (left, right)]
     first = [
         f"<h1>{title}</h1>",
         f"<p>{html.escape(verdict)}</p>" if verdict else "",
-        _beside(left, right),
+        _beside(*("".join(map(_table, column)) for column in columns)),
         _beside(_picture(sheet, draw_side, 4.0, "side view"), _picture(sheet, draw_top, 4.0, "top view")),
         _beside(_picture(sheet, draw_payload, 2.5, "payload"), _picture(sheet, draw_errors, 2.5, "errors")),
     ]
+    joints, parts, changes = tables.joint_table(sheet), tables.parts_table(sheet), tables.sensitivity_table(sheet)
+    assumed = tuple(f"{about}: {text}." for about, text in sheet.assumptions.items())
+    bodies, sources = tables.body_lines(sheet), tables.source_lines(sheet)
     second = [
-        _table(tables.joint_table(sheet)),
-        _list(tables.body_lines(sheet)),
-        _table(tables.parts_table(sheet)),
-        _list(tables.source_lines(sheet)),
-        _table(tables.sensitivity_table(sheet)),
-        "<h2>What the values assume</h2>",
-        _list(tuple(f"{about}: {text}." for about, text in sheet.assumptions.items())),
+        *(_table(joints), _list(bodies), _table(parts), _list(sources), _table(changes)),
+        *("<h2>What the values assume</h2>", _list(assumed)),
     ]
-    pages = "\n".join(f"<section>\n{chr(10).join(filter(None, texts))}\n</section>" for texts in (first, second))
-    return (
+    sizes = (
+        min(_printed_size(column, (verdict,), PAGE - DRAWN, WIDTH / 2.0) for column in columns),
+        _printed_size((joints, parts, changes), (*bodies, *sources, *assumed, "", ""), PAGE, WIDTH),
+    )
+    pages = [
+        f'<section style="--size: {size}pt">\n{chr(10).join(filter(None, texts))}\n</section>'
+        for size, texts in zip(sizes, (first, second), strict=True)
+    ]
+    head = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>{STYLE}</style></head>\n'
-        f"<body>\n{pages}\n</body></html>\n"
+    )
+    return head + "<body>\n" + "\n".join(pages) + "\n</body></html>\n"
+
+
+def _printed_size(shown: Sequence[Table], texts: Sequence[str], lines: float, width: float) -> float:
+    """Return the largest size of text [pt] in which tables and paragraphs take at most `lines` lines of 1 pt."""
+    rows = [" ".join((*row, *row[:1])) for table in shown for row in (*table.rows, table.header, (table.note,), ("",))]
+    lengths = [len(text) for text in (*rows, *texts)]
+    return next(
+        (size for size in SIZES if sum(math.ceil((length + 1) * size / width) for length in lengths) * size <= lines),
+        SIZES[-1],
     )
 
 
@@ -92,8 +111,10 @@ def _table(table: Table) -> str:
 
 
 def _row(table: Table, cells: tuple[str, ...], tag: str) -> str:
-    aligned = [' class="left"' * (column in table.left) for column in range(len(cells))]
-    shown = (f"<{tag}{side}>{html.escape(cell)}</{tag}>" for side, cell in zip(aligned, cells, strict=True))
+    shown: list[str] = []
+    for column, cell in enumerate(cells):
+        aligned = ' class="left"' if column in table.left else ""
+        shown.append(f"<{tag}{aligned}>{html.escape(cell)}</{tag}>")
     return f"<tr>{''.join(shown)}</tr>"
 
 
