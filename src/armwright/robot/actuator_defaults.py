@@ -51,27 +51,20 @@ def default_values(
     """
     ratios = DEFAULTS[kind]
     gain = ratios.gain * torque if position_gain is None else position_gain
+    speed, voltage = (math.nan if value is None else value for value in (speed, voltage))
     values = {
         "rated_torque": ratios.continuous * torque,
         "coulomb_friction": ratios.coulomb * torque,
         "backlash": ratios.backlash,
         "joint_stiffness": ratios.joint_stiffness * torque,
         "position_gain": gain,
-    }
-    if ratios.damping is not None:
-        values["damping_gain"] = ratios.damping * gain
-    if speed is None:
-        return values
-    values |= {
+        "damping_gain": torque / speed if ratios.damping is None else ratios.damping * gain,
         "rotor_inertia": ratios.time_constant * torque / speed,
         "viscous_friction": ratios.viscous * torque / speed,
         "corner_speed": ratios.corner * speed,
+        "current": ratios.current * torque * speed / voltage,
     }
-    if ratios.damping is None:
-        values["damping_gain"] = torque / speed
-    if voltage is not None:
-        values["current"] = ratios.current * torque * speed / voltage
-    return values
+    return {name: value for name, value in values.items() if not math.isnan(value)}
 
 
 def default_shape(

@@ -108,6 +108,15 @@ def inertia_moments(link: Link) -> dict[str, str]:
     around = link.mass * link.radius**2 / 2.0
     across = around / 2.0 + link.mass * link.length**2 / 12.0
     tensor = inertia_tensor(link) if link.end_mass else np.diag([across, across, around])
+    return _moments(tensor)
+
+
+def tool_moments(arm: Arm) -> dict[str, str]:
+    """Return the moments of the tool about its centre of mass [kg m²], by their URDF names."""
+    return _moments(np.array(arm.tool.inertia))
+
+
+def _moments(tensor: Array) -> dict[str, str]:
     return {name: f"{tensor[place]:.17g}" for name, place in TENSOR_INDICES.items()}
 
 
@@ -132,11 +141,6 @@ def tip_rpy(arm: Arm) -> Vector:
     y = np.cross(z, arm.tool.side)
     y = y / np.linalg.norm(y)
     return rpy_from_rotation(np.column_stack([np.cross(y, z), y, z]))
-
-
-def tool_moments(arm: Arm) -> dict[str, str]:
-    """Return the moments of the tool about its centre of mass [kg m²], by their URDF names."""
-    return {name: f"{arm.tool.inertia[row][column]:.17g}" for name, (row, column) in TENSOR_INDICES.items()}
 
 
 def midpoint(link: Link) -> Vector:
