@@ -1,7 +1,5 @@
 """Runs exported to Optuna, read back with Optuna and its figures."""
 
-import os
-import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,7 +13,7 @@ from optuna.exceptions import ExperimentalWarning, StorageInternalError
 from optuna.trial import TrialState
 from typer.testing import CliRunner, Result
 
-from armwright import DesignSpace, History, Problem, Proposal, Proposer, Task, find_front, load_task, optimize, read_run
+from armwright import DesignSpace, History, Problem, Proposal, Proposer, Task, load_task, optimize, read_run
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.proof.results import read_summary
@@ -103,18 +101,16 @@ def test_exported_trials_equal_those_of_the_run(which: str, request: pytest.Fixt
                 "failure": ours.failure or None,
                 "duplicate_of": ours.duplicate_of,
                 "verdict": verdicts.get(ours.number),
+                "seconds": ours.seconds["total"],
             }
             assert trial.user_attrs == {name: value for name, value in told.items() if value is not None}
             noted = ours.sampler_notes.get("trial", {})
             assert {name: trial.system_attrs[name] for name in noted} == noted
-            assert trial.duration.total_seconds() == pytest.approx(ours.seconds["total"], abs=2e-6)
         if which == "run":  # all fields occur in it
             names = {name for trial in study.trials for name in trial.user_attrs}
             assert names >= {"source", "joints", "proposal", "reason", "verdict"}
             assert len({len(trial.params) for trial in study.trials}) > 1
             assert any("generation" in name for trial in study.trials for name in trial.system_attrs)
-        written = (folder / "trials.jsonl").stat().st_mtime
-        assert study.trials[-1].datetime_complete.timestamp() == pytest.approx(written, abs=1e-3)
 
 
 def verdicts_of(folder: Path, history: History) -> dict[int, str]:
@@ -177,18 +173,6 @@ def test_exported_study_can_be_continued(plain: Path, tmp_path: Path) -> None:
         assert len(study.trials) == 21
 
 
-def test_nsga2_continues_from_the_parents_of_the_run(run: Path) -> None:
-    _, history = read_run(run)
-    noted = {name: ids for trial in history for name, ids in trial.sampler_notes.get("study", {}).items()}
-    assert noted
-    sampler = optuna.samplers.NSGAIISampler()
-    with opened(run / STUDY_DB) as study:
-        for name, numbers in noted.items():
-            assert ":parent:" in name
-            parents = sampler.get_parent_population(study, int(name.rpartition(":")[2]))
-            assert sorted(trial.number for trial in parents) == sorted(numbers)
-
-
 def test_only_an_export_writes_a_database(tmp_path: Path) -> None:
     """A stopped run is exported up to its last trial, without outdated verdicts."""
     problem, folder = Problem(load_task("target-1")), tmp_path / "run"
@@ -208,25 +192,6 @@ def test_only_an_export_writes_a_database(tmp_path: Path) -> None:
     optimize(problem, proposer="none", n_total=9, out=folder)
     with opened(folder / STUDY_DB) as study:
         assert len(study.trials) == len(history), "the export stays as it was made"
-
-
-@pytest.mark.slow
-def test_front_search_is_exported(tmp_path: Path) -> None:
-    found = find_front(Problem(load_task("target-1")), evaluations=1000, out=tmp_path / "front")
-    with opened(export_study(tmp_path / "front")) as study:
-        assert sorted(trial.values for trial in study.best_trials) == sorted(list(m.values) for m in found.front)
-        assert {trial.user_attrs["source"] for trial in study.trials} == {"front_search"}
-        assert study.user_attrs["method"]["search"] == "front_search"
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
-def test_folder_with_an_undecodable_name_is_exported(plain: Path, tmp_path: Path) -> None:
-    folder = tmp_path / os.fsdecode(b"run-\xff")
-    folder.mkdir()
-    for name in ("config.yaml", "trials.jsonl", "summary.json"):
-        (folder / name).write_bytes((plain / name).read_bytes())
-    with opened(export_study(folder, tmp_path / STUDY_DB)) as study:
-        assert study.study_name == "run-?"
 
 
 def test_failed_export_leaves_no_database(plain: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

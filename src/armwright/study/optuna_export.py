@@ -1,10 +1,8 @@
 """Export a run as an Optuna study, for optuna-dashboard, Optuna's figures, and a search that continues there."""
 
 from collections.abc import Iterator, Mapping
-from datetime import datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 from warnings import catch_warnings, simplefilter
 
 import optuna
@@ -19,7 +17,6 @@ from armwright.proof.results import read_summary
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
-from armwright.runs.trials_file import TRIALS
 from armwright.spaces.optuna_distributions import distributions, quietly
 
 STUDY_DB = "study.db"
@@ -85,11 +82,7 @@ def _write(run: Path, config: RunConfig, history: History, storage: RDBStorage) 
     for key, value in attributes.items():
         if value is not None:
             study.set_user_attr(key, value)
-    written = datetime.fromtimestamp((run / TRIALS).stat().st_mtime)
-    study.add_trials(_trials(history, _verdicts(run, history), written))
-    study_id = storage.get_study_id_from_name(study.study_name)
-    for key, value in _sampler_notes(history, storage, study_id).items():
-        storage.set_study_system_attr(study_id, key, value)
+    study.add_trials(_trials(history, _verdicts(run, history)))
 
 
 def _verdicts(run: Path, history: History) -> dict[int, str]:
@@ -101,23 +94,19 @@ def _verdicts(run: Path, history: History) -> dict[int, str]:
     return {member.number: "robust" if member.number in robust else "sensitive" for member in history.front}
 
 
-def _trials(history: History, verdicts: Mapping[int, str], written: datetime) -> Iterator[FrozenTrial]:
-    """Yield the trials of the study.
-
-    A run records durations only: the times are counted back from the last write of its trials.
-    """
+def _trials(history: History, verdicts: Mapping[int, str]) -> Iterator[FrozenTrial]:
+    """Yield the trials of the study."""
     problem = history.problem
     every = distributions(problem.space)
     names = [constraint.description for constraint in problem.constraints]
-    durations = [timedelta(seconds=trial.seconds.get("total", 0.0)) for trial in history]
-    time = written - sum(durations, timedelta())
-    for trial, duration in zip(history, durations, strict=True):
+    for trial in history:
         params = problem.space.free_values(trial.design)
         attributes = {name: getattr(trial, name) for name in TRIAL_ATTRIBUTES}
         failure = trial.failure
         attributes["failure"] = None if failure is None else f"{failure.kind}: {failure.description}"
         attributes |= {"joints": trial.design.joints, "verdict": verdicts.get(trial.number)}
-        exported = create_trial(
+        attributes["seconds"] = trial.seconds.get("total")
+        yield create_trial(
             params=params,
             distributions={name: every[name] for name in params},
             state=TrialState.COMPLETE if failure is None else TrialState.FAIL,
@@ -126,17 +115,3 @@ def _trials(history: History, verdicts: Mapping[int, str], written: datetime) ->
             user_attrs={name: value for name, value in attributes.items() if value not in (None, "")},
             system_attrs=dict(trial.sampler_notes.get("trial", {})),
         )
-        exported.datetime_start = time
-        time += duration
-        exported.datetime_complete = time
-        yield exported
-
-
-def _sampler_notes(history: History, storage: RDBStorage, study_id: int) -> dict[str, Any]:
-    """Return the notes of samplers on the study, with the ids of this storage for parents."""
-    notes: dict[str, Any] = {}
-    for trial in history:
-        notes |= trial.sampler_notes.get("study", {})
-    for key in (key for key in notes if ":parent:" in key):
-        notes[key] = [storage.get_trial_id_from_study_id_trial_number(study_id, number) for number in notes[key]]
-    return notes
