@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.pareto import front_mask
@@ -24,7 +23,9 @@ def attribution_by_source(history: History) -> dict[str, Attribution]:
     """Return the attribution of each source, in the order of their first trials."""
     gains, on_front = hypervolume_gains(history), front_mask(history.masked_objectives)
     attribution: dict[str, Attribution] = {}
-    for source, mine in _masks_by_source(history).items():
+    sources = np.array([trial.source for trial in history], dtype=object)
+    for source in dict.fromkeys(sources.tolist()):
+        mine = sources == source
         gained = None if gains is None else float(gains[mine].sum())
         attribution[source] = Attribution(int(mine.sum()), int(on_front[mine].sum()), gained)
     return attribution
@@ -39,9 +40,3 @@ def hypervolume_gains(history: History) -> Array | None:
     if history.reference_point is None:
         return None
     return np.diff(history.hypervolumes, prepend=0.0)
-
-
-def _masks_by_source(history: History) -> dict[str, NDArray[np.bool_]]:
-    """Return for each source (N,) a mask of its trials, in the order of the first trials."""
-    sources = np.array([trial.source for trial in history], dtype=object)
-    return {source: sources == source for source in dict.fromkeys(sources.tolist())}

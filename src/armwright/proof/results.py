@@ -135,6 +135,8 @@ def summarize(
     seconds: Counter[str] = Counter()
     for trial in history:
         seconds.update(trial.seconds)
+    failed = Counter(trial.failure.kind for trial in history if trial.failure is not None)
+    screened = Counter(trial.screened.source for trial in history if trial.screened is not None)
     volume = {
         "final": float(curve[-1]) if len(curve) else None,
         "mean": float(curve.mean()) if len(curve) else None,
@@ -143,9 +145,9 @@ def summarize(
     return {
         **_common_record(history, config, history.masked_objectives, volume, verification),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
-        **_failure_record(history, config),
+        **({} if config.evaluator is None else {"failures": {kind: failed[kind] for kind in FAILURE_KINDS}}),
+        **({"screened_out": dict(screened)} if config.study.screen else {}),
         **({} if surrogate is None else {"surrogate": surrogate}),
-        **_screening_record(history, config),
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
         "proposer_bias": None if proposer is None else asdict(proposer_bias(history, proposer.name)),
@@ -182,14 +184,6 @@ def summarize_front(
     }
 
 
-def _failure_record(history: History, config: RunConfig) -> dict[str, Any]:
-    """Return the number of failed evaluations by kind; empty without a custom evaluator."""
-    if config.evaluator is None:
-        return {}
-    counts = Counter(trial.failure.kind for trial in history if trial.failure is not None)
-    return {"failures": {kind: counts[kind] for kind in FAILURE_KINDS}}
-
-
 def _common_record(
     history: History,
     config: RunConfig,
@@ -202,6 +196,7 @@ def _common_record(
     """Return what the summaries of studies and direct searches have in common; found: (N, M) values of the front."""
     reference = history.reference_point
     gap = None if reference is None else front_gap(history.problem, found, reference)
+    assumed = assumed_values(history.problem, [member.arm for member in history.front])
     return {
         "task": history.problem.task.name,
         "seed": config.seed,
@@ -212,22 +207,9 @@ def _common_record(
         "front_gap": None if gap is None else asdict(gap),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
-        **_assumed_record(history),
-        **_recommended_record(history, left),
+        **({"assumed": assumed} if assumed else {}),
+        **({"recommended": to_jsonable_python(recommend(history, left=left))} if history.problem.constraints else {}),
     }
-
-
-def _assumed_record(history: History) -> dict[str, Any]:
-    """Return the assumed values of actuators in use in the front; empty without any."""
-    assumed = assumed_values(history.problem, [member.arm for member in history.front])
-    return {"assumed": assumed} if assumed else {}
-
-
-def _recommended_record(history: History, left: Callable[[], float]) -> dict[str, Any]:
-    """Return the recommended designs; empty without constraints, which a cycle implies."""
-    if not history.problem.constraints:
-        return {}
-    return {"recommended": to_jsonable_python(recommend(history, left=left))}
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
@@ -266,13 +248,6 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
         "verdict": "robust" if verdict["robust"] else "sensitive",
         **{f"{name}_{case}": value for case in CASES for name, value in verdict[case].items()},
     }
-
-
-def _screening_record(history: History, config: RunConfig) -> dict[str, Any]:
-    """Return how many proposals were not evaluated, by proposer, if proposals were screened."""
-    if not config.study.screen:
-        return {}
-    return {"screened_out": dict(Counter(trial.screened.source for trial in history if trial.screened is not None))}
 
 
 def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:

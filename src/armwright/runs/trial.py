@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
-from pydantic import AfterValidator, ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
+from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
 
 from armwright.arrays import LARGEST_OBJECTIVE
 from armwright.files import replace_surrogates
@@ -24,21 +24,10 @@ LONGEST = 1e8  # [s]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
 
 
-def _within(limit: float) -> AfterValidator:
-    """Return the check of a number whose sums and products have to stay finite."""
-
-    def check(value: float) -> float:
-        if not abs(value) <= limit:
-            raise ValueError(f"expected a number within ±{limit:g}, got {value:g}")
-        return value
-
-    return AfterValidator(check)
-
-
-_Objectives = tuple[Annotated[float, _within(LARGEST_OBJECTIVE)], ...]
-_Violations = tuple[Annotated[float, _within(PENALTY)], ...]
-_Angles = tuple[tuple[Annotated[float, _within(LONGEST)], ...], ...]
-_Seconds = Mapping[str, Annotated[float, _within(LONGEST)]]
+_Objectives = tuple[Annotated[float, Field(ge=-LARGEST_OBJECTIVE, le=LARGEST_OBJECTIVE)], ...]
+_Violations = tuple[Annotated[float, Field(ge=-PENALTY, le=PENALTY)], ...]
+_Angles = tuple[tuple[Annotated[float, Field(ge=-LONGEST, le=LONGEST)], ...], ...]
+_Seconds = Mapping[str, Annotated[float, Field(ge=-LONGEST, le=LONGEST)]]
 
 _PARAMS: TypeAdapter[dict[str, ParameterValue]] = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True))
 

@@ -24,7 +24,6 @@ from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
 from armwright.study.record import Record
-from armwright.study.sampler_advice import sampler_advice
 from armwright.study.schedule import ReplaySchedule, Schedule
 from armwright.study.settings import EvaluationOptions
 from armwright.study.workers.dask_backend import DaskBackend
@@ -271,8 +270,9 @@ class Study:
         while (pending := self._pending.get(self._n_finished)) is not None and pending.is_evaluated:
             trial = self._pending.pop(self._n_finished).trial
             self._record.add(trial)
-            note = pending.note or sampler_advice(self._problem, self._method, self._record.trials)
-            self._report("finished", trial.number, trial.source, fault=trial.fault, note=note, reason=trial.reason)
+            self._report(
+                "finished", trial.number, trial.source, fault=trial.fault, note=pending.note, reason=trial.reason
+            )
 
     @property
     def _n_finished(self) -> int:
@@ -286,34 +286,25 @@ class Study:
         self._channel.report("asking", number)
         self._report("proposing", number, self._proposer.name, note=self._proposer.announce(number))
 
-    def _report(
-        self,
-        doing: Activity,
-        number: int,
-        source: str = "",
-        *,
-        fault: str | None = None,
-        note: str = "",
-        reason: str = "",
-    ) -> None:
+    def _report(self, doing: Activity, number: int, source: str = "", **about: Any) -> None:
+        """Report the progress; about: fault, note and reason."""
         if self._watch is None:
             return
+        record = self._record
         self._watch(
             Progress(
                 doing=doing,
                 number=number,
                 iteration=max(0, self._n_finished - self._method.n_init),
                 n_total=self._method.n_total,
-                hypervolume=self._record.front.hypervolume,
-                front_size=self._record.front.size,
+                hypervolume=record.front.hypervolume,
+                front_size=record.front.size,
                 source=source,
                 n_in_flight=self._schedule.n_in_flight,
-                fault=fault,
-                faults=self._record.faults.copy(),
-                failures=self._record.failures.copy(),
-                latest_failures=self._record.latest_failures.copy(),
-                note=note,
-                reason=reason,
+                faults=record.faults.copy(),
+                failures=record.failures.copy(),
+                latest_failures=record.latest_failures.copy(),
+                **about,
             )
         )
 

@@ -77,17 +77,12 @@ def check_settings(problem: Problem, method: Method, evaluation: EvaluationOptio
         raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
     for design in method.initial_designs:
         problem.space.design(design)
-    _check_timeout(problem, evaluation.timeout)
+    if evaluation.timeout is not None:
+        if not 0.0 < evaluation.timeout < math.inf:
+            raise SettingsError(f"evaluation_timeout: expected seconds > 0, got {evaluation.timeout!r}")
+        if problem.evaluator is None:
+            raise SettingsError("evaluation_timeout ends custom evaluators; without --evaluator leave it out")
+        if sys.platform == "win32":
+            raise SettingsError("evaluation_timeout needs Linux or macOS; leave it out")
     if evaluation.workers is not None and method.in_flight is not None:
         raise SettingsError("in_flight does not go with --workers, which evaluate while a question is asked anyway")
-
-
-def _check_timeout(problem: Problem, timeout: float | None) -> None:
-    if timeout is None:
-        return
-    if not 0.0 < timeout < math.inf:
-        raise SettingsError(f"evaluation_timeout: expected seconds > 0, got {timeout!r}")
-    if problem.evaluator is None:
-        raise SettingsError("evaluation_timeout ends custom evaluators; without --evaluator leave it out")
-    if sys.platform == "win32":
-        raise SettingsError("evaluation_timeout needs Linux or macOS; leave it out")
