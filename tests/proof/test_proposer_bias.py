@@ -8,7 +8,6 @@ from armwright.problem.problem import Problem
 from armwright.proof.proposer_bias import are_round, proposer_bias
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
-from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
 from armwright.tasks.catalogue import load_task, random_task
 
@@ -73,14 +72,6 @@ def test_equal_neighbours_are_counted_over_all_designs(joints: tuple[str, ...], 
     found = proposer_bias(history([("rules", design(joints=each)) for each in joints]), "rules")
     assert found.proposer is not None
     assert found.proposer.equal_neighbours == share
-
-
-def test_single_joint_has_no_neighbours() -> None:
-    single = Problem(load_task("target-2"), DesignSpace(joints=1))
-    past = History(single, [FinishedTrial(0, "rules", single.space.sample(1, 0)[0], (1.0, 2.0))], 0)
-    found = proposer_bias(past, "rules").proposer
-    assert found is not None
-    assert found.equal_neighbours is None
 
 
 def test_uniform_designs_have_no_bias() -> None:

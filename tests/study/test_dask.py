@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -11,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 import armwright as aw
 from armwright.exceptions import ClusterError, EvaluatorError, SettingsError, StoppedError
@@ -31,7 +29,7 @@ from tests.support.dask_processes import (
     descendants,
     wait_until,
 )
-from tests.torture.short import n_lines, trials
+from tests.torture.short import trials
 
 PAPER = aw.Problem(aw.load_task("target-1"))
 QUANTITIES = ("position_error", "torque", "collision", "path_error", "uncovered_fraction")
@@ -277,17 +275,6 @@ def test_worker_evaluator_exception_has_its_traceback_and_design(
 
 
 @pytest.mark.slow
-def test_command_line_shows_the_evaluator_traceback(tmp_path: Path, bench: Bench) -> None:
-    bench.ask("fail")
-    search = begin_search(bench, tmp_path / "run")
-    trace, cause, line = search.communicate()[1].rsplit("\n", 3)[:3]
-    assert search.returncode == 1
-    assert trace.startswith("Traceback (most recent call last):\n")
-    assert cause == "ValueError: no licence"
-    assert line.startswith("armwright: the first 5 evaluations all failed: ValueError: no licence (sim.py, line ")
-
-
-@pytest.mark.slow
 def test_hanging_evaluation_is_ended_on_a_worker(tmp_path: Path, shell: ShellCluster, bench: Bench) -> None:
     """The run is that of this process, apart from the design whose evaluation hung."""
     shell.only(2)
@@ -365,20 +352,3 @@ def two_cells(n_total: int) -> ExperimentPlan:
     method = {"label": "BBO", "proposer": "none", "sampler": "random"}
     content = {"name": "two", "tasks": ["random-3"], "seeds": 2, "n_init": 4, "n_total": n_total}
     return ExperimentPlan.model_validate({**content, "methods": {"bbo": method}})
-
-
-@pytest.mark.slow
-def test_ctrl_c_ends_an_experiment_and_its_workers(tmp_path: Path) -> None:
-    plan = two_cells(n_total=10_000)
-    cells = plan_cells(plan, tmp_path, tmp_path / "out")[0]
-    file = tmp_path / "two.yaml"
-    file.write_text(yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True)), encoding="utf-8")
-    process = start("experiment", file, "--workers", "2", "--out", tmp_path / "out")
-    wait_until(lambda: all(n_lines(cell.folder / "trials.jsonl") for cell in cells))
-    started = descendants(process.pid)
-    process.send_signal(signal.SIGINT)
-    said, complained = process.communicate()
-    assert (process.returncode, complained) == (130, "")
-    assert "Resume with:" in said
-    assert len(started) >= 3
-    assert all_ended(started)

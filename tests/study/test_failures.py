@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import optuna
 import pytest
 
 import armwright as aw
 from armwright.exceptions import EvaluatorError
 from armwright.llm.feedback import Feedback
 from armwright.search.samplers import SAMPLERS
-from armwright.study.optuna_export import export_study
 from armwright.study.workers import evaluation_process
 from tests.torture.short import armwright
 
@@ -96,13 +94,6 @@ def test_pages_figures_and_prompts_show_failures(run: Path) -> None:
     assert shown
     assert all(text.startswith("none, its evaluation failed (") for text in shown)
     assert all("inf" not in str(record["e_all"]) for record in feedback_of.values())
-
-
-@pytest.mark.slow
-def test_exported_study_has_failed_trials(run: Path) -> None:
-    trials = optuna.load_study(study_name=None, storage=f"sqlite:///{export_study(run)}").trials
-    failed = [trial.state == optuna.trial.TrialState.FAIL for trial in trials]
-    assert failed == aw.read_run(run)[1].failed.tolist() == ["failure" in trial.user_attrs for trial in trials]
 
 
 @pytest.mark.parametrize("sampler", [name for name in SAMPLERS if name != "gp"])
@@ -224,7 +215,7 @@ def test_timeout_ends_code_that_holds_the_lock_and_crashes_are_failures() -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scale", [-1e60, 5e-324, -0.0])
+@pytest.mark.parametrize("scale", [-1e60, 5e-324])
 def test_values_at_the_limits_of_numbers_are_modelled_and_drawn(tmp_path: Path, scale: float) -> None:
     """Warnings are errors."""
     measure = aw.evaluator("reach [m]", "height [m]")(lambda arm, task: (scale * arm.base[0], scale * arm.base[2]))

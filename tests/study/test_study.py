@@ -95,13 +95,6 @@ def test_failing_proposer_is_counted_and_flagged() -> None:
     assert (proposer["failures"], proposer["fallback_share"], proposer["flagged"]) == ({"timeout": 2}, 1.0, True)
 
 
-@pytest.mark.parametrize(("n_total", "flagged"), [(9, True), (10, False)])
-def test_run_with_more_than_a_tenth_of_fallbacks_is_flagged(n_total: int, flagged: bool) -> None:
-    run = optimize(PROBLEM, proposer=Listed(faulty=(4,)), n_init=2, n_step=1, n_total=n_total, verify=False)
-    assert [trial.source for trial in run.trials[2:]] == ["listed"] * 2 + ["bbo"] + ["listed"] * (n_total - 3)
-    assert run.summary["proposer"]["flagged"] is flagged
-
-
 class Repeating(Proposer):
     """Proposes one design again and again, and keeps how many finished trials it was shown each time."""
 

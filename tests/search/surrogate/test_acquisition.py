@@ -6,7 +6,7 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.pareto import front_mask
-from armwright.search.surrogate.acquisition import LONGEST_FRONT, Forecast, expected_gain, free_boxes
+from armwright.search.surrogate.acquisition import Forecast, expected_gain, free_boxes
 
 SAMPLES = 3000
 POINTS = {1: 5, 2: 15, 3: 10, 4: 8, 5: 6}
@@ -48,24 +48,6 @@ def test_boxes_are_disjoint_and_fill_what_the_front_leaves() -> None:
     assert size == pytest.approx(1.0 - volume(front, reference_point))
 
 
-def test_gain_of_an_objective_in_another_unit_is_scaled() -> None:
-    found, values = forecast(2), np.random.default_rng(1).uniform(0.2, 1.4, (9, 2))
-    scale = np.array([1000.0, 1.0])
-    scaled = Forecast(found.mean * scale, found.deviation * scale)
-    gain, other = (
-        expected_gain(f, v, r) for f, v, r in ((found, values, np.full(2, 1.5)), (scaled, values * scale, 1.5 * scale))
-    )
-    assert other == pytest.approx(1000.0 * gain)
-
-
 def test_without_a_front_the_whole_box_is_to_be_gained() -> None:
     sure = Forecast(np.array([[0.25, 0.5]]), np.full((1, 2), 1e-6))
     assert expected_gain(sure, np.empty((0, 2)), np.ones(2)) == pytest.approx(0.75 * 0.5)
-
-
-@pytest.mark.parametrize("n_objectives", sorted(LONGEST_FRONT))
-def test_long_fronts_keep_few_boxes(n_objectives: int) -> None:
-    values = np.abs(np.random.default_rng(0).standard_normal((500, n_objectives)))
-    values = 1.0 - values / np.linalg.norm(values, axis=1, keepdims=True)
-    gain = expected_gain(forecast(n_objectives), values, np.ones(n_objectives))
-    assert np.all(gain >= 0.0)

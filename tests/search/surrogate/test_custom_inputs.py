@@ -60,11 +60,6 @@ def test_parameters_of_joints_that_do_not_exist_are_zero() -> None:
     assert columns["oil_3 thick"].tolist() == [0.0, 1.0]
 
 
-def test_space_without_custom_parameters_has_no_custom_inputs() -> None:
-    space = aw.paper_space(3)
-    assert CustomInputs(space)(space.matrix(space.sample(4, 0))).shape == (4, 0)
-
-
 def test_objective_of_a_custom_parameter_is_predicted_with_the_physics() -> None:
     problem = aw.Problem(TASK, space_of({"kp": CUSTOM["kp"]}), evaluator=lag)
     designs = problem.space.sample(40, 1)

@@ -15,7 +15,7 @@ from armwright.cli.show_results import show_result
 from armwright.exceptions import SettingsError
 from armwright.proof.results import read_summary
 from armwright.runs.history import BBO, RANDOM, History
-from armwright.search.samplers import BlackBox, SamplerFactory, sampler_for, sampler_name
+from armwright.search.samplers import SamplerFactory, sampler_for, sampler_name
 from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
 from armwright.spaces.optuna_distributions import distributions
@@ -180,14 +180,6 @@ def test_choice_does_not_depend_on_the_unit_of_an_objective() -> None:
     assert np.array_equal(Surrogate(p).choose(known, 0), Surrogate(p).choose(scaled, 0))
 
 
-def test_choice_beats_random_designs() -> None:
-    p = problem()
-    known = observed(p, 15)
-    chosen = p.space.designs(Surrogate(p).choose(known, 0)[None])[0]
-    values = np.array(measure(p.arm(chosen), p.task))
-    assert not np.any(np.all(known.values <= values, axis=1))  # it is on the front at once
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("n_objectives", [1, 5])
 def test_one_to_five_objectives(n_objectives: int) -> None:
@@ -266,9 +258,3 @@ def test_failed_trials_of_a_script_are_not_learned_from() -> None:
     study.sampler = aw.surrogate_sampler(p)(0)
     trial = study.ask(space)
     assert p.space.design(trial.params)
-
-
-def test_first_trials_of_a_study_are_random() -> None:
-    p = problem()
-    box, plain = BlackBox(p.space, aw.surrogate_sampler(p), 0), BlackBox(p.space, "random", 0)
-    assert box.draw(0, BBO)[1] == plain.draw(0, BBO)[1]
