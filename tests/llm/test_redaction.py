@@ -1,10 +1,14 @@
 """API keys never reach output or files, even if the server echoes them."""
 
+import base64
 import json
 import os
+import re
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from unittest.mock import patch
 
@@ -41,6 +45,13 @@ def model_of(wire: str, server: ChatServer, **options: str) -> tuple[str, ...]:
     if model is None:
         return ("--model", "m", *wires.model_options(base_url=server.url, **options))
     return ("--model", model, *wires.model_options(**options))
+
+
+def words_of(file: Path) -> str:
+    """What a file says; of a page what it is about, not the libraries that it carries."""
+    text = file.read_bytes().decode("latin-1")
+    data = re.search(r'id="content">([^<]*)<', text)
+    return text if data is None else zlib.decompress(base64.b64decode(data[1])).decode("latin-1")
 
 
 def no_key_in(text: str) -> None:
@@ -101,6 +112,15 @@ def test_keys_are_not_logged_by_libraries(chat_server: ChatServer, in_folder: Pa
     assert "DEBUG] HTTP Re" in done.stderr
 
 
+@pytest.mark.slow
+def test_keys_are_not_on_the_page(chat_server: ChatServer, in_folder: Path) -> None:
+    chat_server.answer = parrot(chat_server)
+    study = [argument for argument in STUDY if argument != "--no-figures"]
+    done = run(chat_server, *study, *model_of("own server", chat_server))
+    assert "report.html" in {path.name for path in in_folder.rglob("*")}
+    check_for_keys(done, chat_server, in_folder, done.stdout)
+
+
 def check_for_keys(
     done: subprocess.CompletedProcess[str], chat_server: ChatServer, in_folder: Path, shown: str
 ) -> None:
@@ -112,7 +132,7 @@ def check_for_keys(
     files = [path for path in in_folder.rglob("*") if path.is_file()]
     assert {"config.yaml", "transcripts.jsonl", "trials.jsonl", "summary.json"} <= {path.name for path in files}
     for path in files:
-        no_key_in(path.read_bytes().decode("latin-1"))
+        no_key_in(words_of(path))
     no_key_in(done.stdout + done.stderr)
     assert "_API_KEY>" in (in_folder / "run" / "transcripts.jsonl").read_text(encoding="utf-8")
     assert "iteration 6/6" in shown
@@ -131,6 +151,28 @@ def test_keys_are_hidden_when_the_first_call_fails(
     assert done.stderr.startswith("armwright: openai-chat:gpt-4o: bad: <OPENAI_API_KEY> (HTTP 401)")
     assert len(done.stderr.splitlines()) == 1
     no_key_in(done.stdout + done.stderr)
+
+
+@pytest.mark.slow
+def test_keys_are_not_on_a_command_line(chat_server: ChatServer, in_folder: Path) -> None:
+    """As every user of the machine sees them: of the study, and of the server of its page."""
+    seen: set[str] = set()
+
+    def answer(_request: Request) -> Answer:
+        for command in Path("/proc").glob("[0-9]*/cmdline"):
+            with suppress(OSError):  # it ended
+                seen.add(command.read_bytes().replace(b"\0", b" ").decode(errors="replace"))
+        return json.dumps(GOOD_DESIGN)
+
+    chat_server.answer = answer
+    how = (*model_of("openai", chat_server, answer="one-step"), "--no-figures", "--live", "--out", "run")
+    done = run_alone(chat_server, "optimize", "target-1", *SHORT, *how)
+    assert done.returncode == 0, done.stderr
+    own = [command for command in seen if str(in_folder) in command or "optimize target-1" in command]
+    assert any("armwright report --live" in command for command in own)
+    assert any("armwright optimize" in command for command in own)
+    assert sent_key(chat_server) in KEYS
+    no_key_in(" ".join(seen))
 
 
 KEY = "sk-proj-abcdefghijklmnopqrstuvwxyz0123"

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import SettingsError
-from armwright.problem.evaluation import evaluate_arrays
 from armwright.problem.objectives import OBJECTIVES, QUANTITIES
 from armwright.problem.problem import Problem
-from armwright.proof.verification import verify
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.tolerance import TOLERANCE, perturbed
 from armwright.tasks.task import Task
@@ -170,14 +168,3 @@ def test_robust_values_are_the_worst_of_copies_that_keep_the_postures_of_the_arm
     found = robust.evaluate(rows)
     assert np.array_equal(found.values, np.max([one.values for one in outcomes], axis=0))
     assert np.array_equal(found.violations, np.max([one.violations for one in outcomes], axis=0))
-
-
-def test_other_starts_change_nothing_along_a_cycle() -> None:
-    problem = Problem(task(), DRIVEN)
-    designs = DRIVEN.sample(3, 0)
-    found = verify(problem, designs, problem.evaluate(designs).values, (1.0,))
-    assert np.array_equal(found.started, found.exact)
-    scene = problem.scenes[0]
-    arms = problem.arms(DRIVEN.matrix(designs), "float64")
-    started = evaluate_arrays(arms, scene, initial_q=np.full(arms.dof, 0.05))
-    assert np.array_equal(started.q, evaluate_arrays(arms, scene).q)
