@@ -69,8 +69,9 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
     @wp.func
     def translate(motion: int, place: Vector, displacement: Lane, axis: Vector):
         """Return the place of a joint: a prismatic joint is displaced along its axis."""
-        if wp.static(any_motion) and motion >= PRISMATIC and motion < FIXED:
-            return place + scaled(displacement, axis)
+        if wp.static(any_motion):  # noqa: SIM102 (Warp leaves out what is static alone)
+            if motion >= PRISMATIC and motion < FIXED:
+                return place + scaled(displacement, axis)
         return place
 
     @wp.func
@@ -93,8 +94,9 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
     @wp.func
     def margin(motion: int):
         """Return the distance from a limit within which the limit gradient H is constant."""
-        if wp.static(any_motion) and motion >= PRISMATIC:
-            return travel_margin
+        if wp.static(any_motion):  # noqa: SIM102
+            if motion >= PRISMATIC:
+                return travel_margin
         return angle_margin
 
     @wp.func
