@@ -178,9 +178,10 @@ def _repairs(given: Any, unit: str) -> Iterator[Any]:
     elif isinstance(given, list) and len(cast("list[Any]", given)) == 1:
         yield from cast("list[Any]", given)
     elif isinstance(given, (int, float)) and not isinstance(given, bool):
-        yield from ([given], [given, given], show(given))
+        yield from ([given], [given, given])
         if isinstance(given, float) and math.isfinite(given):
             yield round(given)
+        yield show(given)
 
 
 def _is_accepted(annotation: Any, value: Any) -> bool:

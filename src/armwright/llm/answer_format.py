@@ -32,13 +32,13 @@ _NAMES_ALONE = re.compile(
     r"\((?:(?:origin|link|joint|stroke|limit|direction|tube|motor)_\w++|\.\.\.|…|[,\s])++\)\s*[:=]", re.IGNORECASE
 )
 # Items of the lines that hold names; "-" stands for a module without such a value.
-_SIZE = r"(?<!\S)-(?!\S)|[\d.]{1,20} ?[x×] ?[\d.]*\d"
+_SIZE = re.compile(r"(?<!\S)-(?!\S)|[\d.]{1,20} ?[x×] ?[\d.]*\d")
 _WORDS = {
-    "mount": r"[A-Za-z]+(?:[-+][xy])?",
+    "mount": re.compile(r"[A-Za-z]+(?:[-+][xy])?"),
     "tube": _SIZE,
     "tubes": _SIZE,
-    "motors": r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*",
-    "directions": r"[-+] ?[xyzXYZ]",
+    "motors": re.compile(r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*"),
+    "directions": re.compile(r"[-+] ?[xyzXYZ]"),
 }
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
@@ -151,7 +151,7 @@ def _values(name: str, text: str) -> dict[str, Any] | None:
     if name == "joints":
         return _joints(text)
     if name in _WORDS:
-        words = re.findall(_WORDS[name], _spaced(re.sub(rf"{LISTS.get(name, name)}_\d+\s*[:=]", "", text)))
+        words = _WORDS[name].findall(_spaced(re.sub(rf"{LISTS.get(name, name)}_\d+\s*[:=]", "", text)))
         words = [word.replace("×", "x").replace(" ", "").rstrip(".") for word in words]
         words = words if name == "motors" else [word.lower() for word in words]
         return _listed(name, words) if name in LISTS else {name: words[0]} if len(words) == 1 else None
