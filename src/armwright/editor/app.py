@@ -131,7 +131,7 @@ class Editor:
     async def opened(self, request: Request) -> Response:
         files = self._files
         names = {"task": files.task.name, "space": files.space.name}
-        state = {"exist": files.exist, "choices": choices()}
+        state = {"exist": files.exist, "notes": asdict(files.notes), "choices": choices()}
         return _json({"files": names, **asdict(files.texts()), **state})
 
     async def job(self, request: Request) -> Response:
