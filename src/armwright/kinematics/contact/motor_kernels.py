@@ -79,16 +79,8 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                     r = arms.radius[arm, k]
                     if r > zero:
                         if links_between > 0:
-                            nearest = from_link(
-                                nearest,
-                                kind,
-                                size,
-                                place,
-                                frame,
-                                arms.starts[arm, target, k],
-                                arms.ends[arm, target, k],
-                                r,
-                            )
+                            start, end = arms.starts[arm, target, k], arms.ends[arm, target, k]
+                            nearest = from_link(nearest, kind, size, place, frame, start, end, r)
                         links_between += 1
                 links_before = int(0)  # noqa: RUF046, UP018
                 n_joints = int(0)  # noqa: RUF046, UP018
@@ -97,16 +89,8 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                     r = arms.radius[arm, k]
                     if r > zero:
                         if links_before > 0 and n_joints > 0:
-                            nearest = from_link(
-                                nearest,
-                                kind,
-                                size,
-                                place,
-                                frame,
-                                arms.starts[arm, target, k],
-                                arms.ends[arm, target, k],
-                                r,
-                            )
+                            first, last = arms.starts[arm, target, k], arms.ends[arm, target, k]
+                            nearest = from_link(nearest, kind, size, place, frame, first, last, r)
                         links_before += 1
                     if arms.motion[arm, k] < wp.static(FIXED):
                         n_joints += 1

@@ -18,10 +18,10 @@ import warp as wp
 from armwright.kinematics.arms.arm_arrays import MAX_JOINTS, PRISMATIC
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
+from armwright.kinematics.cycle.path_math import path_math
 
 UPDATES = 6  # at most, of a sample
 CONVERGED = 1e-7  # [m], [rad]
-DAMPING = 1e-6  # of the mean square singular value of J
 MAX_ROTATION = 0.3  # [rad] of any joint in one update
 HOPELESS, HOPELESS_ANGLE = 0.02, 0.2  # [m], [rad] off at the first sample: the rest gets one update a sample
 
@@ -29,105 +29,16 @@ HOPELESS, HOPELESS_ANGLE = 0.02, 0.2  # [m], [rad] off at the first sample: the 
 @cache
 def path_kernels() -> SimpleNamespace:
     """Return the kernels."""
-    base = frame_math("float64")
+    base, steps = frame_math("float64"), path_math()
     real, Vector3 = base.real, base.Vector3
     advance, axis_of = base.advance, base.axis_of
-    Row = wp.types.vector(length=6, dtype=real)
-    Square = wp.types.matrix(shape=(6, 6), dtype=real)
+    Path, Row, Square = steps.Path, steps.Row, steps.Square
+    tool_error, solve_damped = steps.tool_error, steps.solve_damped
     Columns = wp.types.matrix(shape=(MAX_JOINTS, 6), dtype=real)
     Values = wp.types.vector(length=MAX_JOINTS, dtype=real)
     hopeless, hopeless_angle = real(HOPELESS), real(HOPELESS_ANGLE)
-    zero, one, half = real(0.0), real(1.0), real(0.5)
+    zero, one = real(0.0), real(1.0)
     converged, max_rotation, tiny = real(CONVERGED), real(MAX_ROTATION), real(1e-18)
-    damping = real(DAMPING)
-
-    @wp.struct
-    class Path:
-        """Arms, and the samples of S poses in B blocks."""
-
-        dof: int
-        base: wp.array(dtype=Vector3)  # (N,)
-        motion: wp.array2d(dtype=int)  # (N, D)
-        lower: wp.array2d(dtype=real)  # (N, D)
-        upper: wp.array2d(dtype=real)  # (N, D)
-        offset: wp.array2d(dtype=Vector3)  # (N, D)
-        tool_axis: wp.array(dtype=Vector3)  # (N,)
-        tool_side: wp.array(dtype=Vector3)  # (N,)
-        first: wp.array(dtype=int)  # (B + 1,)
-        n_angular: wp.array(dtype=int)  # (S,)
-        position: wp.array(dtype=Vector3)  # (S,)
-        x: wp.array(dtype=Vector3)  # (S,) of the tool
-        y: wp.array(dtype=Vector3)  # (S,)
-        z: wp.array(dtype=Vector3)  # (S,)
-
-    @wp.func
-    def in_frame(v: Vector3, x: Vector3, y: Vector3, z: Vector3):
-        """Return the world components of a vector that is fixed in a frame."""
-        return v[0] * x + v[1] * y + v[2] * z
-
-    @wp.func
-    def rotation_error(kind: int, s: Vector3, t: Vector3, a: Vector3, x: Vector3, y: Vector3, z: Vector3):
-        """Return the rotation vector in the world from the tool s, t, a to the sample x, y, z [rad]."""
-        v = wp.cross(a, z)
-        cosine = wp.dot(a, z)
-        if kind > 2:
-            v = half * (wp.cross(s, x) + wp.cross(t, y) + v)
-            cosine = half * (wp.dot(s, x) + wp.dot(t, y) + cosine - one)
-        sine = wp.length(v)
-        return (wp.atan2(sine, cosine) / wp.max(sine, tiny)) * v, wp.atan2(sine, cosine)
-
-    @wp.func
-    def tool_error(path: Path, arm: int, sample: int, p: Vector3, x: Vector3, y: Vector3, z: Vector3):
-        """Return the vector from the tip to a sample, the rotation vector to it and its angle, and the tool's axes.
-
-        p: the tip.  x, y, z: the last local frame.
-        """
-        tool_z = in_frame(path.tool_axis[arm], x, y, z)
-        tool_x = in_frame(path.tool_side[arm], x, y, z)
-        tool_y = wp.cross(tool_z, tool_x)
-        turn, angle = Vector3(), real(0.0)
-        kind = path.n_angular[sample]
-        if kind > 0:
-            turn, angle = rotation_error(kind, tool_x, tool_y, tool_z, path.x[sample], path.y[sample], path.z[sample])
-        return path.position[sample] - p, turn, angle, tool_x, tool_y, tool_z
-
-    @wp.func
-    def solve_damped(square: Square, error: Row, kind: int):
-        """Return the solution of the damped system, by Cholesky's factor in the lower triangle.
-
-        kind: as `n_angular`. Rows of rotation that a target does not need become those of the identity.
-        """
-        trace = real(0.0)
-        for i in range(6):
-            trace += square[i, i]
-        for i in range(6):
-            square[i, i] += damping * trace / real(6.0) + tiny
-        if kind == 0:
-            square[3, 3] = one
-            square[4, 4] = one
-            error[3] = zero
-            error[4] = zero
-        if kind < 3:
-            square[5, 5] = one
-            error[5] = zero
-        for i in range(6):
-            for k in range(i):
-                inner = square[i, k]
-                for m in range(k):
-                    inner -= square[i, m] * square[k, m]
-                square[i, k] = inner / square[k, k]
-                error[i] -= square[i, k] * error[k]
-            inner = square[i, i]
-            for m in range(i):
-                inner -= square[i, m] * square[i, m]
-            square[i, i] = wp.sqrt(wp.max(inner, tiny))
-            error[i] = error[i] / square[i, i]
-        for step in range(6):
-            i = 5 - step
-            for k in range(i + 1, 6):
-                error[i] -= square[k, i] * error[k]
-            error[i] = error[i] / square[i, i]
-        return error
 
     @kernel
     def follow(
