@@ -14,7 +14,7 @@ def test_design_continues_its_run_and_starts_from_another(in_folder: Path) -> No
     done = armwright("design", "target-1", "--evaluations", "3000", "--seed", "4", "--no-figures")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    for words in ("of the best known hypervolume", "robust", "from other initial postures", "budget spent", "a toy"):
+    for words in ("of the best known hypervolume", "robust", "budget spent", "a toy"):
         assert words in done.stdout
     assert (in_folder / "runs" / "target-1-design-seed4" / "summary.json").is_file()
     more = armwright("design", "target-1", "--evaluations", "4000", "--seed", "4", "--no-figures", "--json")

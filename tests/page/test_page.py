@@ -26,6 +26,7 @@ from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from tests.fuzz.run_targets import a_run
 from tests.support.browser import Tab
+from tests.support.command_line import wait_until
 
 
 @pytest.fixture
@@ -69,7 +70,7 @@ def test_page_opens_offline_without_requests(run: Path, tab: Tab) -> None:
     assert not tab.page.locator("#repeat").is_visible()  # it was made by Python
     tab.page.set_viewport_size({"width": 390, "height": 800})
     tab.page.emulate_media(color_scheme="dark")
-    tab.page.wait_for_function("document.documentElement.scrollWidth <= 390")  # after plots have shrunk
+    wait_until(lambda: tab.ask("document.documentElement.scrollWidth") <= 390)  # after plots have shrunk
     background = tab.ask("getComputedStyle(document.body).backgroundColor")
     assert sum(map(int, re.findall(r"\d+", background)[:3])) < 200
     (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', (run / "report.html").read_text("utf-8"))

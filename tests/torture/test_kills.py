@@ -124,7 +124,7 @@ def search(_: Path, __: ChatServer) -> Scenario:
 
 
 EXPERIMENT: dict[str, Any] = {
-    "name": "small", "tasks": ["target-1"], "seeds": 2, "n_init": 4, "n_total": 30,
+    "name": "small", "tasks": ["target-1"], "seeds": 2, "n_init": 4, "n_total": 15,
     "methods": {
         "bbo": {"label": "BBO", "proposer": "none"},
         "rules": {"label": "BBO/rules", "proposer": "rules", "n_step": 3},

@@ -1,5 +1,6 @@
 """Commands that search designs: design, optimize."""
 
+import os
 import shlex
 import sys
 import time
@@ -279,7 +280,8 @@ def _draw(folder: Path, drawing: bool) -> list[Path]:
     with activity("drawing the page and the figures"), RunFolder(folder) as run:
         existing = sorted((folder / FIGURES).glob("*.png"))
         if not (folder / REPORT).is_file():
-            words = [Path(word).name if Path(word).is_absolute() else word for word in sys.argv[1:]]  # pages are shared
+            given = [os.fsencode(word).decode(errors="replace") for word in sys.argv[1:]]  # whatever the locale is
+            words = [Path(word).name if Path(word).is_absolute() else word for word in given]  # pages are shared
             run.write_text(COMMAND, redacted(shlex.join(["armwright", *words])) + "\n")
             write_report(folder)
         if existing or not drawing:

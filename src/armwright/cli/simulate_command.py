@@ -93,6 +93,10 @@ def _row(one: "SimulatedDesign") -> dict[str, Any]:
     }
 
 
+def _in_millimetres(error: float) -> str:
+    return f"{1e3 * error:.2f}"
+
+
 def _show(
     console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: Sequence[dict[str, Any]]
 ) -> None:
@@ -105,8 +109,8 @@ def _show(
         return
     columns = (
         number("#", "design", str), text("verdict", "verdict"), number("cycle [s]", "cycle_time", "{:.2f}".format),
-        number("energy [J]", "energy", "{:.1f}".format), number("tip error [m]", "tip_error", "{:.2g}".format),
-        number("without feed-forward", "droop", "{:.2g}".format),
+        number("energy [J]", "energy", "{:.1f}".format), number("tip error [mm]", "tip_error", _in_millimetres),
+        number("without feed-forward", "droop", _in_millimetres),
         number("peak torque / claimed", "torque_over_claimed", "{:.3f}".format),
     )  # fmt: skip
     print_table(console, columns, map(_row, results))

@@ -158,6 +158,12 @@ class ModelClient(LlmBackend):
             except (CallError, Interrupted) as fault:
                 fault.reply = spent = spent.plus(fault.reply)
                 others = modes[modes.index(mode) + 1 :]
+                if question is CHECK and not others and isinstance(fault, _FormError) and fault.reply.answer.strip():
+                    self._modes = (mode,)  # the model is there, and may understand a larger question
+                    self.note = (
+                        f"{self.model} answered the check in another form than its JSON schema; its proposals may fail"
+                    )
+                    return replace(spent, output_mode=mode)
                 if others and isinstance(fault, _FormError):
                     self._modes = others  # also for the next question, if this one has no requests left
                 elif not others or fault.reply.requests or not may_refuse_output(fault.kind, str(fault)):

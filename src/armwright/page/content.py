@@ -14,7 +14,7 @@ from pydantic_core import to_json
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.existing.compare_arms import read_existing_arms
-from armwright.files import MAX_DERIVED, check_no_links, read_text
+from armwright.files import MAX_DERIVED, check_no_links, read_text, replace_surrogates
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
 from armwright.page.reach_maps import PageReachMap, read_reach_maps
 from armwright.pictures.style import EXISTING, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
@@ -135,7 +135,7 @@ def _packed(
     head = {
         **shown.head,
         "files": files,
-        "folder": folder.resolve().name,
+        "folder": replace_surrogates(folder.resolve().name),
         "command": _command(folder),
         "calls_from": calls_from,
         "calls": [asdict(call) for call in calls[calls_from:]],

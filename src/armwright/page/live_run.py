@@ -8,6 +8,7 @@ from typing import Any
 from armwright.exceptions import ArmwrightError
 from armwright.existing.compare_arms import EXISTING_ARMS
 from armwright.extras import naming_extras
+from armwright.files import replace_surrogates
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
 from armwright.page.content import RunContent
 from armwright.proof.results import REPORT, SUMMARY
@@ -98,7 +99,7 @@ class LiveRun:
         n_init = 0 if study is None else study.n_init
         used = used_hints(calls)  # proposals, named PROPOSER-NUMBER, by hint
         return {
-            "name": self.folder.resolve().name,
+            "name": replace_surrogates(self.folder.resolve().name),
             "run": self._run,
             "doing": doing,
             "since": 0.0 if status is None else status.since,

@@ -5,7 +5,7 @@ import zlib
 from pathlib import Path
 
 from armwright.exceptions import RunFolderError
-from armwright.files import naming_write_errors, replace_file
+from armwright.files import naming_write_errors, replace_file, replace_surrogates
 from armwright.page.assembly import PageSource, assemble
 from armwright.page.content import RunContent, finished_content
 from armwright.proof.results import REPORT
@@ -18,7 +18,9 @@ def write_report(folder: str | Path) -> Path:
     folder = Path(folder)
     data = base64.b64encode(zlib.compress(finished_content(folder) or _content(folder), 6)).decode()
     holder = f'<script type="text/plain" id="content">{data}</script>'
-    page = assemble(PAGE, f"{folder.resolve().name}: armwright", connects=False, values={"data": holder})
+    page = assemble(
+        PAGE, f"{replace_surrogates(folder.resolve().name)}: armwright", connects=False, values={"data": holder}
+    )
     path = folder / REPORT
     with naming_write_errors(path, "; the trials are safe"):
         replace_file(path, page.encode())
