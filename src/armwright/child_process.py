@@ -10,12 +10,7 @@ def start_module(module: str, *arguments: object, **options: Any) -> subprocess.
     """Start `python -m MODULE` with the module path of this process, in a session of its own.
 
     It imports nothing from the working folder, which may hold somebody else's files (`-P`), and Ctrl-C in the terminal
-    does not reach it.
-
-    Args:
-        module: The module.
-        *arguments: Its arguments.
-        **options: Of `subprocess.Popen`; `env` holds variables besides those of this process.
+    does not reach it. The options are those of `subprocess.Popen`; `env` holds variables besides those of this process.
     """
     command = [sys.executable, "-P", "-m", module, *map(str, arguments)]
     path = os.pathsep.join(filter(None, sys.path))

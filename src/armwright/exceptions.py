@@ -93,8 +93,7 @@ class RunFolderError(FailureError):
 class ModelError(FailureError):
     """A language model that cannot be used.
 
-    Attributes:
-        final: The kind of fault if a retry in this session is useless (a wrong key, a spent quota); else None.
+    `final` is the kind of fault if a retry in this session is useless (a wrong key, a spent quota); else None.
     """
 
     def __init__(self, message: str, *, final: str | None = None) -> None:

@@ -55,9 +55,7 @@ def check_extra(extra: str, subject: str) -> None:
 def naming_extras(subject: str, extra: str | None = None) -> Generator[None]:
     """Convert failed imports inside the context to MissingExtraError; `subject` needs them.
 
-    Args:
-        subject: What needs them.
-        extra: What brings them; None for the extra whose package is missing, if it is one of those.
+    `extra` brings them; None for the extra whose package is missing, if it is one of those.
     """
     try:
         yield

@@ -71,10 +71,7 @@ def read_records(file: BinaryIO, path: Path) -> Iterator[bytes]:
 def replace_file(target: Path, content: bytes, mode: int = 0o666) -> None:
     """Replace a file atomically: readers, and a crash, leave the old or the new content. A link is replaced itself.
 
-    Args:
-        target: The file.
-        content: Its new content.
-        mode: Its permissions, less those of the umask, from the moment when it is created.
+    `mode` states its permissions, less those of the umask, from the moment when it is created.
     """
     part = new_part(target)
     try:

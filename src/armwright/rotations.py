@@ -63,14 +63,10 @@ def rotation_to_axis(axis: Sequence[float] | Array) -> Array:
 
 
 def cone_directions(axis: Sequence[float] | Array, half_angle: float, n: int) -> Array:
-    """Return (n, 3) unit vectors spread evenly over a cone, by Fibonacci's lattice.
+    """Return (n, 3) unit vectors spread evenly over a cone, by Fibonacci's lattice; a single one is the axis.
 
+    The axis (3,) has any length. Half the opening angle [rad] is π for the whole sphere.
     R. Swinbank, R. J. Purser: Fibonacci grids: a novel approach to global modelling, QJRMS 132(619), 2006.
-
-    Args:
-        axis: (3,) middle of the cone, of any length.
-        half_angle: Half its opening angle [rad]; π for the whole sphere.
-        n: Number of vectors; 1 for the axis alone.
     """
     if n == 1:
         return (np.array(axis) / np.linalg.norm(axis))[None]

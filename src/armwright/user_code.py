@@ -24,12 +24,9 @@ class ForkError(Exception):
 
 @contextmanager
 def contained() -> Generator[None]:
-    """Restore what user code changes in this process; a process that it forks ends at the end of the block.
+    """Restore what user code changes in this process; a process that it forks gets ForkError at the end of the block.
 
     The working folder, open standard streams, handlers of Ctrl-C and SIGTERM and the recursion limit are restored.
-
-    Raises:
-        ForkError: A forked process reached the end of the block.
     """
     process, limit = os.getpid(), sys.getrecursionlimit()
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}

@@ -29,13 +29,7 @@ _LETTERS = re.compile(r"[^A-Za-z0-9._-]+")
 
 
 def describe_fault(fault: ValidationError, schema: Any, data: Any) -> str:
-    """Return what is wrong first, on one line: `link[1]: expected a number [m], got "long"`.
-
-    Args:
-        fault: The refusal.
-        schema: The model that refused.
-        data: The whole value.
-    """
+    """Return what is wrong first in the whole `data`, on one line: `link[1]: expected a number [m], got "long"`."""
     found = [(field_path(error, schema), error) for error in fault.errors(include_url=False)[:_MOST_ALTERNATIVES]]
     start = found[0][0][:-1] if found[0][1]["type"] == "missing" else found[0][0]
     # Each alternative of a union has errors of its own: report that of the one that the value fits best. A key that is

@@ -107,11 +107,21 @@ def test_check_stays_within_the_budget(chat_server: ChatServer) -> None:
     assert len(chat_server.requests) == 2
 
 
-def test_model_without_json_in_any_mode_is_refused(chat_server: ChatServer) -> None:
+@pytest.mark.parametrize("output", ["auto", "native", "tool", "prompted"])
+def test_model_without_json_in_the_check_is_used_and_reported(
+    chat_server: ChatServer, tmp_path: Path, output: str
+) -> None:
     chat_server.answer = lambda request: "ready" if is_check(request) else designer(request)
-    with pytest.raises(ModelError, match="test-model: "):
-        run(llm_proposer(chat_server.url), None)
-    assert len(chat_server.requests) == 3
+    seen: list[Progress] = []
+    result = run(llm_proposer(chat_server.url, output=output), tmp_path / "run", n_total=1, seen=seen)
+    used = "prompted" if output == "auto" else output
+    told = (
+        "test-model answered the check in another form than its JSON schema; its proposals may fail; "
+        f"this run uses output {used}"
+    )
+    assert told in [progress.note for progress in seen]
+    assert (result.trials[4].source, result.summary["proposer"]["output_mode"]) == ("llm", used)
+    assert len(chat_server.requests) == (3 if output == "auto" else 1) + 2
 
 
 @pytest.mark.parametrize("output", ["tool", "native"])

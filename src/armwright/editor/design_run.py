@@ -17,11 +17,7 @@ PATIENCE = 20.0  # [s] in which an interrupted search ends by itself
 class DesignRun:
     """A search for designs. It goes on while the page is closed, and ends with the editor.
 
-    Args:
-        task: The task file.
-        space: The space file.
-        seconds: The time that the whole command takes [s].
-        folder: The run folder.
+    `seconds` is the time that the whole command takes [s].
     """
 
     def __init__(self, task: Path, space: Path, seconds: float, folder: Path) -> None:

@@ -34,11 +34,9 @@ class Texts:
 
 
 class EditedFiles:
-    """A task file and a space file. Those that do not exist yet begin with a template and are written by `save`.
+    """A task file and a space file (by default `default_space_file`).
 
-    Args:
-        task: The task file.
-        space: The space file; by default `default_space_file`.
+    Those that do not exist yet begin with a template and are written by `save`.
 
     Raises:
         TaskError: A name does not end in .yaml, or a file cannot be read.
@@ -73,11 +71,7 @@ class EditedFiles:
         return Texts(_note(self.task, self._seen[self.task]), _note(self.space, self._seen[self.space]))
 
     def save(self, texts: Texts, overwrite: bool = False) -> None:
-        """Write both files.
-
-        Args:
-            texts: Their content.
-            overwrite: Whether to replace files that have changed since they were last read.
+        """Write both files; `overwrite` replaces even files that have changed since they were last read.
 
         Raises:
             ChangedOnDiskError: A file has changed, and `overwrite` is False.

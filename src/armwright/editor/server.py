@@ -12,13 +12,9 @@ from armwright.page.live_server import LOOPBACK, serve_app
 
 
 def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0, opens_browser: bool = False) -> None:
-    """Serve the editor of two files until Ctrl-C, on this machine only.
+    """Serve the editor of two files until Ctrl-C, on this machine only; port 0 is any free one.
 
-    Args:
-        files: The task file and the space file.
-        tell: Called with the address, which holds the key, once it can be opened.
-        port: Port to listen on; 0 for any free one.
-        opens_browser: Whether to open the address in the user's browser.
+    `tell` is called with the address, which holds the key, once it can be opened.
 
     Raises:
         MissingExtraError: The extra `live` is not installed.

@@ -30,12 +30,9 @@ class Edit(BaseModel, frozen=True, extra="forbid"):
 
 
 def edit_text(text: str, edits: Sequence[Edit], where: str) -> str:
-    """Return the text with the edits applied, one after the other.
+    """Return the text with the edits applied, one after the other; messages call it `where`.
 
-    Args:
-        text: A YAML document with its keys in lines of their own, or an empty one.
-        edits: The edits.
-        where: Names the document in messages.
+    The text is a YAML document with its keys in lines of their own, or an empty one.
 
     Raises:
         TaskError: The text is no such document, or has no place for an edit.

@@ -60,11 +60,8 @@ class Placement:
 def placed(problem: Problem, described: UrdfArm, seed: int, mounting: Mounting | None = None) -> Placement:
     """Place an existing arm on a task as designs are: with its tool, travel of slides and safety factor.
 
-    Args:
-        problem: The task, and the space with the ranges for the base.
-        described: The arm, its base link at the origin.
-        seed: Of the search for the base.
-        mounting: Where the base link stands; None to search.
+    Its base link is given at the origin. The mounting says where it stands; None to search within the ranges of the
+    problem's space, with the seed.
 
     Raises:
         SettingsError: If the seed is negative, or the arm cannot be turned as the mounting demands.

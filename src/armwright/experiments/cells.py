@@ -54,13 +54,8 @@ def plan_cells(
 ) -> tuple[list[Cell], list[Cell]]:
     """Return the cells that can be run, by seed, task and method, and those that cannot.
 
-    Args:
-        plan: The experiment.
-        folder: Folder of the files that the experiment names.
-        out: Folder of the experiment's results.
-        methods: The only methods; empty for all.
-        tasks: The only tasks; empty for all.
-        seeds: The only seeds; empty for all.
+    The files that the experiment names are in `folder`; its results go to `out`. Empty methods, tasks or seeds stand
+    for all.
     """
     chosen_methods = _chosen("method", methods, list(plan.methods), plan.name)
     chosen_tasks = _chosen("task", tasks, plan.task_list, plan.name)

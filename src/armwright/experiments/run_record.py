@@ -121,12 +121,7 @@ def shares_by_source(runs: Sequence[RunSummary]) -> dict[str, dict[str, float]]:
 
 
 def read_run_summary(folder: Path, method: str | None = None) -> RunSummary:
-    """Read a finished run.
-
-    Args:
-        folder: The run folder.
-        method: Name of its method; by default a description of its settings.
-    """
+    """Read a finished run; the name of its method is by default a description of its settings."""
     config, summary = read_config(folder), read_summary(folder)
     if summary is None:
         raise RunFolderError(f"{folder} is not finished; repeat the command that started it")

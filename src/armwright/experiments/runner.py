@@ -120,12 +120,8 @@ def _check_tasks(cells: Sequence[Cell], notify: Callable[[str], None]) -> None:
 def run_cells(cells: Sequence[Cell], workers: Workers | None, notify: Callable[[str], None]) -> Iterator[CellOutcome]:
     """Run cells, and return the outcome of each as it ends.
 
-    A cell whose worker is lost is run again by another worker, which resumes from its last finished trial.
-
-    Args:
-        cells: The cells to run.
-        workers: The workers; None to run the cells one after another in this process.
-        notify: Called with messages about the workers for the user.
+    Without workers, they run one after another in this process. A cell whose worker is lost is run again by another
+    worker, which resumes from its last finished trial. `notify` is called with messages about the workers for the user.
 
     Raises:
         ClusterError: The workers did not start, or the scheduler was lost.

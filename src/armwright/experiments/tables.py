@@ -68,9 +68,8 @@ class Table:
 def write_tables(place: Path, comparison: Comparison, title: str, notes: Sequence[str] = ()) -> list[Path]:
     """Write table.md and a CSV file of each table; return the paths, table.md first.
 
-    Only runs.csv holds measured times and folders: equal runs give equal bytes in all other files.
-
-    notes: further remarks, such as missing cells.
+    Only runs.csv holds measured times and folders: equal runs give equal bytes in all other files. The notes are
+    further remarks, such as missing cells.
     """
     files = {"table.md": markdown(comparison, title, notes)}
     files |= {f"{table.name}.csv": to_csv(table.records) for table in tables(comparison) if table.name}

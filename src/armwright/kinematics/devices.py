@@ -109,13 +109,9 @@ class Loaded:
         return made
 
     def launch(self, name: str, dim: tuple[int, ...], *inputs: Any, outputs: Sequence[NDArray[Any]] = ()) -> None:
-        """Run a kernel.
+        """Run a kernel with `dim` threads and these inputs, of which numpy arrays are put on the device.
 
-        Args:
-            name: The name of the kernel.
-            dim: The numbers of its threads.
-            inputs: Its arguments, of which numpy arrays are put on the device.
-            outputs: Contiguous arrays in the precision of its last arguments, to be filled with them.
+        outputs: contiguous arrays in the precision of its last arguments, to be filled with them.
         """
         kernel = getattr(self.kernels, name)
         arguments = zip((*inputs, *outputs), kernel.adj.args, strict=True)
@@ -133,10 +129,8 @@ class Loaded:
 def load_kernels(name: str, device: Device, *variant: Hashable) -> Loaded:
     """Return one variant of kernels, compiled and loaded on a device, so that threads only launch.
 
-    Args:
-        name: A module of this package, such as `ik.ik_kernels`; its function of the same name makes the variant.
-        device: Where they run.
-        variant: The arguments of that function.
+    name: a module of this package, such as `ik.ik_kernels`; its function of the same name makes the variant from its
+    arguments, `variant`.
     """
     with _loading:
         return _loaded(name, device, *variant)

@@ -111,11 +111,7 @@ def per_joint(space: DesignSpace) -> dict[str, bool]:
 def response_schema(title: str, fields: Mapping[str, Any], of: str, options: PromptOptions) -> dict[str, Any]:
     """Return the JSON schema of a whole answer, with the model's analysis first if there is no call before it.
 
-    Args:
-        title: Name of the schema.
-        fields: Schemas of the values.
-        of: What the reason is the reason of.
-        options: Form of the answer.
+    `fields` are the schemas of the values; `of` is what the reason is the reason of.
     """
     reason = {"type": "string", "description": f"the main reason for {of}, in one sentence"}
     fields = {**fields, "reason": reason}

@@ -62,22 +62,15 @@ def _names(custom: Collection[str]) -> re.Pattern[str]:
 
 
 def module_lists(names: Collection[str]) -> dict[str, str]:
-    """Return the lists of a space besides joints and links, each with the prefix of its parameters.
-
-    Args:
-        names: of the space's parameters.
-    """
+    """Return the lists of a space by the names of its parameters, without joints and links, each with its prefix."""
     return {group: kind for group, kind in LISTS.items() if group not in ("joints", "links") and f"{kind}_1" in names}
 
 
 def design_in_lines(text: str, custom: Mapping[str, bool] = NO_CUSTOM) -> tuple[int, dict[str, Any]]:
     """Return the position of the last design or -1, and its parameters.
 
-    A design begins with its ORIGIN, so that an unfinished one takes no values from another.
-
-    Args:
-        text: an answer.
-        custom: whether each custom parameter has a value per joint.
+    A design begins with its ORIGIN, so that an unfinished one takes no values from another. `custom` says of each
+    custom parameter whether it has a value per joint.
     """
     design: dict[str, Any] = {}
     last = -1
@@ -100,9 +93,7 @@ def design_in_lines(text: str, custom: Mapping[str, bool] = NO_CUSTOM) -> tuple[
 def expand_lists(content: Mapping[str, Any], custom: Mapping[str, bool] = NO_CUSTOM) -> dict[str, Any]:
     """Return an object's values by parameter; groups may be lists or text, as in "origin": [0, 0.1, 0].
 
-    Args:
-        content: the object.
-        custom: whether each custom parameter has a value per joint.
+    `custom` says of each custom parameter whether it has a value per joint.
     """
     lists = {name for name, per_joint in custom.items() if per_joint}
     values: dict[str, Any] = {}

@@ -21,8 +21,7 @@ Amount = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 class Question:
     """A question."""
 
-    # id of the proposal it is for, made of the source and the trial's number; empty for a check
-    proposal: Annotated[str, Field(pattern=r"^(.*-\d{1,9})?$")]
+    proposal: Annotated[str, Field(pattern=r"^(.*-\d{1,9})?$")]  # its id: source and trial's number; empty for a check
     # `check` (is the model available), `reasoning` (the free answer), `parameters` (that answer as values), `answer`
     # (both at once) or `draft` (a task and a space)
     step: str
@@ -74,8 +73,7 @@ class OutputFormat:
     """The form of an answer that is not free text."""
 
     schema: Mapping[str, Any]  # JSON schema
-    # turns an answer, as JSON or as text, into the text to record; UsageError refuses it
-    read: Callable[[Mapping[str, Any] | str], str]
+    read: Callable[[Mapping[str, Any] | str], str]  # turns an answer into the text to record; UsageError refuses it
 
 
 # A tiny question, so that a wrong name, key or address is reported before any work is done. Its structured answer shows
@@ -125,11 +123,8 @@ class LlmBackend:
     ) -> Reply:
         """Return the answer, free text by default; raises CallError if there is none.
 
-        Args:
-            question: What is asked.
-            output: Form of the answer. Its refusals are sent back to the model.
-            most_requests: Limit of requests, those after invalid answers included; None for no limit.
-            earlier: Turns of the conversation that the question continues; None for a question on its own.
+        Refusals by `output` go back to the model. `most_requests` includes those after invalid answers; None for no
+        limit. `earlier` are the turns of the conversation that the question continues; None for a question on its own.
         """
         raise NotImplementedError
 

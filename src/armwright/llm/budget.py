@@ -30,11 +30,8 @@ class CallBudget:
     def reserved(self, calls: Callable[[], Sequence[Call]], over: threading.Event) -> Generator[int | None]:
         """Reserve what a prompt may cost and return its number of requests; None if there is no limit.
 
-        Waits while the rest is reserved for others, until they have returned or the session is over.
-
-        Args:
-            calls: Returns the calls so far, earlier sessions included.
-            over: Set once the session is over.
+        Waits while the rest is reserved for others, until they have returned or the session is `over`. `calls` returns
+        the calls so far, earlier sessions included.
 
         Raises:
             ProposalError: The budget is used up, or the session is over.
@@ -54,11 +51,7 @@ class CallBudget:
                 self._change.notify_all()
 
     def _left(self, calls: Sequence[Call]) -> int | None:
-        """Return the requests left for the next question; None if there is no limit.
-
-        Raises:
-            ProposalError: Nothing would be left even if the questions in flight needed nothing.
-        """
+        """Return the requests left for the next question, None without a limit; ProposalError if a limit is used up."""
         limits: list[int] = []
         if self.max_cost is not None:
             limits.append(self._affordable(self.max_cost, calls))

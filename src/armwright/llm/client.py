@@ -100,9 +100,6 @@ class ModelClient(LlmBackend):
 
     With `output: auto`, hosted models receive the schema as a tool and other servers as a native response format. If
     the server refuses or ignores that, the first question tries the other modes; the one that works is kept.
-
-    Args:
-        options: The model and how it is called.
     """
 
     def __init__(self, options: ModelOptions) -> None:
@@ -160,9 +157,8 @@ class ModelClient(LlmBackend):
                 others = modes[modes.index(mode) + 1 :]
                 if question is CHECK and not others and isinstance(fault, _FormError) and fault.reply.answer.strip():
                     self._modes = (mode,)  # the model is there, and may understand a larger question
-                    self.note = (
-                        f"{self.model} answered the check in another form than its JSON schema; its proposals may fail"
-                    )
+                    form = "in another form than its JSON schema; its proposals may fail"
+                    self.note = f"{self.model} answered the check {form}; this run uses output {mode}"
                     return replace(spent, output_mode=mode)
                 if others and isinstance(fault, _FormError):
                     self._modes = others  # also for the next question, if this one has no requests left

@@ -38,9 +38,7 @@ def configuration_path() -> Path:
 def load_model_options(source: str | None = None, **direct: Any) -> ModelOptions:
     """Return the options of `--model-options`, overridden by single options of the command line.
 
-    Args:
-        source: A YAML file, or a mapping in place ("{temperature: 0}").
-        **direct: Fields of `ModelOptions`; None if not given.
+    The source is a YAML file, or a mapping in place ("{temperature: 0}"). `direct` fields are None if not given.
 
     Raises:
         SettingsError: The file cannot be read, or a key or a value is not valid.

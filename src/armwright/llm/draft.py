@@ -96,13 +96,7 @@ class Draft:
 
 
 class Drafter(LlmSession):
-    """Ask a language model for drafts.
-
-    Args:
-        configured: The model, and its budget for one draft.
-        out: Folder of the files; None to write nothing.
-        force: Replace files of the same name; if false, the model is asked for another name.
-    """
+    """Ask a language model for drafts, with a budget for each; `out` and `force` are as in `draft`."""
 
     def __init__(self, configured: ConfiguredModel, out: Path | None = None, force: bool = False) -> None:
         from armwright.llm.client import ModelClient
@@ -136,11 +130,7 @@ class Drafter(LlmSession):
         return [call for call in self._transcript.calls if call.proposal == self._identity]
 
     def draft(self, description: str) -> Draft:
-        """Return the draft of a description, written if there is a folder.
-
-        Raises:
-            ModelError: No valid draft came.
-        """
+        """Return the draft of a description, written if there is a folder; ModelError if no valid one came."""
         n_drafts = len({call.proposal for call in self._transcript.calls})
         self._identity = f"draft-{n_drafts + 1:04d}"
         question = Question(self._identity, "draft", draft_prompt(description))

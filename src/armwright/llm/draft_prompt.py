@@ -31,11 +31,7 @@ class DraftAnswer(BaseModel):
 
 
 def draft_prompt(description: str) -> str:
-    """Return the question for a description of what the arm has to do.
-
-    Raises:
-        SettingsError: The description is empty or too long.
-    """
+    """Return the question for a description of what the arm has to do; SettingsError if it is empty or too long."""
     shown = end_of(description.strip(), len(description))
     if not shown.strip():
         raise SettingsError('the description is empty; try armwright draft "reach the corners of a 0.5 m cube"')

@@ -68,8 +68,6 @@ class Feedback:
         others: trial numbers of other designs, in the order of the run.
         n_others: number of designs that `others` were drawn from.
         latest: trial numbers of the latest designs of the proposer, in the order of the run.
-        name: of the proposer.
-        digits: decimals of all numbers.
     """
 
     def __init__(self, history: History, seed: int, name: str = "") -> None:
@@ -126,10 +124,7 @@ class Feedback:
 def design_lines(history: History, numbers: Sequence[int], name: str) -> list[Record]:
     """Return the parameters, objectives and hypervolume gained of designs, without their postures.
 
-    Args:
-        history: the finished trials.
-        numbers: of the trials.
-        name: of the proposer, whose designs are marked as its own.
+    Those of the proposer `name` are marked as its own.
     """
     at, gains = Digits.of(history), hypervolume_gains(history)
     front = {member.number for member in history.front}

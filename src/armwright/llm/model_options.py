@@ -19,8 +19,7 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     # "plus" (with instructions on how to analyse the parameters), "minus", or "full" (also with the whole front, the
     # gains of its own designs, joint angles and mechanics)
     prompt: Literal["plus", "minus", "full"] = "plus"
-    # "none" (every call is new), or "chat" (all proposals of a run are one conversation)
-    memory: Literal["none", "chat"] = "none"
+    memory: Literal["none", "chat"] = "none"  # each call is new, or all proposals of a run are one conversation
     # "two-step" (free reasoning, then a second call into the schema), "one-step" (JSON), or "text" (manual answers)
     answer: Literal["two-step", "one-step", "text"] = "two-step"
 

@@ -11,11 +11,8 @@ with naming_extras("a language model", "llm"):
 def estimated_cost(options: ModelOptions, requests: int, given: int, written: int) -> float | None:
     """Return about what requests cost [USD], by the prices that calls are accounted with; None if unknown.
 
-    Args:
-        options: The model and its server.
-        requests: Number of requests, which count as equally long: prices may depend on the length of each.
-        given: Tokens of all prompts; none of them is taken from a provider's cache.
-        written: Tokens of all answers.
+    The tokens of all prompts are `given`, none from a provider's cache; those of all answers are `written`. Requests
+    count as equally long: prices may depend on the length of each.
     """
     server = server_of(options)
     vendor, _, name = (options.model or "").partition(":")

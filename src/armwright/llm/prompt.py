@@ -29,14 +29,8 @@ def design_prompt(
     """Return the prompt for the next design.
 
     Fewer designs, then fewer targets are shown until the prompt has at most about MAX_TOKENS, unless hints and the
-    template itself are longer.
-
-    Args:
-        history: the finished trials.
-        seed: of the draw of the designs that are shown.
-        options: prompt and form of the answer.
-        name: name of the proposer, whose own designs are marked.
-        hints: the user's notes.
+    template itself are longer. The seed draws the designs that are shown; those of the proposer `name` are marked as
+    its own. Hints are the user's notes.
     """
     feedback = Feedback(history, seed, name)
     common = common_values(history, options)
@@ -56,10 +50,7 @@ def parameters_prompt(problem: Problem, answer: str) -> str:
 def shortened(render: Callable[[T], str], most: T, fewer: Callable[[T], T]) -> str:
     """Return a prompt of at most about MAX_TOKENS, or the shortest one.
 
-    Args:
-        render: Returns the prompt that shows so much.
-        most: How much it shows at most.
-        fewer: Returns the next smaller limits, or the same if they are the smallest.
+    It shows `most`, or what `fewer` makes of it: the next smaller limits, or the same if they are the smallest.
     """
     while True:
         text, less = render(most), fewer(most)

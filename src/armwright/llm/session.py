@@ -31,12 +31,8 @@ from armwright.runs.control import Hint
 class LlmSession:
     """Ask one backend, within a budget, and record every call; several threads may ask at a time.
 
-    Args:
-        backend: Who answers.
-        name: The `source` of its trials.
-        options: Memory and form of the answer. With memory `chat`, the proposals are one conversation, in which each
-            question is sent with the turns before it.
-        budget: Limits of the whole transcript; None for no limits.
+    Its trials have the source `name`. With memory `chat`, the proposals are one conversation, in which each question is
+    sent with the turns before it. The budget limits the whole transcript; None for no limits.
     """
 
     def __init__(
@@ -116,12 +112,9 @@ class LlmSession:
         return Question(self.identity(number), step, prompt, known, hints)
 
     def _ask(self, question: Question, output: OutputFormat, extraction: Callable[[str], str] = str) -> str:
-        """Return the answer in its output format.
+        """Return the answer in the format `output`.
 
-        Args:
-            question: What is asked. Its step is "reasoning" if a second question extracts the answer from the first.
-            output: Format of the final answer.
-            extraction: Returns the prompt of the second question, given the free answer.
+        If the question's step is "reasoning", `extraction` makes the second question from its free answer.
         """
         over = self._over  # of this session, even if another one begins meanwhile
         if question.step == "reasoning":
@@ -144,12 +137,8 @@ class LlmSession:
     def _call(self, question: Question, ask: Callable[[int | None], Reply], over: threading.Event) -> str:
         """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call.
 
-        A question that is too long is repeated without the oldest turns, within its requests.
-
-        Args:
-            question: What is asked.
-            ask: Asks it with at most this number of requests.
-            over: Set once no answer is wanted any more.
+        `ask` takes the largest number of requests. A question that is too long is repeated without the oldest turns,
+        within that number. `over` is set once no answer is wanted any more.
         """
         with self._budget.reserved(self._calls, over) as left:
             while True:

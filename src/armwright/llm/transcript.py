@@ -37,11 +37,9 @@ CALL = TypeAdapter(Call)  # reads a line
 
 
 class Transcript:
-    """The calls of one run, recorded in a file if the run has a folder; several threads may add to it.
+    """The calls of one run, recorded in a file, or kept in memory without a path; several threads may add to it.
 
-    Args:
-        path: The file; None to keep calls in memory.
-        read_only: Leave a last line that a crash cut short in the file.
+    If it is `read_only`, a last line that a crash cut short stays in the file.
     """
 
     def __init__(self, path: Path | None, read_only: bool = False) -> None:

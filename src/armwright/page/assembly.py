@@ -34,13 +34,9 @@ class PageSource:
 
 
 def assemble(source: PageSource, title: str, connects: bool, values: Mapping[str, str]) -> str:
-    """Return a page as HTML.
+    """Return a page as HTML; the title is text, the values are HTML for the remaining placeholders.
 
-    Args:
-        source: Its files.
-        title: Its title, as text.
-        connects: Whether it may ask its own server; otherwise the policy forbids all connections.
-        values: HTML for the remaining placeholders.
+    `connects` lets it ask its own server; otherwise the policy forbids all connections.
     """
     scripts = [*(_library(source, name) for name in source.libraries), program(source)]
     sums = " ".join(f"'sha256-{_sum(script)}'" for script in scripts)

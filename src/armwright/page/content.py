@@ -124,13 +124,7 @@ def _packed(
 ) -> bytes:
     """Pack what is shown of a run with what its folder holds beside it.
 
-    Args:
-        folder: The run folder.
-        shown: What is shown of the run.
-        maps: Reach maps by number of the design.
-        files: Files of designs by number and format.
-        calls: Calls to the model.
-        calls_from: Index of the first call that the page lacks.
+    Maps and files are by number of the design, files also by format. The page lacks the calls from `calls_from` on.
     """
     head = {
         **shown.head,

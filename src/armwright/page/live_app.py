@@ -54,12 +54,7 @@ class OpenPages:
 
 
 def live_app(folder: Path, pages: OpenPages) -> Starlette:
-    """Return the server's application, to be guarded.
-
-    Args:
-        folder: The run folder.
-        pages: Counts the open pages.
-    """
+    """Return the server's application, to be guarded; `pages` counts the open pages."""
     page = LivePage(folder, pages)
 
     @asynccontextmanager
@@ -77,12 +72,7 @@ async def show_shell(request: Request) -> Response:
 
 
 class LivePage:
-    """The requests of the page of a run folder.
-
-    Args:
-        folder: The run folder.
-        pages: Counts the open pages.
-    """
+    """The requests of the page of a run folder; `pages` counts the open pages."""
 
     def __init__(self, folder: Path, pages: OpenPages) -> None:
         self._folder = folder

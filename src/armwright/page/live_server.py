@@ -34,14 +34,10 @@ LINGER = 60.0  # [s] to wait for a page to come back, such as a tab in the backg
 def serve(
     folder: Path, tell: Callable[[str], None], host: str = LOOPBACK, port: int = 0, study: BinaryIO | None = None
 ) -> None:
-    """Serve the page of a run until Ctrl-C.
+    """Serve the page of a run until Ctrl-C; port 0 is any free one.
 
-    Args:
-        folder: The run folder.
-        tell: Called with the page's address, which holds the key, once it can be opened.
-        host: Address to listen on.
-        port: Port to listen on; 0 for any free one.
-        study: A pipe that closes when the study's process ends; the server then ends as soon as no page is open.
+    `tell` is called with the page's address, which holds the key, once it can be opened. `study` is a pipe that closes
+    when the study's process ends; the server then ends as soon as no page is open.
 
     Raises:
         MissingExtraError: The extra `live` is not installed.
@@ -65,14 +61,7 @@ def serve_app(
 ) -> None:
     """Serve an application as `serve` does, behind a guard with a key of 192 bits.
 
-    Args:
-        app: The application.
-        shells: The paths of its pages, which need no key.
-        pages: Counts the open pages.
-        tell: As in `serve`, like the rest.
-        host: Address.
-        port: Port.
-        study: Pipe.
+    `shells` are the paths of its pages, which need no key; `pages` counts the open ones.
     """
     import uvicorn
 

@@ -26,12 +26,9 @@ class PageReachMap:
 
 
 def read_reach_maps(run: Path, n: int, params: Callable[[int], Array]) -> dict[int, PageReachMap]:
-    """Return the maps in a run folder by design, without unreadable ones and those of other designs.
+    """Return the maps in the folder of a run of n designs, by design, without unreadable and outdated ones.
 
-    Args:
-        run: The run folder.
-        n: Number of designs of the run.
-        params: Returns the (P,) parameters of a design.
+    `params` returns the (P,) parameters of a design; maps of other parameters are left out.
     """
     found: dict[int, PageReachMap] = {}
     for file in sorted((run / REACH_MAPS).glob("*.npz")):

@@ -27,11 +27,8 @@ HEADERS = {
 class Guard:
     """Refuse requests for other hosts and without the key, and add the security headers to every response.
 
-    Args:
-        app: The guarded application.
-        key: The key of the server.
-        shells: The paths of pages, which hold no data and need no key.
-        is_allowed: Tells whether a Host header names this server; others are refused (DNS rebinding).
+    `shells` are the paths of pages, which hold no data and need no key. `is_allowed` tells whether a Host header names
+    this server; others are refused (DNS rebinding).
     """
 
     def __init__(self, app: Any, key: str, shells: Collection[str], is_allowed: Callable[[str], bool]) -> None:
@@ -65,12 +62,7 @@ class Guard:
 
 
 async def read_request(request: Request, limit: int) -> bytes | Response:
-    """Return the body of a POST of the page itself, or the refusal of any other.
-
-    Args:
-        request: The request.
-        limit: Largest body [bytes].
-    """
+    """Return the body of a POST of the page itself, of at most `limit` bytes, or the refusal of any other."""
     if request.headers.get("origin", "") != f"{request.url.scheme}://{request.headers.get('host', '')}":
         return PlainTextResponse("only the page itself may send this", status_code=403)
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":

@@ -40,11 +40,8 @@ def write_comparison_figures(
 ) -> list[Path]:
     """Draw a comparison into `place`/figures and return the PNG files.
 
-    Args:
-        place: Folder of the experiment.
-        comparison: The runs to compare.
-        curves: Figures of hypervolume curves; by default one with all methods.
-        samples: Methods to show in detail: the first one with runs is drawn; by default the last of all methods.
+    Hypervolume curves are by default one figure with all methods. Of the methods to show in detail (`samples`), the
+    first one with runs is drawn; by default the last of all methods.
     """
     return write_drawn(place / FIGURES, _drawn(comparison, curves or {}, samples))
 

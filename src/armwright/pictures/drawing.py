@@ -39,14 +39,10 @@ def several_panels(width: float, height: float) -> Figure:
 def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Array:
     """Return the limits (2, 2) of a plane of two objectives: low and high of each.
 
-    The plane reaches beyond the reference point, but only beyond the largest values if the reference point is more than
-    twice as far in either. It begins at 0, or near the smallest value if that is negative or all values within the
-    reference point are similar.
-
-    Args:
-        values: (N, 2) designs to show: those nearer than the limits, else their front.
-        reference: The reference point.
-        shown: Upper limits of the axes, as a multiple of the reference point.
+    It shows those of `values` (N, 2) that are nearer than `shown`, a multiple of the reference point, else their front.
+    It reaches beyond the reference point, but only beyond the largest values if the reference point is more than twice
+    as far in either. It begins at 0, or near the smallest value if that is negative or all values within the reference
+    point are similar.
     """
     point = np.asarray(reference[:2])
     within = values[np.all(values <= shown * point, axis=1)]
@@ -64,15 +60,9 @@ def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Arr
 
 
 def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], limits: Array) -> None:
-    """Label a plane of the first two objectives, mark its reference point and set its limits.
+    """Label a plane of the first two objectives, set its limits (2, 2), and mark the reference point if it is in them.
 
     Torques of toy masses are marked as such.
-
-    Args:
-        axes: The plane.
-        problem: The problem with these objectives.
-        reference: The reference point; marked if it lies within the limits.
-        limits: (2, 2) low and high of each axis.
     """
     for i, axis in enumerate("xy"):
         objective = problem.objectives[i]
@@ -95,9 +85,8 @@ def draw_dominated(axes: Any, front: Array, reference: Sequence[float], **fill: 
 def front_steps(front: Array, reference: Sequence[float]) -> tuple[Array, Array]:
     """Return the x and y of a front's step line from the top to the right side of the reference box.
 
-    Args:
-        front: Points within the box, sorted by the first objective (K, 2).
-        reference: The reference point; only its first two objectives are used.
+    The front (K, 2) holds points within the box, sorted by the first objective. Of the reference point, only the first
+    two objectives are used.
     """
     if not len(front):
         return np.array([reference[0]]), np.array([reference[1]])

@@ -52,14 +52,7 @@ def write_figures(folder: str | Path) -> list[Path]:
 def _figures(
     folder: Path, history: History, search: Mapping[str, Any] | None, existing: Sequence[ComparedArm]
 ) -> Iterator[tuple[str, Figure]]:
-    """Yield figures by name.
-
-    Args:
-        folder: The run folder.
-        history: The trials.
-        search: The record of a direct search, whose trials are its front.
-        existing: Arms to compare with.
-    """
+    """Yield figures by name; `search` is the record of a direct search, whose trials are its front."""
     if len(history) and history.failed.all():
         return  # there is nothing to draw
     yield "hypervolume", draw_hypervolume(history) if search is None else draw_search(history, search)

@@ -47,13 +47,7 @@ class _Slice:
 
 
 def write_reach_figure(found: ReachMap, around: MappedArm, file: Path) -> None:
-    """Write the slices of a reach map.
-
-    Args:
-        found: The map.
-        around: The arm and its surroundings.
-        file: The figure, by its ending.
-    """
+    """Write the slices of a reach map with the arm and its surroundings, in the format of the file's ending."""
     with matplotlib.rc_context(RC), naming_write_errors(file):
         save_figure(_draw(found, around), file)
 

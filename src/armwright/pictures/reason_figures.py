@@ -17,13 +17,7 @@ LINE_LENGTH = 104  # characters
 def draw_reasons(run: RunSummary, history: History, solutions: tuple[int, int] | None) -> Figure | None:
     """Draw the reasons given for Solution 1, or for the proposal on the front that is nearest to it.
 
-    Args:
-        run: The run.
-        history: Its trials.
-        solutions: Numbers of Solutions 1 and 2.
-
-    Returns:
-        The figure; None without such a proposal or without reasons.
+    None without such a proposal or without reasons. `solutions` are the numbers of Solutions 1 and 2.
     """
     if solutions is None or not run.proposer:
         return None

@@ -1,7 +1,4 @@
-"""Assumed values of actuators that enter the results of designs.
-
-A value is assumed if it is an estimate or the default of the actuator's kind (`ActuatorRecord.assumed`).
-"""
+"""Assumed values of actuators that enter the results of designs: estimates and defaults (`ActuatorRecord.assumed`)."""
 
 from collections.abc import Container, Iterable, Mapping
 
@@ -23,10 +20,8 @@ Assumed = Mapping[str, Mapping[str, float]]  # assumed values by actuator and na
 def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None, also: Iterable[str] = ()) -> Assumed:
     """Return the assumed values that enter the results; actuators without any are left out.
 
-    Args:
-        problem: The problem.
-        arms: Arms whose actuators count; None for all actuators of the space.
-        also: Names of values that enter besides those that objectives and constraints depend on.
+    Only actuators of `arms` count, by default all of the space. `also` names values that enter besides those that
+    objectives and constraints depend on.
     """
     records = problem.space.actuators
     if arms is not None:

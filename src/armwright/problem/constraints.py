@@ -59,11 +59,7 @@ class Constraint:
 
 
 def read_constraints(texts: Sequence[str]) -> tuple[Constraint, ...]:
-    """Parse the constraints of a task without evaluating them.
-
-    Raises:
-        TaskError: A text is not a constraint, or no design can satisfy all of them.
-    """
+    """Parse constraints without evaluating them; TaskError if a text is none, or no design can satisfy all of them."""
     constraints = tuple(map(_read, texts))
     bounds: dict[tuple[str, Relation], Constraint] = {}
     for constraint in constraints:
@@ -81,10 +77,7 @@ def read_constraints(texts: Sequence[str]) -> tuple[Constraint, ...]:
 def implied_constraints(task: Task, has_actuators: bool, has_bodies: bool) -> tuple[str, ...]:
     """Return the constraints that a cycle and solid bodies imply, except for quantities that the task bounds itself.
 
-    Args:
-        task: The task.
-        has_actuators: Whether the torques and speeds of the joints are limited.
-        has_bodies: Whether motors or a column are solid bodies.
+    `has_actuators`: torques and speeds of the joints are limited. `has_bodies`: motors or a column are solid bodies.
     """
     implied: dict[str, float] = {}
     if task.cycle is not None:

@@ -48,12 +48,9 @@ def lower_bounds(problem: Problem, matrix: Array) -> Outcomes:
 
 
 def estimates(problem: Problem, matrix: Array, near: Array) -> Outcomes:
-    """Estimate the outcomes of designs by rough paths through the cycle, in each case, without tolerances.
+    """Estimate the outcomes of designs (N, P) by rough paths through the cycle, in each case, without tolerances.
 
-    Args:
-        problem: a problem with a cycle.
-        matrix: (N, P) designs.
-        near: (N, B, D) postures near those at the first pose of each block, such as those of similar designs.
+    They start near the postures `near` (N, B, D) at the first pose of each block, such as those of similar designs.
     """
     matrix = problem.space.normalised(matrix)
     parts: list[Outcomes] = []

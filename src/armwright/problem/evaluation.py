@@ -110,12 +110,7 @@ class Evaluation(Scene):
         return self.largest_on_motions(measure(torques, speeds).reshape(n, m, f).max(axis=2))
 
     def largest_on_motions(self, along: Array, at_targets: Array | float = 0.0) -> Array:
-        """Return (N, T) the larger of a target's value and those of the motions of steps to it.
-
-        Args:
-            along: (N, M) values of the motions.
-            at_targets: (N, T) values at the targets.
-        """
+        """Return (N, T) the larger of a target's value (N, T) and those of the motions (N, M) of steps to it."""
         worst = np.zeros(self.position_error.shape) + at_targets
         for index, motion in enumerate(self.paths.plan.motions):
             target = self.paths.plan.targets[motion.step]

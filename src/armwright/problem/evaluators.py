@@ -77,10 +77,7 @@ class Evaluator:
     def __call__(self, arm: Arm, task: Task, design: Design | None = None) -> tuple[float, ...]:
         """Return the objectives of an arm; EvaluatorError if the function fails or exits.
 
-        Args:
-            arm: The arm.
-            task: The task.
-            design: The design that the arm was built from, for a function that takes it.
+        `design` is what the arm was built from, for a function that takes it.
         """
         measured = self.attempt(arm, task, design)
         if not isinstance(measured, Failure):
@@ -131,11 +128,9 @@ def evaluator_error(message: str, failure: Failure) -> EvaluatorError:
 def evaluator(*objectives: str) -> Callable[[Measure], Evaluator]:
     """Make an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
 
-    An arm for which the function raises, or returns other than finite numbers, is infeasible. A function
-    `(arm, task, design) -> numbers` also gets the design, whose `params` hold the custom parameters.
-
-    Args:
-        objectives: Names, each with its unit in brackets if it has one: "energy [J]".
+    Objectives are names, each with its unit in brackets if it has one: "energy [J]". An arm for which the function
+    raises, or returns other than finite numbers, is infeasible. A function `(arm, task, design) -> numbers` also gets
+    the design, whose `params` hold the custom parameters.
 
     Examples:
         >>> @evaluator("reach [m]")
@@ -157,11 +152,7 @@ def evaluator(*objectives: str) -> Callable[[Measure], Evaluator]:
 
 
 def load_evaluator(place: str) -> Evaluator:
-    """Load the evaluator `file.py:function` or `module:function`, which runs its code.
-
-    Raises:
-        SettingsError: There is none.
-    """
+    """Load the evaluator `file.py:function` or `module:function`, running its code; SettingsError if there is none."""
     where, _, function = place.rpartition(":")
     if not where or not function:
         raise SettingsError(f'--evaluator: expected FILE.py:FUNCTION or MODULE:FUNCTION, got "{place}"')
@@ -222,11 +213,7 @@ def _objective(given: str, description: str, name: str) -> Objective:
 
 
 def _loaded(load: Callable[[], ModuleType], where: str) -> ModuleType:
-    """Return a module of users, whose code changes nothing in this process, such as `numpy.seterr`.
-
-    Raises:
-        SettingsError: Its code raises, or is not there.
-    """
+    """Return a module of users, whose code changes nothing here, such as `numpy.seterr`; SettingsError if it fails."""
     try:
         with contained():
             return copy_context().run(load)

@@ -81,10 +81,7 @@ def facts_of(
 ) -> list[Facts]:
     """Return the facts of each arm of an evaluation; what is not known of one is not known of any.
 
-    Args:
-        evaluation: Physics of N arms.
-        arms: The same arms.
-        known: Returns values or the reason why they are not known, as `Objective.known`.
+    `known` returns values, or the reason why they are not known, as `Objective.known` does.
     """
     columns = [(quantity, *known(quantity, evaluation)) for quantity in QUANTITIES.values()]
     return [

@@ -62,9 +62,7 @@ class Objective:
     def known(self, evaluation: Evaluation, minimised: bool = False) -> tuple[Array, str]:
         """Return (N,) values and an empty reason; NaN and the reason if task or arms leave the quantity open.
 
-        Args:
-            evaluation: Physics of N arms. What is not known of one is not known of any.
-            minimised: Return the value that searches minimise.
+        What is not known of one arm is not known of any. `minimised`: return the value that searches minimise.
         """
         try:
             values = self.minimised(evaluation) if minimised else self(evaluation)

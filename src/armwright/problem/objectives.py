@@ -255,11 +255,7 @@ QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*BEN
 
 
 def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> tuple[Objective, ...]:
-    """Return the objectives of these names, built in or among `others`.
-
-    Raises:
-        SettingsError: One is unknown or repeated, or there are too many.
-    """
+    """Return the objectives of these names, built in or in `others`; SettingsError if unknown, repeated or too many."""
     known = {objective.name: objective for objective in others} | dict(OBJECTIVES)
     for name in names:
         if name not in known:

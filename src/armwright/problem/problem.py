@@ -267,12 +267,9 @@ class Problem:
     def physics(
         self, designs: Sequence[Design] | Array | ArmArrays, case: int = 0, near: Array | None = None
     ) -> Evaluation:
-        """Return the kinematics and statics of exact arms at all targets in one case.
+        """Return the kinematics and statics of exact arms at all targets in one case, numbered as in the task.
 
-        Args:
-            designs: N designs, (N, P) their matrix, which may lie outside the ranges of the space, or their arms.
-            case: the number of the case of the task.
-            near: postures as in `evaluate_arrays`.
+        The designs may be a matrix (N, P) with values outside the ranges of the space. `near`: as in `evaluate_arrays`.
         """
         if not isinstance(designs, ArmArrays):
             designs = self.arms(designs if isinstance(designs, np.ndarray) else self.space.matrix(designs))
@@ -302,14 +299,9 @@ class Problem:
             yield evaluate_arrays(arms, scene, self.device, near=postures)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
-        """Return objectives and violations of evaluated arms.
+        """Return objectives and violations of N evaluated arms; SettingsError if one is not a finite number.
 
-        Args:
-            evaluation: physics of N arms.
-            measured: (N,) of each objective that the custom evaluator measures.
-
-        Raises:
-            SettingsError: one is not a finite number.
+        `measured` holds (N,) values of each objective that the custom evaluator measures.
         """
         values = [measured[o.name] if o.name in measured else o.minimised(evaluation) for o in self.objectives]
         names = [f"objective {o.name}" for o in self.objectives]

@@ -23,17 +23,11 @@ KINDS = ("joint", "link", "direction", "tube", "motor", "stroke", "limit")  # pa
 
 
 def reduced(problem: Problem, matrix: Array) -> Array:
-    """Return designs without joints that never move: for each module with such joints, the design without these.
+    """Return (K, P) designs without joints that never move, all different; K = 0 if nothing can be removed.
 
-    A joint that turns is idle if it stays within 1e-3 rad of 0 at all targets, along the whole cycle and in every case
-    of the task. The inverse kinematics may choose other postures for the reduced arm, which has to be evaluated.
-
-    Args:
-        problem: The problem.
-        matrix: (N, P) designs.
-
-    Returns:
-        (K, P) designs of the space, all different; K = 0 if nothing can be removed.
+    For each of (N, P) designs and each of its modules with such joints, there is the design without these. A joint that
+    turns is idle if it stays within 1e-3 rad of 0 at all targets, along the whole cycle and in every case of the task.
+    The inverse kinematics may choose other postures for the reduced arm, which has to be evaluated.
     """
     if not len(matrix):
         return matrix

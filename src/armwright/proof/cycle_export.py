@@ -32,15 +32,7 @@ class CycleModel:
 
 
 def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, name: str) -> Mapping[str, str]:
-    """Return the content of the files by name; none for a task without a cycle or with a step of unknown duration.
-
-    Args:
-        problem: The problem.
-        arm: The arm of a design.
-        evaluation: Physics of some designs.
-        row: Which of them it is.
-        name: Name of the model.
-    """
+    """Return the files of an arm, row `row` of an evaluation, by name; none without a cycle of known durations."""
     if evaluation.plan is None:
         return {}
     try:
@@ -86,15 +78,9 @@ def _modelled(arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row
 def task_model(
     arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, peak_torques: Array, name: str
 ) -> str:
-    """Return the MJCF of an arm in the surroundings in which it was evaluated.
+    """Return the MJCF of an arm, row `row` of an evaluation, in the surroundings in which it was evaluated.
 
-    Args:
-        arm: The arm.
-        target_names: Names of the targets.
-        evaluation: Physics of some arms.
-        row: Which of them it is.
-        peak_torques: (D,) largest torques of the moving joints [N m] or [N].
-        name: Name of the model.
+    peak_torques: (D,) largest torques of the moving joints [N m] or [N].
     """
     postures = evaluation.q[row][:, _moving(arm)]
     return to_simulation_mjcf(arm, evaluation, target_names, postures, peak_torques, name)
@@ -116,11 +102,7 @@ def _moving(arm: Arm) -> list[int]:
 
 
 def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:
-    """Return the trajectory of an arm, which is row `row` of an evaluation.
-
-    Raises:
-        SettingsError: The task has no cycle, or a step of unknown duration.
-    """
+    """Return the trajectory of an arm, row `row` of an evaluation; SettingsError without a cycle of known durations."""
     arrays = carrying(stack_arms([arm], "float64"), evaluation.load_shape)
     paths = tuple(
         MotionPath(path.motion, np.where(arrays.motion == FIXED, 0.0, path.q[..., : arrays.dof]))

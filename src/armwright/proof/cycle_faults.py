@@ -96,10 +96,7 @@ def describe_path(path: Mapping[str, Extreme | list[int]] | None) -> str:
 
 
 def describe_faults(evaluation: Evaluation, row: int) -> str:
-    """Describe where an arm fails to follow its cycle, with a via point for a collision.
-
-    The text is empty if the arm follows the cycle or the task has none.
-    """
+    """Describe where an arm fails to follow its cycle, with a via point for a collision; empty without faults."""
     paths = evaluation.cycle_paths
     if paths is None:
         return ""
@@ -117,16 +114,10 @@ def describe_faults(evaluation: Evaluation, row: int) -> str:
 
 
 def via_point(arm: ArmArrays, path: MotionPath, share: float, obstacles: Sequence[Obstacle]) -> Array | None:
-    """Return a point through which an arm avoids a collision, None if none was found.
+    """Return a point through which one arm avoids a collision at a share of a motion, None if none was found.
 
     Points to all sides of the tip are tried. The arm must reach the point, and be free along the joint motions from the
     start of the motion to the point and from there to its end. The point with the largest clearance is returned.
-
-    Args:
-        arm: One arm.
-        path: Its path along the motion.
-        share: The share of the motion at which it collides.
-        obstacles: The obstacles.
     """
     q = path.at(np.array([0.0, share, 1.0]))  # (1, 3, D)
     sides = np.concatenate([np.eye(3), -np.eye(3)])

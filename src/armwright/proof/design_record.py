@@ -103,14 +103,7 @@ class DesignRecord(BaseModel, extra="allow"):
 def write_designs(
     folder: RunFolder, history: History, verdicts: Mapping[int, Mapping[str, Any]], recommended: Collection[int]
 ) -> dict[int, DesignRecord]:
-    """Write the folders of the front's designs, with verdicts of the verification; remove others; return the records.
-
-    Args:
-        folder: The run folder.
-        history: The trials.
-        verdicts: Of the verification, by number.
-        recommended: Numbers of the recommended designs.
-    """
+    """Write the folders of the front's designs, with verdicts by number; remove the others; return the records."""
     written: dict[int, DesignRecord] = {}
     numbers = [member.number for member in history.front]
     names = {design_name(number) for number in numbers}

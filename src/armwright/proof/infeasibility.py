@@ -137,9 +137,8 @@ def _rounded(constraint: Constraint, violation: float) -> float:
 def describe_infeasibility(history: History, feasibility: Mapping[str, Any] | None = None) -> str:
     """Describe why a history has no feasible design.
 
-    Args:
-        history: The history; of a direct search, only the designs that it kept.
-        feasibility: The result of `feasibility_record` of all evaluated designs; None for those of the history.
+    feasibility: `feasibility_record` of all evaluated designs, of which the history of a direct search holds only some;
+        None for that of the history.
     """
     (number,) = history.nearest(1)
     failure, constraints = history.trials[number].failure, history.problem.constraints
@@ -178,9 +177,7 @@ def describe_conflict(record: Mapping[str, Any]) -> str:
 def feasibility_record(history: History, tally: ViolationTally | None = None) -> dict[str, Any]:
     """Return how many designs violate each constraint; empty for a task without constraints.
 
-    Args:
-        history: The history.
-        tally: All evaluated designs, if the history does not hold them.
+    tally: All evaluated designs, if the history does not hold them.
 
     Returns:
         nearest: If no design is feasible, the one with the smallest violation, the quantities that constraints bound,

@@ -91,9 +91,7 @@ class _Batch:
 def evaluate_survival(history: History, designs: Mapping[int, bool]) -> dict[int, Survival]:
     """Return the survival of designs by trial number; empty without constraints.
 
-    Args:
-        history: The trials.
-        designs: Trial numbers of feasible designs, and whether to simulate the changes of all their assumed values.
+    designs: Trial numbers of feasible designs, and whether to simulate the changes of all their assumed values.
     """
     problem, numbers = history.problem, list(designs)
     if not problem.constraints or not numbers:

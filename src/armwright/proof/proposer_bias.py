@@ -19,10 +19,8 @@ class SourceBias:
 
     lengths_5_cm: float  # all link lengths are multiples of 0.05 m, within 1e-9 m
     lengths_1_cm: float  # all link lengths are multiples of 0.01 m, within 1e-9 m
-    # The base is within 1e-6 m of a symmetry plane of the targets; None if they have none
-    base_on_symmetry_plane: float | None
-    # Share of pairs of consecutive joints with the same type; None if there are no pairs
-    equal_neighbours: float | None
+    base_on_symmetry_plane: float | None  # within 1e-6 m of a symmetry plane of the targets; None if they have none
+    equal_neighbours: float | None  # of pairs of consecutive joints: with the same type; None if there are no pairs
 
 
 @dataclass(frozen=True)
@@ -42,10 +40,7 @@ def proposer_bias(history: History, proposer: str) -> ProposerBias:
 def source_bias(history: History, source: str, planes: Array) -> SourceBias | None:
     """Return the bias of a source's designs; None if it has none.
 
-    Args:
-        history: The trials.
-        source: The source.
-        planes: (P, 3) normals of the symmetry planes of the targets.
+    planes: (P, 3) normals of the symmetry planes of the targets.
     """
     designs = [trial.design for trial in history if trial.source == source]
     if not designs:

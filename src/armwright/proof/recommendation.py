@@ -1,7 +1,4 @@
-"""The recommended designs of a front: its knee, its ends, the cheapest and the stiffest, verified in the simulator.
-
-For each it is stated which perturbations it survives.
-"""
+"""The recommended designs of a front: its knee, its ends, the cheapest and the stiffest, verified in the simulator."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -79,7 +76,6 @@ def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str,
     """Return by name the (N,) prices [USD] and deflections [m] that are no objectives and known of all designs."""
     if history.problem.evaluator is not None:
         return {}
-
     first = history.evaluation(numbers[:1])
     others = [quantity for quantity in (price, deflection) if quantity not in history.problem.objectives]
     asked = [quantity for quantity in others if not quantity.known(first)[1]]
@@ -91,14 +87,11 @@ def _price_and_deflection(history: History, numbers: Sequence[int]) -> dict[str,
 def recommend(
     history: History, simulator: Simulator | None = None, left: Callable[[], float] = unlimited
 ) -> list[Recommendation]:
-    """Return the recommended designs: simulated, unless a cycle or its durations are missing.
+    """Return the recommended designs: simulated, unless a cycle, its durations or the time for it are missing.
 
     With a custom evaluator neither our simulation nor our perturbations say what it would measure.
 
-    Args:
-        history: The trials.
-        simulator: Keeps what it simulates; None for a new one.
-        left: Returns the time that is left [s].
+    left: Returns the time that is left [s].
     """
     roles = candidates(history)
     if history.problem.evaluator is not None:

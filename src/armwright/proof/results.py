@@ -52,15 +52,7 @@ def write_results(
     summary: Mapping[str, Any],
     verification: Verification | None,
 ) -> None:
-    """Write all results, and the summary last: it marks them as complete.
-
-    Args:
-        folder: The run folder.
-        history: The trials.
-        config: The settings of the run.
-        summary: The content of summary.json.
-        verification: Verification of the front; None if it was not verified.
-    """
+    """Write all results, and the summary last: it marks them as complete."""
     verdicts = _verdicts(history, verification)
     rows = [_row(history, trial) for trial in history]
     folder.write_text("trials.csv", to_csv(rows))
@@ -167,14 +159,9 @@ def summarize_front(
 ) -> dict[str, Any]:
     """Return the content of summary.json for a direct search.
 
-    Args:
-        history: The designs of the front that became trials.
-        config: The settings of the run.
-        found: (N, M) objective values of the whole front.
-        search: Evaluations, seconds, why it ended, and the hypervolume over the evaluations.
-        verification: Verification of the front; None if it was not verified.
-        tally: All evaluated designs by the constraints that they satisfy.
-        left: Returns the time that is left for simulations and survival of recommended designs [s].
+    The trials of `history` are designs of the front, `found` are the (N, M) objectives of the whole front. `search`
+    holds evaluations, seconds, why it ended, and the hypervolume over the evaluations. `tally` is of all evaluated
+    designs. `left` returns the time that is left for simulations and survival of recommended designs [s].
     """
     volume = {"final": hypervolume(found, history.reference_point or ())}
     return {

@@ -139,12 +139,7 @@ def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int
 def quantities_of_front(
     history: History, names: Sequence[str], facts: Mapping[int, Facts] | None = None
 ) -> dict[int, dict[str, float]]:
-    """Return the quantities of the designs of the front by number: those of `numbers_of`, and these.
-
-    Args:
-        history: The trials.
-        names: Names of quantities.
-        facts: What is known of the designs by number; None to compute it if needed.
+    """Return the quantities of the designs of the front by number: those of `numbers_of`, and `names`.
 
     Raises:
         SettingsError: A name is unknown, or the quantity of a design.

@@ -31,7 +31,7 @@ from armwright.tasks.task import Task
 SHOWN = "shown.npz"
 
 Arrays = Mapping[str, NDArray[Any]]
-Summary = Mapping[str, Any] | None
+Summary = Mapping[str, Any] | None  # None if the run has not ended
 
 
 class _Config(BaseModel, extra="allow"):
@@ -78,15 +78,7 @@ def read_shown_run(folder: Path) -> ShownRun | None:
 def show_run(
     config: RunConfig, history: History, summary: Summary, records: Mapping[int, DesignRecord], first: int = 0
 ) -> ShownRun:
-    """Return what the page shows of a run, with its designs from number `first` on.
-
-    Args:
-        config: The settings of the run.
-        history: Its trials.
-        summary: Its summary; None if it has not ended.
-        records: The records of the front, by number.
-        first: Number of the first design that the page lacks.
-    """
+    """Return what the page shows of a run: the records of its front, and its designs from number `first` on."""
     trials = history.trials[first:]
     head = {
         **_settings(config, history),

@@ -25,11 +25,7 @@ class SimulatedMember:
 
 
 class Simulator:
-    """Simulate designs of a history, each at most once.
-
-    Raises:
-        SettingsError: The task has no cycle.
-    """
+    """Simulate designs of a history, each at most once; SettingsError if the task has no cycle."""
 
     def __init__(self, history: History) -> None:
         if history.problem.task.cycle is None:
@@ -49,18 +45,7 @@ class Simulator:
 
 
 def simulate_arm(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, number: int) -> SimulatedMember:
-    """Simulate an arm.
-
-    Args:
-        problem: The problem.
-        arm: The arm.
-        evaluation: Physics of some arms.
-        row: Which of them it is.
-        number: Number of its design.
-
-    Raises:
-        SettingsError: A duration of its steps is not known.
-    """
+    """Simulate the arm of a design, row `row` of an evaluation; SettingsError if a duration of a step is unknown."""
     files = dict(cycle_files(problem, arm, evaluation, row, f"{problem.task.name}-{number}"))
     if not files:
         raise SettingsError(

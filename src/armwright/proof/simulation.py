@@ -92,15 +92,7 @@ def mujoco_version() -> str:
 
 
 def drive(model_xml: str, trajectory: Trajectory, target_names: tuple[str, ...], feed_forward: bool = True) -> Drive:
-    """Drive a model through a trajectory.
-
-    Args:
-        model_xml: MJCF, as `to_simulation_mjcf` writes it.
-        trajectory: R rows.
-        target_names: Names of the targets.
-        feed_forward: Whether the drives are given the torques of the trajectory. Without them, servos alone hold the
-            positions.
-    """
+    """Drive a model of `to_simulation_mjcf` through a trajectory; without feed-forward, by its servos alone."""
     return _Driver(model_xml, trajectory, target_names, feed_forward).run()
 
 

@@ -63,13 +63,8 @@ def to_simulation_mjcf(
     user data are the tolerance of the position [m], of the angle [rad], and how many angles count (2: the z axis, 3:
     all). The keyframe NAME is the posture there.
 
-    Args:
-        arm: The arm.
-        scene: Its surroundings.
-        target_names: Names of the targets.
-        postures: (T, D) values of the moving joints at the targets [rad] or [m].
-        peak_torques: (D,) largest torques of the moving joints, for the gains of joints without actuators.
-        name: Name of the model.
+    postures: (T, D) values of the moving joints at the targets [rad] or [m].
+    peak_torques: (D,) largest torques of the moving joints, for the gains of joints without actuators.
     """
     root = Element("mujoco", model=name)
     SubElement(root, "compiler", COMPILER)

@@ -43,13 +43,9 @@ def verify_front(history: History) -> Verification | None:
 def verify(
     problem: Problem, designs: Sequence[Design], values: Array, reference_point: Sequence[float]
 ) -> Verification:
-    """Evaluate designs again, and decide which are robust.
+    """Evaluate N designs again, and decide which are robust.
 
-    Args:
-        problem: The problem.
-        designs: N designs.
-        values: (N, M) objectives that the search found.
-        reference_point: (M,) scale of the allowed differences.
+    values: (N, M) objectives that the search found; reference_point: (M,) scale of the allowed differences.
     """
     problem = replace(problem, device="cpu")
     matrix = problem.space.matrix(designs)

@@ -20,9 +20,7 @@ MAX_FILE = 10_000_000  # [bytes]
 class ManualBackend(LlmBackend):
     """Write DIR/NNN-prompt.md and read DIR/NNN-answer.md (or .json), where NNN is the trial's number.
 
-    Args:
-        folder: The folder DIR.
-        wait: Wait for a missing answer; if false, raise AnswerPendingError.
+    It waits for a missing answer; if `wait` is false, it raises AnswerPendingError.
     """
 
     def __init__(self, folder: Path, wait: bool = True) -> None:

@@ -24,11 +24,7 @@ from armwright.runs.history import History
 class PromptedProposer(LlmSession, Proposer):
     """Ask a backend for each proposal, and record questions and answers.
 
-    Args:
-        backend: Who answers.
-        name: The `source` of its trials.
-        options: How designs are asked for.
-        budget: Limits of the whole run.
+    `name` is the `source` of its trials. The options say how designs are asked for; the budget limits the whole run.
     """
 
     def __init__(

@@ -132,9 +132,7 @@ def by_module(history: History, member: FrontMember, values: Array) -> Array:
 def upright_height(design: Design, angles: Array) -> float:
     """Return the height [m] of the links that stay upright, up to the first bent R or P joint.
 
-    Args:
-        design: the arm.
-        angles: (M,) mean absolute joint angles [rad].
+    `angles` (M,) are mean absolute joint angles [rad].
     """
     height = 0.0
     for kind, bend, link in zip(design.joints, angles, design.links, strict=True):

@@ -61,11 +61,8 @@ def gravity_share(axis: Array, direction: Array) -> Array:
     """Return the share of the gravity moment of a straight level arm that its joints carry, as a norm.
 
     A joint carries the part along its own axis. The first axis is given; the second, moved by the first joint, stands
-    across both the first axis and the arm. Where it comes to stand vertical, it carries nothing.
-
-    Args:
-        axis: (..., 3) unit vector of the first axis.
-        direction: (..., 3) unit vector of the arm.
+    across both the first axis and the arm. Where it comes to stand vertical, it carries nothing. The first axis and the
+    arm's direction are unit vectors (..., 3).
     """
     moment = np.cross(direction, (0.0, 0.0, -1.0))
     second = np.cross(axis, direction)
@@ -98,13 +95,7 @@ def _stretched(problem: Problem, designs: Sequence[Design]) -> tuple[Array, Arra
 
 
 def gains(front: Array, values: Array, reference_point: Sequence[float]) -> Array:
-    """Return the hypervolume (N,) that each of N points would add to a front by itself.
-
-    Args:
-        front: (F, 2) non-dominated objectives.
-        values: (N, 2) objectives.
-        reference_point: bounds the hypervolume.
-    """
+    """Return the hypervolume (N,) that each of the `values` (N, 2) would add by itself to a front (F, 2)."""
     corner = np.array(reference_point)
     inside = front[np.all(front < corner, axis=1)]
     inside = inside[np.argsort(inside[:, 0])]

@@ -23,10 +23,7 @@ def draw_gap(sizes: Sequence[float], rng: np.random.Generator) -> int:
 def change_until_new(value: T, is_tried: Callable[[T], bool], change: Callable[[T, float], T]) -> T:
     """Change a value by growing steps until it has not been tried; return the last if none is new.
 
-    Args:
-        value: what a rule proposes.
-        is_tried: True for values that have been tried.
-        change: returns a value, changed by a spread given as a share of the parameters' scale.
+    `change` returns a value, changed by a spread given as a share of the parameters' scale.
     """
     spread = FIRST_SPREAD
     for _ in range(MAX_CHANGES):

@@ -23,12 +23,9 @@ SWAPPED_AXES = str.maketrans("RP", "PR")
 def shoulders(points: Array, reach: Array) -> Array:
     """Return the points (N, 3) [m] from which the targets are least out of reach in total.
 
+    The targets are (T, 3) [m], the reach of the arms is (N,) [m].
     Minimises Σ max(0, ‖p_i - c‖ - reach) by Weiszfeld's iteration. The sum is flat where all targets are in reach, so
     these have a small weight. A point lies on every symmetry plane of the targets.
-
-    Args:
-        points: (T, 3) targets [m].
-        reach: (N,) of the arms [m].
     """
     centre = np.repeat(points.mean(axis=0)[None], len(reach), axis=0)  # (N, 3)
     for _ in range(ROUNDS):
@@ -126,10 +123,7 @@ STRUCTURES = (
 def fitted(structure: Structure, problem: Problem, lengths: Array) -> list[Design]:
     """Size and place a structure for the problem's targets, within its space.
 
-    Args:
-        structure: type of arm.
-        problem: gives targets and space.
-        lengths: (N,) of the arms, all links together [m].
+    The lengths (N,) [m] are those of the arms, all links together.
     """
     space = problem.space
     reach = lengths / sum(structure.links)

@@ -21,8 +21,7 @@ class KindDefaults:
     backlash: float  # backlash [rad]
     joint_stiffness: float  # joint stiffness / τ [1/rad]
     gain: float  # position gain / τ [1/rad]
-    # Damping gain / position gain [s]; None for τ / ω, the back-EMF of a motor driven by a voltage
-    damping: float | None
+    damping: float | None  # damping gain / position gain [s]; None for τ / ω, the back-EMF of a voltage-driven motor
     current: float  # supply current at the peak torque x V / (τ ω)
     continuous: float = 0.25  # continuous torque / τ
 
@@ -42,12 +41,8 @@ def default_values(
 ) -> dict[str, float]:
     """Return the defaults of a kind, without those for which speed or voltage is missing.
 
-    Args:
-        kind: The kind of actuator.
-        torque: Its reference torque [N m].
-        speed: Its no-load speed [rad/s].
-        voltage: Its supply voltage [V].
-        position_gain: Its position gain [N m/rad]; None for the default.
+    torque: its reference torque [N m].  speed: its no-load speed [rad/s].  voltage: its supply voltage [V].
+    position_gain: its position gain [N m/rad]; None for the default.
     """
     ratios = DEFAULTS[kind]
     gain = ratios.gain * torque if position_gain is None else position_gain

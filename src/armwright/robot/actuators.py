@@ -163,8 +163,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         return Actuator(**{field.name: values[field.name] for field in fields(Actuator)})
 
 
-# Of all values that a record may state; empty for a number without a unit
-UNITS: Mapping[str, str] = {
+UNITS: Mapping[str, str] = {  # of all values that a record may state; empty for a number without a unit
     name: KEY_UNITS.get(name, "")
     for name, field in ActuatorRecord.model_fields.items()
     if float in members_of(field.annotation)
@@ -221,11 +220,7 @@ def _codes(sources: str) -> dict[str, str]:
 
 
 def named_actuator(name: str) -> ActuatorRecord:
-    """Return an actuator of the catalogue.
-
-    Raises:
-        SpaceError: It does not have one of this name.
-    """
+    """Return an actuator of the catalogue; SpaceError if it has none of this name."""
     known = catalogue()
     if name not in known:
         raise SpaceError(

@@ -24,8 +24,7 @@ class Actuator:
     speed: float | None = None  # speed without load [rad/s]
     price: float | None = None  # price [USD]
     continuous_torque: float | None = None  # torque that it can hold forever [N m]
-    # Speed from which on the available torque falls linearly, to 0 at `speed` [rad/s]
-    corner_speed: float | None = None
+    corner_speed: float | None = None  # from which on the available torque falls linearly, to 0 at `speed` [rad/s]
     rotor_inertia: float | None = None  # inertia of rotor and gear [kg m²]
     coulomb_friction: float | None = None  # friction at any speed [N m]
     viscous_friction: float | None = None  # friction that is proportional to the speed [N m s/rad]
@@ -101,8 +100,7 @@ class Link:
     radius: float  # radius of its round section [m]
     end_mass: float = 0.0  # point mass that it carries at its end, such as the next joint's actuator [kg]
     end_shift: Vector = (0.0, 0.0, 0.0)  # vector from its end to that point [m]
-    # Young's modulus times the second moment of area of its section, EI [N m²]; infinite if rigid, None if
-    # unknown
+    # Young's modulus times the second moment of area of its section, EI [N m²]; infinite if rigid, None if unknown
     bending_stiffness: float | None = None
     torsional_stiffness: float | None = None  # shear modulus times the polar second moment of area, GJ [N m²]; likewise
     wall: float | None = None  # wall thickness of its tube [m], at most the radius; None if unknown

@@ -71,11 +71,8 @@ def placed_body(shape: ActuatorShape, axis: Axis, carrier: Vector) -> MotorBody:
     before, towards which the body extends; if that link is along the shaft, it is along the next axis in cyclic order,
     and the body extends to its negative side.
 
-    Args:
-        shape: The shape of the actuator.
-        axis: The axis of the joint.
-        carrier: Unit vector along an axis, from the start of the link before to the joint; for the first joint away
-            from the surface that the arm is mounted on.
+    carrier: unit vector along an axis, from the start of the link before to the joint; for the first joint away from
+    the surface that the arm is mounted on.
     """
     along = AXES.index(axis)
     if carrier[along] != 0.0:

@@ -13,12 +13,8 @@ def to_ros2_control(arm: Arm, name: str = "arm", plugin: str = MOCK) -> str:
     """Return the URDF of an arm with one `<ros2_control type="system">` for all joints that move.
 
     Each joint accepts commands of position, velocity and effort within the limits of the URDF, and reports the same
-    three. It starts at 0, or at the limit closest to it.
-
-    Args:
-        arm: The arm.
-        name: The name of the robot.
-        plugin: The hardware plugin; the default needs no hardware and reports every command as executed.
+    three. It starts at 0, or at the limit closest to it. `plugin` is the hardware plugin; the default needs no hardware
+    and reports every command as executed.
     """
     robot = urdf_tree(arm, name)
     system = SubElement(robot, "ros2_control", name="arm", type="system")

@@ -74,8 +74,7 @@ class Material(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return value
 
 
-# Prices depend on the shop: none here.
-MATERIALS: Mapping[str, Material] = {
+MATERIALS: Mapping[str, Material] = {  # without prices, which depend on the shop
     material.name: material
     for material in (
         # EN 1999-1-1:2007, 3.2.5: all alloys of the standard, 6060 and 6061 among them.
@@ -94,11 +93,7 @@ MATERIALS: Mapping[str, Material] = {
 
 
 def resolve_material(entry: Any) -> Any:
-    """Return the material of a name; anything else unchanged, for pydantic to validate.
-
-    Raises:
-        ValueError: If there is no such material.
-    """
+    """Return the material of a name (ValueError if none has it); anything else unchanged, for pydantic to validate."""
     if not isinstance(entry, str):
         return entry
     if entry not in MATERIALS:

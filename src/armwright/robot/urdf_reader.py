@@ -159,11 +159,7 @@ def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list
 
 
 def _zeros(tree: "_LinkTree", base: str, moving: Sequence[UrdfJoint], where: str) -> dict[str, float]:
-    """Return a posture [rad] with all joint axes along axes of the world, 0 for as many joints as possible.
-
-    Raises:
-        ArmError: If none is found.
-    """
+    """Return a posture [rad] with all joint axes along axes of the world, 0 for as many joints as possible."""
     zeros = {joint.name: 0.0 for joint in moving}
 
     def axes() -> dict[str, Array]:

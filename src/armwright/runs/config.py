@@ -39,8 +39,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     n_init: int = Field(ge=1)  # number of random trials
     n_step: int = Field(ge=1)  # trials of a block; one of each block is the proposer's
     n_total: int = Field(ge=1)  # number of counted trials
-    # Requests to the proposer that run while black-box trials continue; None to wait for each
-    in_flight: int | None = Field(default=None, ge=1)
+    in_flight: int | None = Field(default=None, ge=1)  # requests while black-box trials go on; None to wait for each
     initial_designs: tuple[dict[str, float | str], ...] = ()  # designs of the first of the n_init trials
     screen: bool = False  # whether the surrogate decides which proposals are evaluated
 

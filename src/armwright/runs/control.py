@@ -47,8 +47,7 @@ class Control(BaseModel, frozen=True, extra="forbid", strict=True):
 
     paused: bool = False  # no trial begins
     stop: bool = False  # the session ends before the next trial
-    # All hints of the run, used ones included, by increasing id
-    hints: tuple[Hint, ...] = Field(default=(), max_length=MAX_HINTS)
+    hints: tuple[Hint, ...] = Field(default=(), max_length=MAX_HINTS)  # all of the run, used ones too, by increasing id
 
     @field_validator("hints")
     @classmethod
@@ -64,8 +63,7 @@ class Status(BaseModel, frozen=True, extra="forbid", strict=True):
 
     pid: int = Field(gt=0, lt=2**31)  # its process, which may have been killed since
     doing: Doing
-    # The trial at which the activity began; the number of trials of a finished study
-    number: int = Field(ge=0, lt=2**31)
+    number: int = Field(ge=0, lt=2**31)  # trial at which the activity began; number of trials of a finished study
     since: float = Field(allow_inf_nan=False)  # when the activity began [s since 1970]
     fault: str = ""  # why the last request to the model, or the session, failed; empty if it did not
 
@@ -134,10 +132,7 @@ class Channel:
     def report(self, doing: Doing, number: int, fault: str | None = None) -> None:
         """Write the status if it has changed; ignore a file that cannot be written.
 
-        Args:
-            doing: The activity.
-            number: The current trial.
-            fault: Why the last request to the model failed, empty if it did not; None if nothing has changed.
+        `fault` says why the last request to the model failed: empty if it did not, None if nothing has changed.
         """
         if self._folder is None:
             return

@@ -68,8 +68,7 @@ class History:
     problem: Problem
     trials: Sequence[FinishedTrial]
     n_init: int  # number of random trials
-    # The one chosen from the random trials, if the task states none
-    frozen_reference_point: tuple[float, ...] | None = None
+    frozen_reference_point: tuple[float, ...] | None = None  # from the random trials, if the task states none
     method: Method | None = None  # the search settings of the study; None outside one
     # Values of the history that this one extends (`grown`), with its number of trials
     earlier: Mapping[str, tuple[int, Any]] = field(

@@ -72,17 +72,14 @@ class FinishedTrial:
     fault: str | None = None  # why a trial that was a proposer's became a black-box one
     asked: int | None = None  # the trial that the proposal was asked for, if another one
     feedback: int | None = None  # how many finished trials the proposer knew, if not all before this one
-    # The earlier trial with an equal design, whose values it has; it was not evaluated again
-    duplicate_of: int | None = None
-    # Wall time by part (total, proposing, sampling, evaluation)
-    seconds: _Seconds = field(default_factory=dict[str, float])
+    duplicate_of: int | None = None  # earlier trial of an equal design, whose values it has: not evaluated again
+    seconds: _Seconds = field(default_factory=dict[str, float])  # wall time: total, proposing, sampling, evaluation
     # Attributes that the sampler set on its trial and study, needed to resume
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     q: _Angles = ()  # joint angles [rad] or strokes [m] at each target, as the design was evaluated
     violations: _Violations = ()  # of each constraint; satisfied at <= 0
     failure: Failure | None = None  # why the custom evaluator gave no values, which makes the design infeasible
-    # The proposal in whose place this design was drawn, because the surrogate expected little of it
-    screened: ScreenedOut | None = None
+    screened: ScreenedOut | None = None  # proposal replaced by this design, as the surrogate expected little of it
 
     @property
     def answer(self) -> str | None:

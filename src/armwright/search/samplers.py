@@ -66,13 +66,8 @@ def sampler_for(
 
     Evaluators take long as a rule, which is when the surrogate pays; the built-in physics does not.
 
-    Args:
-        problem: the problem.
-        sampler: name of a sampler, or a factory seed -> sampler.
-        features: further inputs of the surrogate, from a design.
-
     Raises:
-        SettingsError: there are features, and the sampler is not the surrogate.
+        SettingsError: there are features, inputs of the surrogate alone, and the sampler is another one.
     """
     if sampler == AUTO:
         sampler = "tpe" if problem.evaluator is None else SURROGATE
@@ -108,23 +103,15 @@ def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
 
 
 def sampler_name(sampler: str | SamplerFactory) -> str:
-    """Return the name of a sampler in the settings of a run; a run resumes only with the same name.
-
-    A factory is named by its module and name. A lambda or a nested function, which has no unique name, is named by its
-    line and a checksum of its code and of the values it captures.
-    """
+    """Return the name of a sampler in the settings of a run, which resumes only with the same one."""
     factory = sampler_factory(sampler)
     return sampler if isinstance(sampler, str) else name_of(factory)
 
 
 class BlackBox:
-    """In-memory Optuna study over a design space.
+    """In-memory Optuna study over a design space; all objectives are minimised.
 
     Args:
-        space: the design space.
-        sampler: name of a sampler, or a factory seed -> sampler.
-        seed: of the run.
-        n_objectives: number of objectives, all minimised.
         constraints: names of the constraints; Optuna's samplers prefer trials that satisfy them (Deb's rules).
         can_fail: whether evaluations can fail. Samplers then see one more constraint, which failed trials violate, and
             infinite values of these.
@@ -210,12 +197,6 @@ class BlackBox:
     ) -> dict[str, dict[str, Any]]:
         """Pass the result of a trial to the sampler.
 
-        Args:
-            trial: a trial from `draw` or `inject`.
-            values: objective values.
-            violations: constraint violations; satisfied at <= 0.
-            has_failed: whether the evaluation failed.
-
         Returns:
             Notes of the sampler on the trial and on the study, such as generations and parents; needed by `restore`.
         """
@@ -244,10 +225,7 @@ class BlackBox:
         return self._space.from_free_values(params)
 
     def _assign_generation(self, sampler: BaseSampler, trial: Trial) -> None:
-        """Assign a generation to the trial, if the sampler is a genetic one.
-
-        Genetic samplers ignore trials without a generation, and assign one only to trials whose values they draw.
-        """
+        """Assign a generation: genetic samplers ignore trials without one, and assign it only if they draw values."""
         assign = getattr(sampler, "get_trial_generation", None)
         if assign is not None:
             assign(self._study, self._study.get_trials(deepcopy=False)[trial.number])

@@ -22,13 +22,9 @@ ASSUMED = {  # of the values of any sheet
 
 
 def arm_lines(arm: Arm, payload: float, targets: Array, zeros: Sequence[float] | None = None) -> dict[str, Any]:
-    """Return these parts of a data sheet, by field.
+    """Return these parts of a data sheet, by field; the payload [kg] moves with the tip.
 
-    Args:
-        arm: The arm.
-        payload: What moves the tip [kg].
-        targets: (T, 3) [m], or none.
-        zeros: Values of the joints that count as 0; 0 by default.
+    Targets (T, 3) [m] may be none. `zeros` are the values of the joints that count as 0; 0 by default.
     """
     return {
         "links": tuple(_link_line(arm, n) for n in range(1, len(arm.links) + 1)),

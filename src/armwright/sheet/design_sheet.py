@@ -44,14 +44,7 @@ def design_sheet(run: Path, number: int | None = None) -> DataSheet:
 
 
 def sheet_of(history: History, member: FrontMember, facts: Facts, verdict: Mapping[str, str]) -> DataSheet:
-    """Return the data sheet of a design.
-
-    Args:
-        history: The trials.
-        member: The design.
-        facts: What is known of it.
-        verdict: Role, status and survival, as in `DataSheet`.
-    """
+    """Return the data sheet of a design; its verdict is role, status and survival, as in `DataSheet`."""
     problem, arm = history.problem, member.arm
     evaluation, payload = history.evaluation([member.number]), float(problem.task.payloads.max())
     lines = arm_lines(arm, payload, evaluation.targets)

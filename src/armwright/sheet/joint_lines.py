@@ -15,12 +15,9 @@ from armwright.sheet.record import JointLine
 
 
 def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[str] = ()) -> tuple[JointLine, ...]:
-    """Return a line for each moving joint.
+    """Return a line for each moving joint, named joint_1, joint_2 and so on by default.
 
-    Args:
-        arm: The arm.
-        evaluation: Its physics in the task, of this arm alone; None without a task.
-        names: Names of the moving joints; by default joint_1, joint_2, …
+    The evaluation is that of this arm alone in the task; None without a task.
     """
     lines: list[JointLine] = []
     moving = [j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"]

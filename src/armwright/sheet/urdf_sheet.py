@@ -31,9 +31,7 @@ ENTERING = ("stall_torque", "peak_torque", "backlash")  # values of actuators th
 def read_actuators(text: str, joints: Sequence[str]) -> dict[str, ActuatorRecord]:
     """Parse `shoulder=XM540-W270,elbow=XM430-W350` into actuators of the catalogue by joint.
 
-    Args:
-        text: Names of joints, or their numbers from 1, with names of actuators.
-        joints: The names of the moving joints.
+    Joints are given by name, or by number from 1.
 
     Raises:
         SettingsError: A part is no pair, or there is no such joint.
@@ -73,13 +71,10 @@ def urdf_sheet(
     job: Job | None = None,
     price: float | None = None,
 ) -> DataSheet:
-    """Return the data sheet of an existing arm.
+    """Return the data sheet of an existing arm; with a job, in its place and with the tool of the task.
 
-    Args:
-        described: The arm; with a job, in its place and with the tool of the task.
-        actuators: Those of its joints by name that `driven` has put there.
-        job: What it is there for.
-        price: Its price as stated, in place of that of its parts [USD].
+    The actuators are those that `driven` has put at its joints, by name. The price [USD] is the stated one, in place of
+    that of its parts.
 
     Raises:
         SettingsError: If the price is not a finite number of at least 0.

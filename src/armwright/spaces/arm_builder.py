@@ -56,13 +56,9 @@ _UPRIGHT = tuple(DIRECTIONS).index("+z")  # from the surface that the arm is mou
 def stack_designs(
     space: SpaceSchema, matrix: Array, tool: Tool = NO_TOOL, precision: Precision = "float32"
 ) -> ArmArrays:
-    """Build the arms of a matrix of designs.
+    """Build the arms of a matrix (N, P) of designs, with a tool at their end, as arrays of a precision for the kernels.
 
-    Args:
-        space: The design space.
-        matrix: (N, P) designs, as from `DesignSpace.matrix`; values outside the ranges of the space are allowed.
-        tool: The tool at the end of each arm.
-        precision: The precision of the arrays that the kernels read.
+    Values outside the ranges of the space are allowed.
     """
     return _Parts(space, matrix).stacked(tool, precision)
 

@@ -14,15 +14,11 @@ LEVEL = 1e-9  # sine of the largest tilt of a top face
 
 
 def supported_space(space: DesignSpace, obstacles: Sequence[Obstacle]) -> DesignSpace:
-    """Return the space with its bases on what they stand on in a task.
+    """Return the space with its bases on what they stand on in a task with these obstacles.
 
     With `base_on`, the base position is restricted to the top face of that obstacle: at its height, or above if there
     is a column, or above by at most the reach of a motor if motors are bodies. The column stands on it, else on the
     highest ground, else at z = 0. Applied twice, nothing changes.
-
-    Args:
-        space: The design space.
-        obstacles: The obstacles of the task.
 
     Raises:
         SpaceError: There is no such obstacle, it has no level top face, or the ranges of the base do not meet it.

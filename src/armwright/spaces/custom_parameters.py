@@ -79,11 +79,7 @@ class CustomParameter(
 
 
 def read_custom(value: Any) -> Any:
-    """Return the pairs of name and parameter of a mapping; any other value as it is.
-
-    Raises:
-        ValueError: An entry is no parameter; the message names it.
-    """
+    """Return a mapping's pairs of name and parameter, other values as they are; ValueError names a wrong entry."""
     if not isinstance(value, dict):
         return value
     pairs: list[tuple[str, CustomParameter]] = []

@@ -17,11 +17,7 @@ class DesignFile(BaseModel, frozen=True, extra="allow"):
 
 
 def read_design(path: str | Path, space: DesignSpace) -> Design:
-    """Read a design from a YAML or JSON file.
-
-    Raises:
-        DesignError: If it is not in the space.
-    """
+    """Read a design from a YAML or JSON file; DesignError if it is not in the space."""
     content = read_document(Path(path), DesignFile, DesignError)
     try:
         return space.design(content.params)

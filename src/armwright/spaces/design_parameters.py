@@ -1,7 +1,6 @@
 """The parameters of a design space, and the conditions under which they are active.
 
-A parameter of module j is inactive if the arm has fewer modules, or if its type does not have the
-parameter: a roll joint has no stroke.
+A parameter of module j is inactive if the arm has fewer modules, or if its type lacks it: a roll joint has no stroke.
 """
 
 import math
@@ -102,14 +101,7 @@ def _unrestricted(space: SpaceSchema) -> Iterator[ConditionalParameter]:
 def _per_module(
     space: SpaceSchema, kind: str, make: Callable[[str], Parameter], types: frozenset[str] | None = None
 ) -> Iterator[ConditionalParameter]:
-    """Yield one parameter for each module, unless no module may have it.
-
-    Args:
-        space: The design space.
-        kind: The name of the parameters, without the number of the module.
-        make: Returns the parameter of a name.
-        types: The module types for which the parameters are active; None for all.
-    """
+    """Yield `make("kind_j")` for each module j, unless no module may have it: active for these types, None for all."""
     used = None if types is None else types & set(space.joint_types)
     if used is not None and not used:
         return
@@ -133,11 +125,7 @@ def _kind(name: str) -> str:
 
 
 def _restrict(parameter: Parameter, to: Restriction) -> Parameter:
-    """Return the parameter with fewer choices or a narrower range.
-
-    Raises:
-        ValueError: If the restriction is not a part of the parameter.
-    """
+    """Return the parameter with fewer choices or a narrower range; ValueError if these are not a part of its own."""
     values: tuple[float | str, ...] = (to,) if isinstance(to, (str, float, int)) else to
     if isinstance(parameter, CategoricalParameter):
         for choice in values:

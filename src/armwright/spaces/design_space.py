@@ -88,10 +88,8 @@ class DesignSpace(SpaceSchema, frozen=True):
     def design(self, params: Mapping[str, Any]) -> Design:
         """Return the design with these values, in the order of the space.
 
-        Tied values may be missing. Values of inactive parameters are left out.
-
-        Raises:
-            DesignError: If a value is unknown, missing or outside its range.
+        Tied values may be missing. Values of inactive parameters are left out. Raises DesignError if a value is
+        unknown, missing or outside its range.
         """
         known = conditional_parameters(self)
         for name in params:
@@ -132,14 +130,10 @@ class DesignSpace(SpaceSchema, frozen=True):
     def clipped(
         self, origin: Iterable[float], joints: str, links: Iterable[float], like: Design | None = None
     ) -> Design:
-        """Return the design with these numbers, each moved into its range.
+        """Return the design with this base position [m], joint letters and link lengths [m], each moved into its range.
 
-        Args:
-            origin: (3,) base position [m].
-            joints: The letters of the joint modules.
-            links: (D,) link lengths [m].
-            like: The source of all other values. Those that it lacks have their defaults; actuators are by default
-                the strongest at the base and the weakest at the tip.
+        All other values are those of `like`. Those that it lacks have their defaults; actuators are by default the
+        strongest at the base and the weakest at the tip.
         """
         known: dict[str, Any] = _default_motors(self)
         known |= {} if like is None else like.params
@@ -216,11 +210,7 @@ class DesignSpace(SpaceSchema, frozen=True):
         return self.normalised(np.array(rows, dtype=np.float64).reshape(n, len(parameters)))
 
     def arm(self, design: Design, tool: Tool = NO_TOOL) -> Arm:
-        """Return the arm that a design builds, with a tool at its end.
-
-        Raises:
-            DesignError: If the design is not in the space.
-        """
+        """Return the arm that a design builds, with a tool at its end; DesignError if not in the space."""
         if not self.min_joints <= len(design.joints) == len(design.links) <= self.max_joints:
             self.design(design.params)  # raises the reason
         return build_arm(self, self.matrix([design]), tool)
@@ -251,10 +241,7 @@ def _default_motors(space: SpaceSchema) -> dict[str, str]:
 
 
 def paper_space(joints: int = 4) -> DesignSpace:
-    """Return the design space of the paper.
-
-    Args:
-        joints: The number of joints, 4 in the experiments of the paper.
+    """Return the design space of the paper, whose experiments have arms of 4 joints.
 
     Examples:
         >>> import armwright as aw

@@ -43,8 +43,7 @@ class FloatParameter:
     def check(self, value: Any) -> float:
         """Return `value` as a float, or as an int if values are whole numbers.
 
-        Raises:
-            DesignError: If it is not a number within the range, or not on the grid.
+        Raises DesignError if it is not a number within the range, or not on the grid.
         """
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
             raise DesignError(f"{self.name} = {value!r} is not a finite number [{self.unit}]")
@@ -98,11 +97,7 @@ class CategoricalParameter:
         return self.choices[0]
 
     def check(self, value: Any) -> str:
-        """Return `value`.
-
-        Raises:
-            DesignError: If it is not one of the choices.
-        """
+        """Return `value`; DesignError if it is not one of the choices."""
         if value not in self.choices:
             raise DesignError(f"{self.name} = {value!r} is not one of {', '.join(self.choices)}")
         return value

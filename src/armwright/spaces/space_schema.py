@@ -189,12 +189,7 @@ class SpaceSchema(
         return _arm_actuators(self)
 
     def link_mass(self, length: Length, tube: Any = 0) -> Length:
-        """Return the mass of links or rails [kg].
-
-        Args:
-            length: Their lengths [m].
-            tube: The indices of their tubes.
-        """
+        """Return the mass of links or rails [kg], from their lengths [m] and the indices of their tubes."""
         if self.link_section.material is None:
             return (self.mass or MassPerMetre()).mass(length)
         return self.tube_values("mass_per_metre")[tube] * length

@@ -13,14 +13,9 @@ MIN_LENGTH = 1e-6  # [m] of a link or stroke
 
 
 def perturbed(space: DesignSpace, matrix: Array, tolerance: float = TOLERANCE) -> Iterator[Array]:
-    """Yield copies of designs with one length or base coordinate off by ±tolerance, one parameter after the other.
+    """Yield copies of designs (N, P) with one length or base coordinate off by ±tolerance [m], one after the other.
 
     In the space of the paper these are 2 (3 + D) copies. They may lie outside the design space by the tolerance.
-
-    Args:
-        space: The design space.
-        matrix: (N, P) designs.
-        tolerance: The deviation [m].
     """
     matrix = space.normalised(matrix)
     for column in length_columns(space):

@@ -227,11 +227,7 @@ class Study:
         return *self._black_box.draw(number, source), source
 
     def _take_results(self, timeout: float) -> None:
-        """Pass all finished evaluations to the sampler, and record the trials that no missing one precedes.
-
-        Args:
-            timeout: how long to wait for the first result [s].
-        """
+        """Pass results, the first within `timeout` [s], to the sampler; record trials that no missing one precedes."""
         while (result := self._backend.next_result(timeout)) is not None:
             number, evaluated = result
             self._tell(self._pending[number], evaluated)

@@ -26,12 +26,7 @@ TRIAL_ATTRIBUTES = ("source", "proposal", "reason", "fault", "duplicate_of")
 def export_study(run: Path, target: Path | None = None) -> Path:
     """Export all finished trials of a run as an Optuna study in a new database of Optuna's own storage.
 
-    Args:
-        run: Folder of a finished, stopped or ongoing run.
-        target: Database file; `study.db` in the run folder if None.
-
-    Returns:
-        The database.
+    The run may be finished, stopped or ongoing. The database is `study.db` in its folder if `target` is None.
 
     Raises:
         RunFolderError: The database exists, as it may hold notes and trials of its owner, or it cannot be written.

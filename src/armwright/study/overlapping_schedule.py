@@ -19,10 +19,6 @@ class OverlappingSchedule(Schedule):
     A request is made when its block starts, `max_in_flight` - 1 blocks ahead. The black box may run ahead of the
     answers by the trials in the blocks of the requests in flight, then it waits. An answer enters as the next trial
     after its arrival.
-
-    Args:
-        requests: requests to the proposer.
-        max_in_flight: requests at a time.
     """
 
     def __init__(self, requests: ProposalRequests, max_in_flight: int) -> None:

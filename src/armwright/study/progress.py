@@ -28,8 +28,7 @@ class Progress:
     fault: str | None = None  # kind of the fault of this trial
     faults: Mapping[str, int] = field(default_factory=dict[str, int])  # faults of all trials so far, by kind
     failures: Mapping[str, int] = field(default_factory=dict[str, int])  # failed evaluations so far, by kind
-    # Trial and reason of the last failed evaluation of each kind
-    latest_failures: Mapping[str, str] = field(default_factory=dict[str, str])
+    latest_failures: Mapping[str, str] = field(default_factory=dict[str, str])  # trial and reason of the last, by kind
     note: str = ""  # message for the user, reported once
     reason: str = ""  # reason of the proposer for this trial's design
 

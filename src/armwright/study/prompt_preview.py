@@ -41,9 +41,7 @@ def preview(
 def preview_after(run: Path, options: PromptOptions | None = None) -> Preview:
     """Return the prompt for the next proposal of a run, requested as the run would.
 
-    Args:
-        run: run folder.
-        options: options that replace those of the run, if set.
+    Options that are set replace those of the run.
     """
     config, history = read_run(run)
     stated = {} if options is None else options.given

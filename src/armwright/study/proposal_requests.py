@@ -54,12 +54,7 @@ class ProposalSlot:
 class ProposalRequests:
     """Requests proposals, until a fault that another request cannot mend.
 
-    Args:
-        proposer: the proposer.
-        seed: of the run.
-        method: search settings of the run.
-        history: returns the finished trials.
-        notify: called with the number of the trial before each request.
+    `history` returns the finished trials; `notify` is called with the number of the trial before each request.
     """
 
     def __init__(

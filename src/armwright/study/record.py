@@ -79,10 +79,7 @@ class Record:
         )
 
     def _freeze_reference_point(self) -> None:
-        """Store a reference point that the task leaves open, once the random trials give it.
-
-        It follows the trials until enough of them have succeeded.
-        """
+        """Store a reference point that the task leaves open: after the random trials, until enough have succeeded."""
         if self._is_frozen or len(self.trials) < self.config.study.n_init:
             return
         history = self.history()

@@ -1,9 +1,4 @@
-"""Schedules: which trials are the proposer's, and with what design.
-
-AlternatingSchedule   the first trial of each block of n_step is the proposer's, and the study waits for its design
-OverlappingSchedule   requests run while black-box trials go on (`overlapping_schedule.py`)
-ReplaySchedule        a recorded run is repeated: each proposal enters at its recorded trial
-"""
+"""Schedules: which trials are the proposer's, and with what design."""
 
 from collections import deque
 from collections.abc import Sequence

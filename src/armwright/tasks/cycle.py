@@ -126,11 +126,7 @@ class Cycle(Strict, frozen=True):
 
 
 def target_indices(steps: Sequence[Step], names: Mapping[str, int], n_targets: int) -> tuple[int, ...]:
-    """Return the index of each step's target, counted from 0.
-
-    Raises:
-        ValueError: A step names a target that does not exist, or the target where it already is.
-    """
+    """Return the index of each step's target, counted from 0; ValueError if a step names one that does not exist."""
     return tuple(_index(number, step.to, names, n_targets) for number, step in enumerate(steps, start=1))
 
 

@@ -188,14 +188,7 @@ class CyclePlan:
 
 
 def plan_cycle(cycle: Cycle, targets: Sequence[int], positions: Array, arrays: TargetArrays) -> CyclePlan:
-    """Return the motions of a cycle.
-
-    Args:
-        cycle: The cycle.
-        targets: Index of each step's target.
-        positions: (T, 3) of the targets [m].
-        arrays: How the targets are to be reached.
-    """
+    """Return the motions of a cycle, given the index of each step's target and the positions of targets (T, 3) [m]."""
     poses = Poses(positions, arrays.rotation, arrays.n_angular, arrays.tolerance, arrays.angle_tolerance)
     for number, (target, step) in enumerate(zip(targets, cycle.steps, strict=True), start=1):
         if step.do and cycle.approach and arrays.n_angular[target] == 0:

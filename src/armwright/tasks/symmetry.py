@@ -14,14 +14,11 @@ MAX_CANDIDATES = 2000  # otherwise thousands of points on a circle take minutes
 
 
 def symmetry_planes(points: Array) -> Array:
-    """Return the unit normals (P, 3) of all planes that mirror points onto themselves within 1e-6 m.
+    """Return the unit normals (P, 3) of all planes that mirror points (T, 3) [m] onto themselves within 1e-6 m.
 
     All planes pass through `centre(points)`. If the points lie in one plane, it is included. For points on one line
     only the plane that bisects it is returned, and for a single point none, since infinitely many others exist.
     Duplicate points count once. At most 2,000 candidates are tried.
-
-    Args:
-        points: (T, 3) positions [m].
     """
     offsets = _offsets(points)  # (T, 3)
     normals = np.empty((0, 3))

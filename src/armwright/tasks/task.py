@@ -221,8 +221,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def plan(self, positions: Array) -> CyclePlan:
         """Return the motions of the cycle with the targets at these positions (T, 3) [m].
 
-        Raises:
-            ValueError: The task has no cycle, or one that no arm can follow.
+        Raises ValueError if the task has no cycle, or one that no arm can follow.
         """
         if self.cycle is None:
             raise ValueError(f"task {self.name} has no cycle; try cycle: {IN_ORDER}")

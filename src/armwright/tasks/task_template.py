@@ -17,12 +17,7 @@ EXAMPLE_TARGETS: tuple[Point, ...] = ((0.45, 0.0, 0.1), (0.45, 0.2, 0.3), (0.45,
 
 
 def task_template(file: Path, targets: Sequence[Point | Target] = EXAMPLE_TARGETS) -> str:
-    """Return a commented task file to edit.
-
-    Args:
-        file: The path of the file; its stem becomes the name of the task.
-        targets: The targets of the task; points in [m].
-    """
+    """Return a commented task file to edit, with these targets [m]; the stem of its path becomes the task's name."""
     text = (resources.files("armwright.tasks") / "template.yaml").read_text(encoding="utf-8")
     return Template(text).substitute(
         file=shlex.quote(str(file)),

@@ -52,11 +52,9 @@ class Actuation(PerArm):
 def actuation_at_joints(ratings: Array, travel: Array, price: Array, safety_factor: Array) -> Actuation:
     """Return the actuation of joints by the ratings of their actuators.
 
-    Args:
-        ratings: (N, D, R) as from `ratings_of`; FIXED_RATINGS for fixed joints.
-        travel: (N, D) of a joint for each radian of its actuator [m/rad]; 1 for revolute joints.
-        price: (N,) of all actuators of an arm [USD].
-        safety_factor: (N,) by which required torques are multiplied.
+    ratings: (N, D, R) as from `ratings_of`; FIXED_RATINGS for fixed joints.  travel: (N, D) of a joint for each radian
+    of its actuator [m/rad]; 1 for revolute joints.  price: (N,) of all actuators of an arm [USD].  safety_factor: (N,)
+    by which required torques are multiplied.
     """
     at_joints = {
         name: ratings[..., i] * travel**power if power >= 0 else ratings[..., i] / travel**-power

@@ -126,11 +126,7 @@ def check_precision(name: str) -> Precision:
 
 
 def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArrays:
-    """Stack arms into arrays.
-
-    Args:
-        arms: N arms of at most MAX_JOINTS joints.
-        precision: The precision of the arrays that the kernels read.
+    """Stack N arms of at most MAX_JOINTS joints into arrays that the kernels read in a precision.
 
     Raises:
         ArmError: If there is no arm, or one that the kernels do not support.

@@ -29,12 +29,7 @@ class Frames:
 
 
 def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
-    """Return the joint frames of arms in postures.
-
-    Args:
-        arms: N arms.
-        q: (N, K, D) joint angles [rad] or displacements [m].
-    """
+    """Return the joint frames of N arms in postures; q: (N, K, D) joint angles [rad] or displacements [m]."""
     n, k, dof = q.shape
     revolute, prismatic = arms.motion < PRISMATIC, arms.prismatic  # (N, D)
     local = np.where((revolute | prismatic)[..., None], np.eye(3)[arms.motion % PRISMATIC], 0.0)  # (N, D, 3)

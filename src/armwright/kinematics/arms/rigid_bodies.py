@@ -81,13 +81,7 @@ class RigidBodies:
 
 
 def rigid_bodies(bodies: Bodies, tools: Tools, last: NDArray[np.integer]) -> RigidBodies:
-    """Return the bodies that move with each joint.
-
-    Args:
-        bodies: Links of N arms of up to D joints.
-        tools: Their tools.
-        last: (N,) index of the last link.
-    """
+    """Return the bodies that move with each joint of N arms of up to D joints; last: (N,) index of the last link."""
     mass, com, inertia = bodies.total_mass, bodies.total_com, bodies.inertia
     if tools.mass.any():
         own = np.arange(len(mass)), last

@@ -21,22 +21,13 @@ SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than th
 def clearances(
     arms: ArmArrays, q: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu"
 ) -> tuple[Array, Array]:
-    """Compute the self-clearance and the obstacle clearance of arms in postures.
+    """Return the (N, T) self-clearance and obstacle clearance [m] of arms in postures q (N, T, D) [rad] or [m].
 
     These are the smallest distances of two links that are not neighbours, and of a link from an obstacle. The bodies of
     actuators count as well, if the arms have them: from each other, from links that they do not join, and from
     obstacles. A column below the base counts as a part of the arm; its distance from obstacles is ignored. Clearances
     are negative for overlaps, and infinite without obstacles or links to compare. The tool is ignored, since it is made
     to touch.
-
-    Args:
-        arms: N arms of up to D joints.
-        q: (N, T, D) joint angles [rad] or displacements [m].
-        obstacles: The obstacles.
-        device: The device to compute on.
-
-    Returns:
-        (N, T) self-clearance and (N, T) obstacle clearance [m].
     """
     n, t, _ = q.shape
     distances = np.empty((2, n, t))

@@ -70,11 +70,7 @@ def holding_torques(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]])
 
 
 def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> CycleLoads:
-    """Return the loads of arms along a cycle.
-
-    Args:
-        paths: N arms.
-        terms: Their torque terms, from `torque_terms`.
+    """Return the loads of N arms along a cycle, by their torque terms from `torque_terms`.
 
     Raises:
         UnknownQuantityError: A step should be as fast as possible, but the arms have no actuators with known speeds.

@@ -93,14 +93,8 @@ def find_paths(
 ) -> CyclePaths:
     """Find the joint paths of N arms through a cycle. A path that is off is a result, never an exception.
 
-    Args:
-        arms: N arms.
-        plan: The cycle.
-        obstacles: The obstacles.
-        candidates: K, the number of postures at the first pose of each block to choose from.
-        device: The device to compute on.
-        near: (N, B, D) postures at the first pose of each block that the arms are to keep, as far as they can, instead
-            of choosing from candidates.
+    candidates: K, the number of postures at the first pose of each block to choose from.  near: (N, B, D) postures
+    there that the arms are to keep, as far as they can, instead of choosing from candidates.
     """
     if near is None:
         postures = entry_postures(arms, plan, obstacles, candidates, device)
@@ -140,12 +134,7 @@ def rough_paths(
 
     Nothing is chosen or refined. Of jumps only those are found that come from a joint at its limit.
 
-    Args:
-        arms: N arms.
-        plan: The cycle.
-        near: (N, B, D) postures near those at the first pose of each block.
-        obstacles: The obstacles.
-        device: The device to compute on.
+    near: (N, B, D) postures near those at the first pose of each block.
     """
     entry = np.clip(near, arms.lower[:, None], arms.upper[:, None])
     paths = _follow(arms, plan, entry, ROUGH, device)

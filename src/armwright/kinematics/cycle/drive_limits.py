@@ -41,14 +41,10 @@ class MotionLoad:
 
 
 def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: Array, drives: Actuation) -> MotionLoad:
-    """Return the load of a motion, with friction and rotor inertia of the drives.
+    """Return the load of a motion of N arms, with friction and rotor inertia of the drives.
 
-    Args:
-        gravity: (N, S, D) torques that hold the arm [N m].
-        inertial: (N, S, D) torques that move its links in T = 1 s, without gravity [N m s²].
-        velocity: (N, S, D) of the joints, for T = 1 s [rad].
-        acceleration: (N, S, D) of the joints, for T = 1 s [rad].
-        drives: Actuation of the N arms.
+    gravity: (N, S, D) torques that hold the arm [N m].  inertial: (N, S, D) torques that move its links in T = 1 s,
+    without gravity [N m s²].  velocity, acceleration: (N, S, D) of the joints, for T = 1 s [rad].
     """
     coulomb, viscous, rotor = (each[:, None] for each in (drives.coulomb, drives.viscous, drives.rotor_inertia))
     return MotionLoad(
@@ -61,18 +57,12 @@ def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: 
 
 
 def torque_speed_utilisation(torque: Array, velocity: Array, drives: Actuation) -> Array:
-    """Return the factor by which torque and speed together exceed what drives can deliver.
+    """Return (N, K, D) factors by which torque and speed together exceed what drives can deliver; 0 for fixed joints.
 
-    It is the largest ratio of the point (required torque, speed) to the border of the available torques in the same
+    Each is the largest ratio of the point (required torque, speed) to the border of the available torques in the same
     direction from (0, 0): at most 1 if the drive can deliver the torque, and at rest the share of the peak torque.
 
-    Args:
-        torque: (N, K, D) required, without the safety factor [N m].
-        velocity: (N, K, D) [rad/s].
-        drives: Actuation of the N arms.
-
-    Returns:
-        (N, K, D) utilisations; 0 for fixed joints.
+    torque: (N, K, D) required, without the safety factor [N m].  velocity: (N, K, D) [rad/s].
     """
     share = drives.safety_factor[:, None, None] * np.abs(torque) / drives.peak[:, None]
     along_line = (share * _falling_range(drives)[:, None] + np.abs(velocity)) / drives.no_load_speed[:, None]
@@ -80,7 +70,7 @@ def torque_speed_utilisation(torque: Array, velocity: Array, drives: Actuation) 
 
 
 def least_time(load: MotionLoad, drives: Actuation) -> Array:
-    """Return the least durations (N,) of motions that drives can follow [s]; infinite if there is none.
+    """Return the least durations (N,) of motions of N arms that drives can follow [s]; infinite if there is none.
 
     With u = 1 / T, each limit at each sample is a quadratic inequality α u² + β u + γ <= 0. Turned so that the velocity
     w is not negative, and with the safety factor k, the torque is τ(u) = a + b u + c u² and the limits are
@@ -92,10 +82,6 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
     at a lower speed. So the result is the largest u that all inequalities allow together, not the least of their ends.
     From the speed limit, u descends to the roots of the inequalities that do not hold there, until all hold. An arm
     that could not stop on the way, because k |gravity| > P, has none.
-
-    Args:
-        load: Load of the motions of N arms.
-        drives: Actuation of the N arms.
 
     Examples:
         A motor of 2 N m and 10 rad/s turns a disc of 0.1 kg m² by 1 rad at a constant speed.

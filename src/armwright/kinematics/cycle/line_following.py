@@ -35,14 +35,7 @@ class BlockPaths:
 
 
 def follow_lines(arms: ArmArrays, samples: LineSamples, entry: Array, device: Device = "cpu") -> BlockPaths:
-    """Follow all lines from the candidates of each block.
-
-    Args:
-        arms: N arms.
-        samples: S samples in B blocks.
-        entry: (N, B, K, D) postures at the first sample of each block.
-        device: The device to solve on.
-    """
+    """Follow all lines of N arms from `entry`: (N, B, K, D) candidate postures at the first sample of each block."""
     loaded = load_kernels("cycle.path_kernels", device)
     n, b, k, dof = entry.shape
     s = len(samples.poses)

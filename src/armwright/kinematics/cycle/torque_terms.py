@@ -51,14 +51,8 @@ def inverse_dynamics_torques(
 ) -> Array:
     """Return (N, S, D) torques of N arms in S states, without rotors and friction [N m], or forces [N].
 
-    Args:
-        arms: N arms.
-        q: (N, S, D) joint values [rad] or [m].
-        qd: (N, S, D) speeds [rad/s] or [m/s].
-        qdd: (N, S, D) accelerations [rad/s²] or [m/s²].
-        carried: (S,) share of the payload that is carried.
-        payload: Its mass [kg].
-        device: The device to compute on.
+    q, qd, qdd: (N, S, D) joint values [rad] or [m], speeds [rad/s] or [m/s] and accelerations [rad/s²] or [m/s²].
+    carried: (S,) share of the payload that is carried.  payload: its mass [kg].
     """
     gravity, drag, _ = _terms(arms, q, qd, qdd, carried, payload, device)  # M q_ss + C q_s, with the time as share
     return gravity + drag
@@ -67,12 +61,7 @@ def inverse_dynamics_torques(
 def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, device: Device = "cpu") -> Array:
     """Return (N, S, D, D) joint-space inertia matrices of N arms in S postures, without rotors, in SI units.
 
-    Args:
-        arms: N arms.
-        q: (N, S, D) joint values [rad] or [m].
-        carried: (S,) share of the payload that is carried.
-        payload: Its mass [kg].
-        device: The device to compute on.
+    q: (N, S, D) [rad] or [m].  carried: (S,) share of the payload that is carried.  payload: its mass [kg].
     """
     rest = np.zeros_like(q)
     units = (np.broadcast_to(unit, q.shape) for unit in np.eye(arms.dof))

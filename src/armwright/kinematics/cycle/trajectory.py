@@ -36,15 +36,9 @@ class Trajectory:
 def sample_trajectory(
     arm: ArmArrays, paths: tuple[MotionPath, ...], plan: CyclePlan, durations: Array, dwells: Array, payload: float
 ) -> Trajectory:
-    """Sample the cycle of one arm.
+    """Sample the cycle of one arm, stacked as one of one, by its path along each of the M motions of the plan.
 
-    Args:
-        arm: The arm, as one of one.
-        paths: Its path along each of the M motions of the plan.
-        plan: The cycle.
-        durations: (M,) of the motions [s].
-        dwells: (M,) time at rest after each motion [s].
-        payload: Mass of the payload [kg].
+    durations: (M,) of the motions [s].  dwells: (M,) time at rest after each motion [s].  payload: its mass [kg].
     """
     begin = np.concatenate([[0.0], np.cumsum(durations + dwells)])
     time = np.arange(int(np.ceil((begin[-1] - SAME_TIME) / PERIOD)) + 1, dtype=np.float64) * PERIOD

@@ -70,24 +70,14 @@ def unit_payload(arms: ArmArrays, frames: Frames) -> Loads:
 
 
 def tip_displacements(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Stiffness) -> Array:
-    """Return the (N, K, 3) displacements of the tips under the weight of loads [m].
-
-    Args:
-        arms: N arms.
-        frames: Their frames in K postures.
-        loads: Masses that they hold.
-        stiffness: Of their links and joints.
-    """
+    """Return the (N, K, 3) displacements of the tips of N arms in K postures under the weight of loads [m]."""
     return _of_links(arms, frames, loads, stiffness) + _of_joints(arms, frames, loads, stiffness.joints)
 
 
 def backlash_errors(arms: ArmArrays, frames: Frames, backlash: Array) -> Array:
     """Return the (N, K) sums over the joints of how far half their backlash moves the tip: an upper bound [m].
 
-    Args:
-        arms: N arms.
-        frames: Their frames in K postures.
-        backlash: (N, D) of joints [rad], or of slides [m]; 0 for fixed joints.
+    backlash: (N, D) of joints [rad], or of slides [m]; 0 for fixed joints.
     """
     lever = np.linalg.norm(jacobian_of(arms, frames), axis=2)  # (N, K, D)
     # A running sum has the same bits whatever the number of joints of other arms.

@@ -27,11 +27,8 @@ def payload_limits(arms: ArmArrays, frames: Frames, torques: Array, peak: Array)
     Torques are linear in the mass of the payload, so each motor holds up to a limit of its own. An arm that does not
     hold itself holds nothing.
 
-    Args:
-        arms: N arms.
-        frames: Their frames in K postures.
-        torques: (N, K, D) that hold the arms without payload [N m], or forces [N].
-        peak: (N, D) torques [N m], or forces [N], that may be used at rest.
+    torques: (N, K, D) that hold the arms without payload in K postures.  peak: (N, D) that may be used at rest; both
+    are torques [N m], or forces [N].
     """
     by_mass, allowed = torques_by_payload(arms, frames), peak[:, None]
     loaded = by_mass != 0.0

@@ -12,10 +12,7 @@ from armwright.tasks.obstacles import Ground
 
 
 def check_base_motor(problem: Problem) -> Iterator[Finding]:
-    """Find a ground that the motor of the first joint of every floor-mounted arm is in.
-
-    This motor is at rest and may touch the ground, but not be inside.
-    """
+    """Find a ground that the first motor of every floor-mounted arm is inside; being at rest, it may touch a ground."""
     grounds = [obstacle for obstacle in problem.task.obstacles if isinstance(obstacle, Ground)]
     space = problem.space
     if not (grounds and space.has_motor_bodies and space.mount == ("floor",)) or required_clearance(problem) < 0.0:

@@ -18,8 +18,7 @@ from armwright.problem.problem import Problem
 def check_instantly(problem: Problem) -> list[Finding]:
     """Return what is wrong with a task and its space, the proven faults first.
 
-    Raises:
-        SettingsError: An objective or a constraint needs actuators, a cycle or a workspace that the problem lacks.
+    Raises SettingsError if a quantity needs actuators, a cycle or a workspace that the problem lacks.
     """
     check_requirements(problem)
     checks = (

@@ -20,18 +20,11 @@ SEED = 20  # of the samples alone: searches have random numbers of their own
 def check_by_sampling(
     problem: Problem, seconds: float, at_least: int = 0, clock: Callable[[], float] = time.perf_counter
 ) -> tuple[list[Finding], int]:
-    """Evaluate random designs for about this time, without the loading of kernels.
+    """Find constraints that no random design satisfies; return findings and the number of samples.
 
     Constraints count in the task's first case, for exact arms: a design that violates one there violates it anyway.
-
-    Args:
-        problem: The problem.
-        seconds: The time [s]; less if it is too short for enough samples.
-        at_least: Number of samples that are evaluated even if they take longer.
-        clock: A clock [s].
-
-    Returns:
-        A finding for each constraint that none satisfies, and the number of samples; 0 without constraints.
+    Sampling takes about `seconds` by the clock, without the loading of kernels: less if that is too short for enough
+    samples, more if `at_least` so many take longer. Without constraints there are none.
     """
     if not problem.constraints:
         return [], 0

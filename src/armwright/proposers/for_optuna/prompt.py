@@ -26,18 +26,10 @@ def study_prompt(
     seed: int,
     options: PromptOptions,
 ) -> str:
-    """Return the prompt for the next trial.
+    """Return the prompt for the next trial, with the user's description of the problem.
 
     Fewer trials are shown until the prompt has at most about MAX_TOKENS, unless description and parameters alone are
-    longer.
-
-    Args:
-        study: gives the objectives and their directions.
-        trials: the trials so far.
-        parameters: what the model may choose.
-        description: the user's description of the problem.
-        seed: of the draw of the trials that are shown.
-        options: form of the answer.
+    longer. The seed draws the trials that are shown. Of the options, the form of the answer is used.
     """
     complete = [trial for trial in trials if trial.state == TrialState.COMPLETE]
     objectives = _objectives(study)

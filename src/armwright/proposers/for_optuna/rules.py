@@ -100,10 +100,7 @@ def cross(view: StudyView, rng: np.random.Generator) -> Suggestion:
 
 
 def swap(view: StudyView, rng: np.random.Generator) -> Suggestion:
-    """Change a choice of one of the best trials.
-
-    Parameters that depend on the choice are taken from the best trial that made it.
-    """
+    """Change a choice of one of the best trials; what depends on it comes from the best trial that made it."""
     parent = int(rng.choice(view.best))
     own = view.params[parent]
     name = draw([choice for choice in view.choices if choice in own] or view.choices, rng)

@@ -48,7 +48,6 @@ STALL_FROM = 20_000  # evaluations; an early plateau is not a stall
 STALL_SHARE = 0.5  # of the evaluations, the latest
 STALL_GROWTH = 3e-4  # of the hypervolume, relative, over that share
 
-
 # Attributes of a search, without the leading underscore, that make up its state.
 _COUNTERS = ("generation", "evaluations", "random_left", "side_evaluations", "side_age")
 _ARRAYS = ("matrix", "values", "front_matrix", "front_values", "side_matrix", "side_values", "reference_point")
@@ -63,7 +62,6 @@ class FrontSearch:
         parameters: P parameters of the design space.
         evaluate: maps an (N, P) matrix of designs to (N, M) values, all minimised.
         reference_point: (M,) bound of the hypervolume; points beyond it in any objective do not count.
-        seed: of all random numbers.
         known: (N, P) designs that the first batch includes.
         vary: makes new designs from a pool, as `variation.offspring` does.
     """

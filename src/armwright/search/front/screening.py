@@ -44,9 +44,7 @@ def pays(problem: Problem) -> bool:
 class Screen:
     """Offspring of which the estimates choose; `learn` has to be called with all that is evaluated.
 
-    Args:
-        problem: a problem with a cycle.
-        reference_point: gives the (M,) values beyond which a design counts for nothing, at present.
+    The problem has a cycle. `reference_point` gives the (M,) values beyond which a design now counts for nothing.
     """
 
     def __init__(self, problem: Problem, reference_point: Callable[[], Sequence[float]]) -> None:

@@ -53,17 +53,11 @@ def best_of_each(values: Array, groups: NDArray[np.int64], reference_point: Arra
 
 
 def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, n: int) -> Indices:
-    """Return the indices of the best points of the best structures.
+    """Return the indices of the best points of the n best structures, given the (N,) structures of `values` (N, M).
 
     A structure is as good as its point with the largest box: the volume that the point alone dominates, bounded by the
     reference point. Of each structure M + 1 points are kept: that one, and one for each objective, whose box is
     weighted by the gain in this objective, so that the ends of its front stay, too.
-
-    Args:
-        values: (N, M) objective values.
-        structures: (N,) structure of each point.
-        reference_point: (M,) bound of the boxes.
-        n: number of structures.
     """
     gains = np.maximum(reference_point - values, 0.0)
     boxes = np.prod(gains, axis=1)

@@ -22,14 +22,9 @@ CATEGORY_SHARE = 0.3  # of the mutations: categories change, too
 def offspring(
     pool: Array, ranks: NDArray[np.int64], encoding: DesignEncoding, n: int, rng: np.random.Generator
 ) -> Array:
-    """Return an (n, P) matrix of new designs.
+    """Return an (n, P) matrix of new designs from a pool (N, P), sorted so that neighbours resemble each other.
 
-    Args:
-        pool: (N, P) designs, sorted so that neighbours resemble each other.
-        ranks: (N,) of the designs; of two that are drawn as a parent, the one with the lower rank is taken.
-        encoding: columns of `pool`.
-        n: number of new designs.
-        rng: source of randomness.
+    ranks: (N,) of the pool; of two designs that are drawn as a parent, the one with the lower rank is taken.
     """
     structures = encoding.structures(pool)
     one, other = _parents(structures, n, rng), _parents(structures, n, rng)
@@ -53,10 +48,7 @@ def _parents(structures: NDArray[np.int64], n: int, rng: np.random.Generator) ->
 
 
 def _of_equal_number(numbers: NDArray[np.int64], n: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Draw (2, n) indices of pool members, pairs with as many joints, given the (N,) numbers of joints of the pool.
-
-    Each number is drawn with equal probability, however few designs have it.
-    """
+    """Draw (2, n) indices of pool members, pairs with as many joints, given the (N,) numbers of joints of the pool."""
     _, members = np.unique(numbers, return_counts=True)
     wanted = rng.integers(len(members), size=n)
     within = rng.integers(members[wanted], size=(2, n))

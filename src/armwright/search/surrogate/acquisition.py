@@ -41,13 +41,7 @@ class Forecast:
 
 
 def expected_gain(forecast: Forecast, values: Array, reference_point: Array) -> Array:
-    """Return (N,) the expected gain of hypervolume by each design.
-
-    Args:
-        forecast: of N designs.
-        values: (K, M) objectives of the feasible designs so far.
-        reference_point: (M,) bound of the hypervolume.
-    """
+    """Return (N,) the expected gain of hypervolume by each design over (K, M) values of the feasible ones so far."""
     n_objectives = len(reference_point)
     within = values[np.all(values < reference_point, axis=1)]
     front = within[front_mask(within)]
@@ -62,11 +56,9 @@ def expected_gain(forecast: Forecast, values: Array, reference_point: Array) -> 
 
 
 def free_boxes(front: Array, reference_point: Array) -> tuple[Array, Array]:
-    """Return the (B, M) lower and upper corners of disjoint boxes that fill what a front does not dominate.
+    """Return the (B, M) lower and upper corners of disjoint boxes that fill what a front (K, M) does not dominate.
 
-    Args:
-        front: (K, M) points that do not dominate each other, within the reference point.
-        reference_point: (M,) upper bound of all boxes; the lower one is -inf.
+    The front lies within the reference point, the upper bound of all boxes; the lower one is -inf.
     """
     if len(reference_point) == 1:
         upper = min(float(front.min(initial=np.inf)), float(reference_point[0]))

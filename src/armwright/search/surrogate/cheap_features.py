@@ -94,12 +94,7 @@ class Description:
 
 
 class CheapFeatures:
-    """Inputs of the surrogate for designs of a problem.
-
-    Args:
-        problem: the problem; its evaluator is never called.
-        function: further inputs of a design; None for none.
-    """
+    """Inputs of the surrogate for designs of a problem, whose evaluator is never called; `function` gives more."""
 
     def __init__(self, problem: Problem, function: FeatureFunction | None = None) -> None:
         self._problem = problem

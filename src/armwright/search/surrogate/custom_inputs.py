@@ -9,11 +9,7 @@ from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 
 
 class CustomInputs:
-    """Columns for the custom parameters of a space: numbers on [-1, 1], then an indicator for each choice.
-
-    Args:
-        space: the design space.
-    """
+    """Columns for the custom parameters of a space: numbers on [-1, 1], then an indicator for each choice."""
 
     def __init__(self, space: DesignSpace) -> None:
         self._space = space

@@ -94,9 +94,7 @@ class GaussianProcess:
 def fit(inputs: Array, observations: Array) -> Hyperparameters:
     """Return the hyperparameters of the largest marginal likelihood times prior, found from two starts.
 
-    Args:
-        inputs: (N, F) of about unit variance.
-        observations: (N,) of mean 0 and unit variance.
+    Inputs (N, F) and observations (N,) are scaled as those of a GaussianProcess.
     """
     mean, spread = _priors(inputs.shape[1])
     bounds = np.column_stack([mean - PRIOR_WIDTH * spread, mean + PRIOR_WIDTH * spread])
@@ -121,12 +119,8 @@ def fit(inputs: Array, observations: Array) -> Hyperparameters:
 def loss(logs: Array, inputs: Array, observations: Array, mean: Array, spread: Array) -> tuple[float, Array]:
     """Return the negative logarithm of marginal likelihood times prior, and its gradient.
 
-    Args:
-        logs: (2 + F,) logarithms of amplitude, noise and lengths.
-        inputs: (N, F).
-        observations: (N,).
-        mean: (2 + F,) of the priors of `logs`.
-        spread: (2 + F,) standard deviations of these.
+    logs: (2 + F,) logarithms of amplitude, noise and lengths.
+    mean, spread: (2 + F,) means and standard deviations of their priors.
     """
     found, n = _hyperparameters(logs), len(inputs)
     root = np.sqrt(5.0) * _distances(inputs / found.lengths, inputs / found.lengths)

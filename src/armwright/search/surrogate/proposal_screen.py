@@ -13,13 +13,7 @@ LEAST_GAIN = 0.1  # of the best candidate's; such a proposal is worth less than 
 def rejection(
     surrogate: Surrogate, observations: Observations, row: Array, seed: int
 ) -> tuple[float, tuple[float, ...]] | None:
-    """Return why a design is not worth an evaluation; None if it is, or if too little is known to tell.
-
-    Args:
-        surrogate: of the problem.
-        observations: the designs so far.
-        row: (P,) the design.
-        seed: of the candidates that it is compared with.
+    """Return why a design (P,) is not worth an evaluation; None if it is, or if too little is known to tell.
 
     Returns:
         Its expected gain of hypervolume, as a share of the best candidate's, and its predicted objectives.

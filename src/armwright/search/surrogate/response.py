@@ -57,13 +57,9 @@ class ResponseModel:
 
 
 def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:
-    """Return the model under which values are most probable.
+    """Return the model under which the values (N,) of an objective are most probable.
 
-    The transform is chosen with the first set of inputs, then the set.
-
-    Args:
-        inputs: (N, F) of each set of inputs by name.
-        values: (N,) of an objective.
+    The transform is chosen with the first set of inputs (N, F), then the set.
     """
     first, *others = inputs
     transforms = [Transform.of(values, is_log=False)]

@@ -66,12 +66,7 @@ def surrogate_sampler(problem: Problem, features: FeatureFunction | None = None)
 
 
 class SurrogateSampler(BaseSampler):
-    """Chooses the whole design of one trial.
-
-    Args:
-        surrogate: of the problem.
-        seed: of the trial.
-    """
+    """Chooses the whole design of one trial."""
 
     def __init__(self, surrogate: Surrogate, seed: int) -> None:
         self._surrogate = surrogate

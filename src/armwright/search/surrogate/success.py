@@ -35,12 +35,7 @@ def success_labels(failed: NDArray[np.bool_]) -> Array:
 
 
 def choose_success_model(inputs: Mapping[str, Array], failed: NDArray[np.bool_]) -> tuple[str, Hyperparameters]:
-    """Return the set of inputs and the hyperparameters under which successes and failures are most probable.
-
-    Args:
-        inputs: (N, F) of each set of inputs by name.
-        failed: (N,) whether evaluations failed.
-    """
+    """Return the set of inputs (N, F) and the hyperparameters under which `failed` (N,) is most probable."""
     labels = success_labels(failed)
     fitted = {name: fit(table, labels) for name, table in inputs.items()}
     best = max(fitted, key=lambda name: GaussianProcess(inputs[name], labels, fitted[name]).log_posterior)

@@ -174,12 +174,7 @@ class Surrogate:
 
 
 class Screen:
-    """Forecasts and expected gains of designs, given those evaluated so far.
-
-    Args:
-        surrogate: of the problem.
-        observations: with at least two designs whose evaluation did not fail.
-    """
+    """Forecasts and expected gains of designs, given those evaluated so far, at least two of them without a failure."""
 
     def __init__(self, surrogate: Surrogate, observations: Observations) -> None:
         self._surrogate = surrogate
@@ -222,10 +217,7 @@ class Screen:
         return np.column_stack([m.transform.inverse(column) for m, column in zip(self._models, mean.T, strict=True)])
 
     def gain(self, known: Description) -> Array:
-        """Return (N,) expected gains of transformed hypervolume, times the probabilities of success.
-
-        Designs that violate constraints gain nothing.
-        """
+        """Return (N,) expected gains of transformed hypervolume, times probabilities of success; 0 if infeasible."""
         return self._gain(self.forecast(known), known)
 
     def score(self, matrix: Array, known: Description) -> Array:

@@ -20,16 +20,9 @@ class ReferenceSurvey:
     """The reference point of a direct search.
 
     Where the constraints of the task imply a bound of an objective, the coordinate is 1.1 times the bound. The others
-    come from the front of the first 1000 feasible designs that the search evaluates. Until then the search is bounded
-    by a provisional point, from ten random designs, which matters little: infeasible designs rank by their violation.
-
-    Args:
-        problem: The problem.
-        seed: Seed of the random designs.
-
-    Attributes:
-        point: The reference point.
-        is_open: True while the point is provisional.
+    come from the front of the first 1000 feasible designs that the search evaluates. Until then (`is_open`) the search
+    is bounded by a provisional point, from ten random designs, which matters little: infeasible designs rank by their
+    violation.
     """
 
     def __init__(self, problem: Problem, seed: int) -> None:

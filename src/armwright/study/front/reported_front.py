@@ -27,16 +27,10 @@ class ReportedFront:
 def reported_front(
     problem: Problem, matrix: Array, values: Array, reference_point: Sequence[float], n: int
 ) -> ReportedFront:
-    """Select the designs of a front to report, and remove the joints that they never move until none is left.
+    """Select at most `n` designs of a front to report, and remove the joints that they never move until none is left.
 
-    A reduced design replaces its parent if it is not worse in any objective. Otherwise both compete.
-
-    Args:
-        problem: The problem.
-        matrix: (N, P) designs of the front.
-        values: (N, M) their objectives, with penalties for infeasible ones.
-        reference_point: (M,).
-        n: Largest number of designs to report.
+    A reduced design replaces its parent if it is not worse in any objective. Otherwise both compete. The
+    front is (N, P) designs and (N, M) objectives, penalties for infeasible ones; the reference point is (M,).
     """
     kept, n_distinct = _selected(problem, matrix, values, reference_point, n)
     matrix, values = matrix[kept], values[kept]

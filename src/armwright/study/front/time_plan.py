@@ -25,12 +25,8 @@ SMALLEST_CHUNK, CHUNK_GROWTH = 16, 4  # designs, of which fewer take nearly as l
 class TimePlan:
     """Share out the wall-clock time of a search, without the compilation of kernels.
 
-    Args:
-        budget: the budget.
-        drawing: whether figures and a page follow the search.
-        started: when the time began by the clock; None for now.
-        clock: a clock [s].
-        excluded: returns the time that does not count so far [s].
+    With `drawing`, figures and a page follow the search. The time begins at `started` by the clock, or now;
+    `excluded` returns how much of it so far does not count [s].
     """
 
     def __init__(
@@ -88,12 +84,9 @@ class TimePlan:
         return max(self.left - results, min(at_least, self.left + self._drawing))
 
     def n_designs(self, seconds: float) -> int:
-        """Return how many designs there is time to verify and write.
+        """Return how many designs there is time to verify and write, at `seconds` [s] each.
 
         Recommended designs get half of the time that is left.
-
-        Args:
-            seconds: what a design takes [s].
         """
         left = max(self.left / 2.0, min(LATE_SECONDS, LATE_SHARE * self._limit))
         return int(min(MAX_DESIGNS, max(1.0, left / max(seconds, 1e-9))))
@@ -106,9 +99,6 @@ def files_seconds(task: Task) -> float:
 
 class ChunkSize:
     """Number of designs to evaluate between two looks at the clock, found from one chunk to the next.
-
-    Args:
-        budget: the budget of the search.
 
     Attributes:
         value: the number of designs.

@@ -79,11 +79,7 @@ class _Task:
 
 
 class Cluster:
-    """Runs functions on workers; local ones begin and end with it.
-
-    Args:
-        workers: which workers.
-        notify: called with news for the user.
+    """Runs functions on workers; local ones begin and end with it. `notify` is called with news for the user.
 
     Raises:
         ClusterError: the workers did not start, or the scheduler does not answer.
@@ -115,13 +111,9 @@ class Cluster:
         return len(self._tasks)
 
     def submit(self, key: Hashable, name: str, function: Callable[..., Any], *arguments: Any) -> None:
-        """Run `function(*arguments)` on a worker.
+        """Run `function(*arguments)`, a function of this package with arguments that can be pickled, on a worker.
 
-        Args:
-            key: what `wait` returns with the value.
-            name: names the task in the message that it runs again, if a worker is lost.
-            function: a function of this package.
-            arguments: anything that can be pickled.
+        `wait` returns the key with the value. If a worker is lost, the message that the task runs again has its `name`.
         """
         task_name = f"armwright-{uuid4().hex}"
         future = self._client.submit(_run, function, *arguments, key=task_name, pure=False)
@@ -252,8 +244,7 @@ def _close(client: Any) -> None:
 def _local_cluster(n_workers: int) -> Generator[tuple[str, dict[str, str]]]:
     """Start a scheduler and workers (`local_cluster.py`), and kill them all in the end.
 
-    Yields:
-        The scheduler's address and the credentials to connect, which no other user of the machine knows.
+    Yields the scheduler's address and the credentials to connect, which no other user of the machine knows.
     """
     find_cache()
     environment = {**dict.fromkeys(THREADS, "1"), "DASK_LOGGING__DISTRIBUTED": "critical"}

@@ -15,11 +15,7 @@ from armwright.study.workers.evaluation_process import EvaluationProcess, pickle
 class DaskBackend:
     """Evaluates designs on workers, which get the problem and its evaluator by value.
 
-    Args:
-        problem: the problem.
-        workers: the workers.
-        timeout: for one evaluation [s]; None for no limit.
-        notify: called with news for the user.
+    An evaluation may take `timeout` [s]; None for no limit. `notify` is called with news for the user.
 
     Raises:
         SettingsError: the problem cannot be pickled.

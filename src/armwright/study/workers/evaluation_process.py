@@ -58,9 +58,7 @@ def unpickle_problem(pickled: bytes) -> Problem:
 class EvaluationProcess:
     """Measures one design at a time in another process, which is replaced after it was ended.
 
-    Args:
-        pickled: the problem, from `pickle_problem`.
-        timeout: for one design [s].
+    The problem is pickled by `pickle_problem`; a design may take `timeout` [s].
     """
 
     def __init__(self, pickled: bytes, timeout: float) -> None:
@@ -70,11 +68,7 @@ class EvaluationProcess:
         self._connection: Connection[Any, Any] | None = None
 
     def measure(self, design: Design) -> Measurement:
-        """Measure a design.
-
-        Raises:
-            EvaluatorError: the process cannot load the evaluator.
-        """
+        """Measure a design; EvaluatorError if the process cannot load the evaluator."""
         if self._process is None or self._process.poll() is not None:
             self._start()
         assert self._connection is not None

@@ -39,12 +39,7 @@ def _end_with_parent(folder: str) -> None:
 
 
 def _start(n_workers: int, folder: str) -> tuple[Any, dict[str, str]]:
-    """Start a scheduler in this process and the workers as its children, one thread each.
-
-    Args:
-        n_workers: how many.
-        folder: for their temporary files.
-    """
+    """Start a scheduler in this process and the workers as its children, one thread each, with files in `folder`."""
     from dask.config import set as configure
     from distributed import LocalCluster, Security
 
