@@ -207,8 +207,8 @@ def shortened(text: str) -> str:
     if not re.match(r"armwright (optimize|design) ", text):
         return text
     text = re.sub(r"--budget \w+", "--budget 1s", text)
-    text = re.sub(r"(feeder|7-compare-arms-task)(.*) --evaluations \d+", rf"\1\2 --evaluations {FEW}", text)
-    text = re.sub(r"(3-long-shelf-task.*) --evaluations 8000", r"\1 --evaluations 1000", text)
+    shorter = r"(feeder|3-long-shelf-task|7-compare-arms-task)(.*) --evaluations \d+"
+    text = re.sub(shorter, rf"\1\2 --evaluations {FEW}", text)
     if "armwright design" in text and not re.search(r"--(evaluations|budget) ", text):
         text = f"{text} --evaluations {FEW}"
     if "--evaluator" in text and "--n-total" not in text:
