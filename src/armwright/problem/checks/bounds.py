@@ -7,6 +7,7 @@ if every number of modules violates at least one.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -75,7 +76,8 @@ def check_constraints(problem: Problem) -> Iterator[Finding]:
         yield Finding(f"constraints: no design satisfies {' and '.join(together)} together: {'; '.join(why)}", PROVEN)
 
 
-def intervals_by_modules(problem: Problem) -> dict[int, dict[str, Interval]]:
+@lru_cache(maxsize=1)  # several checks of a problem ask
+def intervals_by_modules(problem: Problem) -> Mapping[int, Mapping[str, Interval]]:
     """Return the intervals of price [USD], mass [kg], length [m] and joints, for each number of modules.
 
     A quantity is left out if it is not known of all arms. Ties are ignored, as if tied parameters were free.
