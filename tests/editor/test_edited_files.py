@@ -92,9 +92,10 @@ def test_what_saving_does_not_keep_is_announced(tmp_path: Path) -> None:
     file.write_bytes(mixed)
     (tmp_path / "other.yaml").hardlink_to(file)
     files = EditedFiles(file)
-    ends, names = files.notes.task.split("; ")
-    assert ends == "saving a change of task.yaml writes the line end CRLF in all lines"
-    assert names == "the other names of task.yaml (hard links) keep the text from before a change"
+    assert files.notes.task == (
+        "Saving a change of task.yaml writes the line end CRLF in all lines. "
+        "The other names of task.yaml (hard links) keep the text from before a change."
+    )
     assert files.notes.space == ""
     files.save(files.texts())
     assert file.read_bytes() == mixed

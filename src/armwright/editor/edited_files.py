@@ -135,10 +135,10 @@ def _note(file: Path, content: bytes | None) -> str:
     notes: list[str] = []
     if set(re.findall(rb"\r\n|\r|\n", content)) - {_line_end(content)}:
         end = "CRLF" if b"\r\n" in content else "LF"
-        notes.append(f"saving a change of {file.name} writes the line end {end} in all lines")
+        notes.append(f"Saving a change of {file.name} writes the line end {end} in all lines.")
     if file.stat().st_nlink > 1:
-        notes.append(f"the other names of {file.name} (hard links) keep the text from before a change")
-    return "; ".join(notes)
+        notes.append(f"The other names of {file.name} (hard links) keep the text from before a change.")
+    return " ".join(notes)
 
 
 def _write(file: Path, content: bytes) -> None:
