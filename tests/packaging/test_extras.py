@@ -134,7 +134,6 @@ WITH_EXTRAS: tuple[tuple[list[str], str], ...] = (  # their only line
     (["draft", "reach a shelf", "--model", "openai-chat:gpt-4o"], LLM),
     (["experiment", "paper"], f"experiment needs {STUDIES}"),
     (["optimize", "target-1", "--print-prompt", "next"], f"optimize needs {STUDIES}"),
-    (["export", "run", "--format", "optuna"], f"--format optuna needs {STUDIES}"),
     (["datasheet", "run"], 'datasheet needs matplotlib: pip install "armwright[figures]"'),
 )
 
