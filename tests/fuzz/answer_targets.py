@@ -23,10 +23,8 @@ def answer_seeds() -> list[bytes]:
         found += [json.dumps(design) for design in designs]
         found.append(json.dumps({"reasoning": "so", **designs[0], "reason": "why"}))
         found.append(f"I think so.\n```json\n{json.dumps(designs[0], indent=2)}\n```\nThat is it.")
-    found.append(
-        "<think>hm</think>\nORIGIN: (0.1, -0.2, 0.0) m\nJOINTS: Y, P, R, P\nLINKS: 0.1 0.2 0.3 0.1 m\nREASON: x"
-    )
-    found.append("**ORIGIN** = [0, 0, 0]; JOINTS = YPRP; LINKS = L1 = 0.1, L2 = 0.1, L3: .2, L4: 0.25")
+    found.append("<think>hm</think>\nORIGIN: (0.1, -0.2, 0.0)\nJOINTS: Y, P, R, P\nLINKS: 0.1 0.2 0.3 0.1\nREASON: x")
+    found.append("**ORIGIN** = [0, 0, 0]\n- JOINTS = YPRP\n1. LINKS = 0.1 m, 0.1 m, .2 m, 0.25 m")
     found.append('{"origin": [0, 0.1, 0], "joints": "YPRP", "links": ["0.1 m", 0.2, "0.3", 0.1]}')
     return [text.encode() for text in found]
 
