@@ -26,7 +26,7 @@ def argument_seeds() -> list[bytes]:
         ["optimize", "target-1", "--model", "openai-chat:x", "--max-cost", "0.5", "--model-options",
          "{base_url: 'http://127.0.0.1:9', max_calls: 3, temperature: 0, seed: 1, answer: one-step, output: native}"],
         ["optimize", "target-1", "--print-prompt", "next", "--model-options", "{answer: one-step}", "--n-init", "3"],
-        ["optimize", run, "--print-prompt", "next"], ["optimize", "target-1", "--print-prompt", "schema"],
+        ["optimize", "target-1", "--print-prompt", "schema"],
         ["design", "target-1", "--evaluations", "100", "--no-stall", "--seed", "1"],
         ["experiment", "paper", "--seeds", "1", "--task", "target-1", "--method", "bbo", "--print"],
         ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"], ["compare", "--list", run, "--json"],

@@ -8,14 +8,13 @@ from typing import Any
 
 import pytest
 
-from armwright import ManualProposer, PromptOptions, ReplayProposer, load_task
+from armwright import ManualProposer, ReplayProposer, load_task
 from armwright.exceptions import AnswerPendingError
 from armwright.llm import client as chat
 from armwright.llm.prompt import design_prompt
 from armwright.llm.transcript import hints_of, used_hints
 from armwright.runs.control import Hint, add_hint, read_control
 from armwright.study.progress import Progress
-from armwright.study.prompt_preview import preview_after
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.command_line import PATIENCE
 from tests.support.controlled_runs import after, asks, calls, cut, interrupt, lines, run, status
@@ -101,10 +100,9 @@ def test_hint_of_an_interrupted_call_is_sent_again(chat_server: ChatServer, tmp_
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
         run(out, asks(chat_server), watch=after(3, lambda: (add_hint(out, "first"), interrupt())))
-    shown = preview_after(out).prompt
-    assert NOTE + "first\n" in shown
     run(out, asks(chat_server))
-    assert [call.prompt for call in calls(out) if call.hints] == [shown]
+    (shown,) = (call.prompt for call in calls(out) if call.hints)
+    assert NOTE + "first\n" in shown
     cut(out, transcripts=3, trials=4)  # two checks, and the thoughts
     (out / "summary.json").unlink()
     chat_server.requests.clear()
@@ -128,19 +126,6 @@ def test_concurrent_calls_share_no_hint(chat_server: ChatServer, tmp_path: Path)
     run(out, asks(chat_server), in_flight=2)
     assert len(prompts_with_hints(out)) == 1
     assert len(used_hints(calls(out))) == 1
-
-
-def test_previewed_hints_are_those_sent(chat_server: ChatServer, tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    run(out, asks(chat_server), n_total=3)
-    plain = preview_after(out).prompt
-    add_hint(out, "first")
-    shown = preview_after(out).prompt
-    assert shown.replace(f"{NOTE}first\n\n", "") == plain
-    assert NOTE in preview_after(out, PromptOptions(prompt="minus")).prompt
-    run(out, asks(chat_server), n_total=6)
-    assert [call.prompt for call in calls(out) if call.hints] == [shown]
-    assert NOTE not in preview_after(out).prompt
 
 
 PAPER = FixedProblem(load_task("target-1"))

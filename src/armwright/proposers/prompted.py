@@ -14,7 +14,7 @@ from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
-from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Transcript, used_hints
+from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, used_hints
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.control import Hint, read_control
@@ -45,11 +45,6 @@ class PromptedProposer(LlmSession, Proposer):
         self._begin(None if folder is None else folder / TRANSCRIPTS)
         self._folder = folder
 
-    def open_read_only(self, folder: Path) -> None:
-        """Open the transcript and hints of a run without changing them."""
-        self._transcript = Transcript(folder / TRANSCRIPTS, read_only=True)
-        self._folder = folder
-
     def unused(self, history: History) -> Sequence[Proposal]:
         """Return recorded designs of a killed run that no trial has used yet."""
         used = {trial.answer for trial in history}
@@ -62,7 +57,7 @@ class PromptedProposer(LlmSession, Proposer):
 
     def propose(self, history: History, seed: int, number: int) -> Proposal:
         """Propose the next design; recorded thoughts of a killed run are used rather than asked for again."""
-        question, problem = self.question(history, seed, number), history.problem
+        question, problem = self._next_question(history, seed, number), history.problem
         try:
             text = self._ask(question, self.output_format(problem), partial(parameters_prompt, problem))
         except ProposalError as fault:
@@ -73,17 +68,17 @@ class PromptedProposer(LlmSession, Proposer):
                 self._hints_under_way.difference_update(question.hints)
         return proposal_of(question, text, problem)
 
-    def question(self, history: History, seed: int, number: int) -> Question:
+    def _next_question(self, history: History, seed: int, number: int) -> Question:
         """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
         thoughts = self._transcript.answered(self.identity(number), "reasoning")
         if thoughts is not None:
             prompt = parameters_prompt(history.problem, thoughts.answer)
             return Question(self.identity(number), "parameters", prompt, thoughts.known)
-        hints = self.next_hints()
+        hints = self._next_hints()
         prompt = self.prompt_for(history, seed, number, hints)
         return self._question(number, prompt, len(history), hints)
 
-    def next_hints(self) -> tuple[Hint, ...]:
+    def _next_hints(self) -> tuple[Hint, ...]:
         """Return the unused hints, which go with a question that is asked now, and no other one.
 
         Manual answers get none: their question has to stay the same until it is answered.
