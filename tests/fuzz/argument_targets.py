@@ -29,7 +29,7 @@ def argument_seeds() -> list[bytes]:
         ["optimize", "target-1", "--print-prompt", "schema"],
         ["design", "target-1", "--evaluations", "100", "--no-stall", "--seed", "1"],
         ["experiment", "paper", "--seeds", "1", "--task", "target-1", "--method", "bbo", "--print"],
-        ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"], ["compare", "--list", run, "--json"],
+        ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"],
         ["compare-arms", "target-1", "arm.urdf", "--base", "0,0,0.5", "--tip", "tip", "--base-link", "base"],
         ["pick", run, "--where", "torque<=9", "--by", "mass", "-n", "2"], ["pick", run, "--weights", "torque=1"],
         ["export", run, "--design", "2", "--format", "mjcf", "--out", "x/y.xml"], ["report", run],

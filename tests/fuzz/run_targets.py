@@ -73,7 +73,6 @@ def of_run(name: str) -> Callable[[bytes], None]:
 def looked_at(there: Path) -> None:
     """Read a run folder in every way."""
     from armwright.experiments.compare_runs import compare_runs
-    from armwright.experiments.run_list import list_runs
     from armwright.experiments.tables import markdown
     from armwright.page.content import RunContent, finished_content
     from armwright.proof.export import export_design
@@ -83,7 +82,6 @@ def looked_at(there: Path) -> None:
 
     any_of(
         (
-            lambda: json.dumps(list_runs([there])),
             lambda: pick_from(there, robust=True),
             lambda: export_design(there, None, "urdf"),
             lambda: RunContent(there).packed(),

@@ -124,7 +124,6 @@ WITHOUT_EXTRAS: tuple[tuple[list[str], str], ...] = (  # what each command print
     (["report", "run"], "run/report.html"),
     (["reach-map", "run", "--spacing", "0.4", "--directions", "1"], NO_FIGURES),
     (["compare", "run"], "front search"),
-    (["compare", "--list", "."], "run"),
     (["doctor"], f"extra studies: {STUDIES.replace(' and ', ', ').replace(':', ' not installed:')}"),
 )
 WITH_EXTRAS: tuple[tuple[list[str], str], ...] = (  # their only line
