@@ -146,11 +146,11 @@ class LiveServer:
     """The live page's application, called without a network."""
 
     def __init__(self, folder: Path) -> None:
-        from armwright.page.live_app import OpenPages, live_app
+        from armwright.page.live_app import live_app
         from armwright.page.request_guard import Guard
 
         self.folder, self.key = folder, "the-key"
-        self.app: Any = Guard(live_app(folder, OpenPages()), self.key, {"/"}, lambda host: host == "127.0.0.1:9")
+        self.app: Any = Guard(live_app(folder), self.key, {"/"}, lambda host: host == "127.0.0.1:9")
 
     async def _ask(self, method: str, path: bytes, headers: list[tuple[bytes, bytes]], body: bytes) -> tuple[int, Any]:
         address, _, query = path.partition(b"?")
@@ -198,7 +198,7 @@ def request_seeds() -> list[bytes]:
     actions = [{"action": action} for action in ("pause", "stop", "resume")]
     bodies = [json.dumps(action) for action in (*actions, {"action": "hint", "text": "lower, please"})]
     posts = [{"method": "POST", "path": "/control", "headers": RIGHT, "body": body} for body in bodies]
-    paths = ("/run?designs=3&calls=1", "/file?design=2&format=mjcf", "/", "/control")
+    paths = ("/run", "/status", "/file?design=2&format=mjcf", "/", "/control")
     gets = [{"method": "GET", "path": path, "headers": RIGHT, "body": ""} for path in paths]
     return [json.dumps(one).encode() for one in (*posts, *posts, *gets)]
 
@@ -211,8 +211,6 @@ def run_request(data: bytes) -> None:
         headers = {str(name): str(value) for name, value in headers.items()}
     except (ValueError, RecursionError, KeyError, TypeError, AttributeError):
         method, path, headers, body = "POST", "/control", RIGHT, data
-    if isinstance(method, str) and str(path).partition("?")[0] == "/events":
-        return  # without an end
     if not isinstance(body, bytes):
         body = (body if isinstance(body, str) else json.dumps(body)).encode("utf-8", "replace")
     before = {path.name for path in server.folder.iterdir()}

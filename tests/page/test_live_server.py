@@ -24,7 +24,7 @@ from armwright.runs.folder import RunFolder, read_run
 from tests.support.browser import Tab
 from tests.support.chat_server import Answer, ChatServer, Request, designer, wants_design
 from tests.support.command_line import PATIENCE
-from tests.support.live_server import ask, post_control, served
+from tests.support.live_server import post_control, served
 from tests.support.wire_formats import model_options
 
 __all__ = ["served"]  # a fixture
@@ -189,17 +189,13 @@ def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Pat
     folder = tmp_path / "run"
     aw.find_front(aw.Problem(aw.load_task("target-1")), evaluations=400, out=folder)
     run = LiveRun(folder)
-    run.look()
-    assert run.status["doing"] == "finished"
+    assert run.status()["doing"] == "finished"
     discard_results(folder)
     with RunFolder(folder):
-        run.look()
-        assert run.status["doing"] == "searching"
-    run.look()
-    assert run.status["doing"] == "unknown"
+        assert run.status()["doing"] == "searching"
+    assert run.status()["doing"] == "unknown"
     Channel(folder).report("evaluating", 0)  # by a process that has been killed
-    run.look()
-    assert run.status["doing"] == "gone"
+    assert run.status()["doing"] == "gone"
 
 
 @pytest.mark.parametrize(
@@ -215,15 +211,6 @@ def test_invalid_control_requests_are_refused(served: tuple[Path, int, str], con
     before = read_control(folder)
     assert post_control(port, key, content) == status
     assert read_control(folder) == before
-
-
-def test_only_what_is_new_is_sent(served: tuple[Path, int, str]) -> None:
-    _, port, key = served
-    whole, other, later = (
-        ask(port, "GET", f"/run{query}", X_Armwright_Key=key)[1] for query in ("", "?designs=-1&calls=x", "?designs=10")
-    )
-    assert other == whole
-    assert len(later) < len(whole)
 
 
 def test_server_listens_on_loopback_only(served: tuple[Path, int, str]) -> None:

@@ -3,18 +3,13 @@
 import { $, duration, element, plural } from "./format.js";
 import { openKey, post, request } from "./key.js";
 
-const AGAIN = 1000; // [ms] between attempts to reach a lost server
+const LOOK = 500, AGAIN = 1000; // [ms] between two looks at the status, and between attempts to reach a lost server
 
 let content = null;
 let take = null;
 let status = null;
-let beside = null; // state of the reach maps and existing arms that the page shows
-let busy = false, behind = false, lost = false;
-
-// Fetches the part of the run that the page lacks.
-async function fetchRun() {
-  return (await request(`run?designs=${content.n}&calls=${content.calls.length}`)).arrayBuffer();
-}
+let version = 0; // of the content that the page shows
+let busy = false, lost = false;
 
 // Fetches the file of a design that the page does not hold; null offline.
 export function fileFetcher() {
@@ -34,45 +29,28 @@ export function openLive(shownContent, taken) {
     const text = $("hint-text").value.trim();
     if (text && (await send({ action: "hint", text }))) $("hint-text").value = "";
   });
-  // A browser allows six connections to a server over all its tabs, so hidden tabs disconnect.
-  listenTo();
-  document.addEventListener("visibilitychange", listenTo);
+  follow();
   setInterval(show, 1000); // updates the elapsed seconds
 }
 
-let listening = new AbortController();
-
-// Follows the status while the tab is visible; not by an EventSource, which cannot send the key.
-async function listenTo() {
-  listening.abort();
-  if (document.hidden) return;
-  listening = new AbortController();
-  const { signal } = listening;
-  while (!signal.aborted) {
+// Follows the status while the tab is visible.
+async function follow() {
+  for (;;) {
     try {
-      // Out of this function, so that no fault of the page is taken for a lost connection.
-      await readLines(await request("events", { signal }), (line) => queueMicrotask(() => takeStatus(JSON.parse(line))));
+      if (!document.hidden) {
+        const news = await (await request("status")).json();
+        queueMicrotask(() => takeStatus(news)); // so that no fault of the page is taken for a lost connection
+      }
     } catch (fault) {
-      if (signal.aborted) return;
       if (fault.status === 403) {
         $("loading").textContent = `This page cannot be shown: ${fault.message}`;
         complain("refusal", fault.message);
         return;
       }
+      lost = true;
+      show();
     }
-    lost = true;
-    show();
-    await new Promise((next) => setTimeout(next, AGAIN));
-  }
-}
-
-async function readLines(reply, listener) {
-  const reader = reply.body.pipeThrough(new TextDecoderStream()).getReader();
-  let rest = "";
-  for (let part = await reader.read(); !part.done; part = await reader.read()) {
-    const lines = (rest + part.value).split("\n");
-    rest = lines.pop();
-    lines.forEach(listener);
+    await new Promise((next) => setTimeout(next, lost ? AGAIN : LOOK));
   }
 }
 
@@ -80,36 +58,24 @@ function takeStatus(news) {
   lost = false;
   const before = status;
   status = news;
-  if (before !== null && before.run !== status.run) { // another run in this folder
+  if (before?.designs && before.run !== status.run) { // another run in this folder
     location.reload();
     return;
   }
   document.title = `${status.name}: armwright, live`;
   show();
-  const isNews = status.designs !== content.n || status.calls !== content.calls.length
-    || status.finished !== content.head?.result.finished || status.beside !== beside;
-  if (isNews && (status.designs || content.n)) catchUp();
+  if (status.version !== version && (status.designs || content.n)) catchUp(status.version);
 }
 
-async function catchUp() {
-  if (busy) {
-    behind = true;
-    return;
-  }
+// Fetches the run; a later look at the status tries again if that fails.
+async function catchUp(latest) {
+  if (busy) return;
   busy = true;
-  let news = null;
-  const fetched = status.beside;
   try {
-    news = await fetchRun();
-    beside = fetched;
-  } catch (fault) {
-    if (fault.status !== 403) setTimeout(catchUp, AGAIN);
-  }
-  busy = false;
-  if (news !== null) take(news);
-  if (behind) {
-    behind = false;
-    catchUp();
+    take(await (await request("run")).arrayBuffer());
+    version = latest;
+  } finally {
+    busy = false;
   }
 }
 
