@@ -24,7 +24,6 @@ EXISTING = {
     "dominates": 1, "dominated_by": 0, "violated": [],
     "notes": ["the tip is here"],
 }  # fmt: skip
-HINTS = [{"id": 1, "text": "a SCARA arm"}, {"id": 2, "text": "lower"}]
 
 
 @cache
@@ -37,7 +36,7 @@ def a_run() -> Path:
         proposer = llm_proposer(server.url, memory="chat", origin="scripted")
         aw.optimize(a_problem(), proposer=proposer, n_init=3, n_step=2, n_total=4, out=there)
     write_report(there)
-    control = {"paused": True, "stop": False, "hints": HINTS}
+    control = {"paused": True, "stop": False}
     for name, content in (("existing_arms.json", [EXISTING]), ("control.json", control)):
         (there / name).write_text(json.dumps(content), encoding="utf-8")
     return there
@@ -76,7 +75,7 @@ def looked_at(there: Path) -> None:
     from armwright.proof.export import export_design
     from armwright.proof.selection import pick_from
     from armwright.proposers.replay import ReplayProposer
-    from armwright.runs.control import Channel, add_hint, read_control, read_status
+    from armwright.runs.control import Channel, read_control, read_status
 
     any_of(
         (
@@ -87,7 +86,6 @@ def looked_at(there: Path) -> None:
             lambda: markdown(compare_runs(there), "runs", notes=()),
             lambda: replayed(ReplayProposer(there)),
             lambda: (read_control(there), read_status(there)),
-            lambda: add_hint(there, "x"),
             lambda: Channel(there).begin(0),
         )
     )

@@ -22,7 +22,7 @@ from armwright.proof.cycle_faults import describe_path
 from armwright.proof.design_record import read_records
 from armwright.proof.results import read_summary
 from armwright.proof.selection import pick_from
-from armwright.runs.control import add_hint, read_control, read_status
+from armwright.runs.control import read_control, read_status
 from armwright.runs.folder import RunFolder, is_held, read_run
 from armwright.sheet.design_sheet import design_sheet
 from tests import ROOT
@@ -158,18 +158,16 @@ def mode(path: Path) -> int:
 
 
 @pytest.mark.parametrize("before", [None, 0o644, 0o666])
-def test_no_other_user_can_open_the_locks_of_a_run(run: Path, before: int | None) -> None:
-    locks = [run / ".lock", run / ".control.lock"]
-    for lock in locks:
-        lock.unlink(missing_ok=True)
-        if before is not None:
-            lock.touch()
-            lock.chmod(before)
+def test_no_other_user_can_open_the_lock_of_a_run(run: Path, before: int | None) -> None:
+    lock = run / ".lock"
+    lock.unlink(missing_ok=True)
+    if before is not None:
+        lock.touch()
+        lock.chmod(before)
     mask = os.umask(0)
     try:
         with RunFolder(run):
-            add_hint(run, "a hint")
-            assert [mode(lock) for lock in locks] == [0o600, 0o600]
+            assert mode(lock) == 0o600
             assert is_held(run)
     finally:
         os.umask(mask)

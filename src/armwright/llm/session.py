@@ -24,7 +24,6 @@ from armwright.llm.conversation import conversation, new_part
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, total_cost
 from armwright.proof.summary_file import ProposerSummary
-from armwright.runs.control import Hint
 
 
 class LlmSession:
@@ -105,10 +104,10 @@ class LlmSession:
         """Return the calls that the budget and the summary count."""
         return self._transcript.calls
 
-    def _question(self, number: int, prompt: str, known: int, hints: tuple[Hint, ...] = ()) -> Question:
+    def _question(self, number: int, prompt: str, known: int) -> Question:
         """Return the question for trial `number`, to be followed by a second one if the answer is in two steps."""
         step = "reasoning" if self.options.answer == "two-step" else "answer"
-        return Question(self.identity(number), step, prompt, known, hints)
+        return Question(self.identity(number), step, prompt, known)
 
     def _ask(self, question: Question, output: OutputFormat, extraction: Callable[[str], str] = str) -> str:
         """Return the answer in the format `output`.
@@ -118,7 +117,7 @@ class LlmSession:
         over = self._over  # of this session, even if another one begins meanwhile
         if question.step == "reasoning":
             thoughts = self._call(question, None, over)
-            question = replace(question, step="parameters", prompt=extraction(thoughts), hints=())
+            question = replace(question, step="parameters", prompt=extraction(thoughts))
         return self._call(question, output, over)
 
     def _earlier(self, question: Question) -> Sequence[Turn] | None:

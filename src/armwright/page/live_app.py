@@ -4,7 +4,7 @@
 /run            the run, packed
 /file           a design as text: ?design=N&format=urdf, mjcf or datasheet
 /status         the status of the study, which a page that is looked at asks for twice a second
-/control        POST: pause, resume, stop, hint; from the page alone
+/control        POST: pause, resume, stop; from the page alone
 
 All but the page need the server's key (request_guard.py).
 """
@@ -24,16 +24,15 @@ from armwright.exceptions import ArmwrightError, RunFolderError
 from armwright.page.live_run import LiveRun
 from armwright.page.page import live_shell
 from armwright.page.request_guard import read_request
-from armwright.runs.control import add_hint, pause_study, resume_study, stop_study
+from armwright.runs.control import pause_study, resume_study, stop_study
 
 MAX_BODY = 64 * 1024  # largest POST [bytes]
 
 
 class ControlRequest(BaseModel, frozen=True, extra="forbid"):
-    """A request of the page's user to the study; text: that of a hint for the next prompt."""
+    """A request of the page's user to the study."""
 
-    action: Literal["pause", "resume", "stop", "hint"]
-    text: str = ""
+    action: Literal["pause", "resume", "stop"]
 
 
 _ACTIONS: dict[str, Callable[[Path], None]] = {"pause": pause_study, "resume": resume_study, "stop": stop_study}
@@ -94,7 +93,7 @@ class LivePage:
         try:
             await asyncio.to_thread(self._apply, ControlRequest.model_validate_json(body))
         except ValidationError:
-            return PlainTextResponse("expected pause, resume, stop or hint", status_code=422)
+            return PlainTextResponse("expected pause, resume or stop", status_code=422)
         except ArmwrightError as fault:
             return PlainTextResponse(str(fault), status_code=409)
         return Response(status_code=204)
@@ -102,10 +101,7 @@ class LivePage:
     def _apply(self, request: ControlRequest) -> None:
         if not self._folder.is_dir():
             raise RunFolderError("the run folder is gone")
-        if request.action == "hint":
-            add_hint(self._folder, request.text)
-        else:
-            _ACTIONS[request.action](self._folder)
+        _ACTIONS[request.action](self._folder)
 
 
 def _natural(request: Request, name: str) -> int | None:

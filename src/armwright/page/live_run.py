@@ -1,7 +1,6 @@
 """A run folder as the live server shows it: its content, and the status of the study."""
 
 import threading
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -10,7 +9,7 @@ from armwright.exceptions import ArmwrightError
 from armwright.existing.compare_arms import EXISTING_ARMS
 from armwright.extras import naming_extras
 from armwright.files import replace_surrogates
-from armwright.llm.transcript import TRANSCRIPTS, used_hints
+from armwright.llm.transcript import TRANSCRIPTS
 from armwright.page.content import RunContent
 from armwright.proof.results import REPORT, SUMMARY
 from armwright.runs.config import FrontMethod
@@ -97,8 +96,6 @@ class LiveRun:
             doing = "gone"
         recent = [trial.seconds.get("total", 0.0) for trial in trials[-RECENT:]]
         planned = None if study is None else study.n_trials
-        n_init = 0 if study is None else study.n_init
-        used = used_hints(() if content is None else content.calls)  # proposals, named PROPOSER-NUMBER, by hint
         return {
             "name": replace_surrogates(self.folder.resolve().name),
             "run": run,
@@ -110,17 +107,8 @@ class LiveRun:
             "left": None if planned is None or not recent else (planned - len(trials)) * sum(recent) / len(recent),
             "paused": control.paused,
             "fault": self.fault or ("" if status is None else status.fault),
-            "takes_hints": study is not None and _asks_a_model(study.proposer or {}),
-            "hints": [
-                {"text": hint.text, "used": int(used[hint].rpartition("-")[2]) - n_init + 1 if hint in used else None}
-                for hint in control.hints
-            ],
+            "asks_a_model": study is not None and "prompt" in (study.proposer or {}),
         }
-
-
-def _asks_a_model(proposer: Mapping[str, Any]) -> bool:
-    """Return whether a hint would reach a model; rules, people and replays take none."""
-    return "prompt" in proposer and "replay" not in proposer and proposer["name"] != "manual"
 
 
 def _stamp(path: Path) -> tuple[int, ...] | None:

@@ -24,11 +24,6 @@ export function openLive(shownContent, taken) {
   $("loading").textContent = "The first designs are being evaluated …";
   $("pause").addEventListener("click", () => send({ action: status?.paused ? "resume" : "pause" }));
   $("stop").addEventListener("click", () => send({ action: "stop" }));
-  $("hint").addEventListener("submit", async (event) => {
-    event.preventDefault();
-    const text = $("hint-text").value.trim();
-    if (text && (await send({ action: "hint", text }))) $("hint-text").value = "";
-  });
   follow();
   setInterval(show, 1000); // updates the elapsed seconds
 }
@@ -99,7 +94,7 @@ const since = () => duration(Math.max(0, Date.now() / 1000 - status.since));
 
 function doing() {
   switch (status.doing) {
-    case "asking": return `asking the ${status.takes_hints ? "model" : "proposer"}, ${since()}`;
+    case "asking": return `asking the ${status.asks_a_model ? "model" : "proposer"}, ${since()}`;
     case "evaluating":
       return status.designs < status.planned ? `evaluating ${status.designs + 1} of ${status.planned}` : "writing the results";
     case "paused": return `paused for ${since()}, at ${status.designs} of ${status.planned}`;
@@ -123,9 +118,5 @@ function show() {
   $("pause").disabled = $("stop").disabled = lost;
   $("pause").setAttribute("aria-pressed", status.paused);
   $("pause").textContent = status.paused ? "Resume" : "Pause";
-  $("hint").hidden = !status.takes_hints || isOver;
   complain("fault", status.fault ? `last fault: ${status.fault}` : "");
-  const used = status.hints.filter((hint) => hint.used !== null), waiting = status.hints.filter((hint) => hint.used === null);
-  $("hints").replaceChildren(...[...used.slice(-1), ...waiting].map((hint) => element("li", {},
-    hint.used === null ? "waiting for the next prompt: " : `used at iteration ${hint.used}: `, element("em", {}, hint.text))));
 }
