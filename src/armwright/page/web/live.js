@@ -66,12 +66,11 @@ function takeStatus(news) {
 async function catchUp(latest) {
   if (busy) return;
   busy = true;
-  try {
-    take(await (await request("run")).arrayBuffer());
-    version = latest;
-  } finally {
-    busy = false;
-  }
+  const news = await request("run").then((reply) => reply.arrayBuffer()).catch(() => null);
+  busy = false;
+  if (news === null) return;
+  version = latest;
+  take(news);
 }
 
 async function send(action) {
