@@ -14,17 +14,15 @@ from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
-from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
+from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM
 from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory
-from armwright.search.surrogate.left_out_errors import left_out_errors
-from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
-from armwright.study.overlapping_schedule import request_schedule
+from armwright.study.overlapping_schedule import OverlappingSchedule
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
 from armwright.study.record import Record
-from armwright.study.schedule import ReplaySchedule, Schedule
+from armwright.study.schedule import AlternatingSchedule, ReplaySchedule, Schedule
 from armwright.study.settings import EvaluationOptions
 from armwright.study.workers.dask_backend import DaskBackend
 from armwright.study.workers.evaluation_backend import Evaluated, LocalBackend
@@ -156,7 +154,10 @@ class Study:
         record = self._proposer.recorded_trials()
         if record:
             return ReplaySchedule(self._requests, record)
-        return request_schedule(self._requests)
+        in_flight = self._method.in_flight
+        return (
+            AlternatingSchedule(self._requests) if in_flight is None else OverlappingSchedule(self._requests, in_flight)
+        )
 
     def _wait_for_start(self, number: int) -> None:
         """Take results until trial `number` may start; StoppedError if the watcher ended the session."""
@@ -310,13 +311,7 @@ class Study:
         if summary is None:
             verification = verify_front(history) if verify and folder is not None else None
             proposer = None if self._proposer is None else self._proposer.summary()
-            summary = summarize(history, config, proposer, verification, self._surrogate_errors(history))
+            summary = summarize(history, config, proposer, verification)
             if folder is not None:
                 write_results(folder, history, config, summary, verification)
         return StudyResult(history, config, summary, None if folder is None else folder.path, resumed)
-
-    def _surrogate_errors(self, history: History) -> dict[str, Any] | None:
-        """Return the errors of the surrogate's predictions; None with another sampler."""
-        if not isinstance(self._sampler, SurrogateFactory):
-            return None
-        return left_out_errors(self._sampler.surrogate, history)
