@@ -121,6 +121,12 @@ def _study_lines(history: History, summary: Record) -> Iterator[str]:
     if repeated:
         trials = "trial" if repeated == 1 else "trials"
         yield f"{repeated} {trials} repeated the design of an earlier one, without another evaluation"
+    if surrogate := summary.get("surrogate"):
+        errors = ", ".join(
+            f"{name} {'constant' if error is None else f'{error:.2g}'}" for name, error in surrogate["errors"].items()
+        )
+        designs = f"{surrogate['designs']} designs"
+        yield f"leave-one-out error of the surrogate over {designs}, in standard deviations: {errors}"
     if summary["proposer"] is not None:
         yield from _proposer_lines(summary["proposer"])
 

@@ -72,7 +72,7 @@ def rewrite_results(
     if isinstance(config.method, FrontMethod):
         new = {**summary, "verification": _verification_record(history, verification)}
     else:
-        known = {key: summary[key] for key in ("proposer", "proposer_bias") if key in summary}
+        known = {key: summary[key] for key in ("proposer", "proposer_bias", "surrogate") if key in summary}
         new = summarize(history, config, None, verification) | known
     write_results(folder, history, config, new, verification)
     return new
@@ -120,6 +120,7 @@ def summarize(
     config: RunConfig,
     proposer: ProposerSummary | None,
     verification: Verification | None = None,
+    surrogate: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a study."""
     curve = history.hypervolume
@@ -138,6 +139,7 @@ def summarize(
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **({} if config.evaluator is None else {"failures": {kind: failed[kind] for kind in FAILURE_KINDS}}),
         **({"screened_out": dict(screened)} if config.study.screen else {}),
+        **({} if surrogate is None else {"surrogate": surrogate}),
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
         "proposer_bias": None if proposer is None else asdict(proposer_bias(history, proposer.name)),

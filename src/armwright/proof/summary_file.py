@@ -65,6 +65,11 @@ class _Proposer(_Record):
     overlap: _Overlap | None
 
 
+class _Surrogate(_Record):
+    designs: Count
+    errors: dict[str, float | None]
+
+
 class _Seconds(_Record):
     total: float
     sampling: float
@@ -133,6 +138,7 @@ class StudySummary(_Summary):
     hypervolume: _Curve
     duplicates: Count
     failures: dict[str, Count] = {}
+    surrogate: _Surrogate | None = None
     screened_out: dict[str, Count] = {}
     attribution: dict[str, Attribution]
     proposer: _Proposer | None

@@ -14,9 +14,11 @@ from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
-from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM
+from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
 from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory
+from armwright.search.surrogate.left_out_errors import left_out_errors
+from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
 from armwright.study.overlapping_schedule import OverlappingSchedule
 from armwright.study.progress import Activity, Progress, StudyResult
@@ -311,7 +313,13 @@ class Study:
         if summary is None:
             verification = verify_front(history) if verify and folder is not None else None
             proposer = None if self._proposer is None else self._proposer.summary()
-            summary = summarize(history, config, proposer, verification)
+            summary = summarize(history, config, proposer, verification, self._surrogate_errors(history))
             if folder is not None:
                 write_results(folder, history, config, summary, verification)
         return StudyResult(history, config, summary, None if folder is None else folder.path, resumed)
+
+    def _surrogate_errors(self, history: History) -> dict[str, Any] | None:
+        """Return the errors of the surrogate's predictions; None with another sampler."""
+        if not isinstance(self._sampler, SurrogateFactory):
+            return None
+        return left_out_errors(self._sampler.surrogate, history)

@@ -1,5 +1,6 @@
 """The surrogate as a sampler: resuming, conditional spaces, constraints, failures, several trials at a time."""
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -7,11 +8,15 @@ import numpy as np
 import optuna
 import pytest
 from optuna.trial import TrialState, create_trial
+from rich.console import Console
 
 import armwright as aw
+from armwright.cli.show_results import show_result
 from armwright.exceptions import SettingsError
-from armwright.runs.history import BBO, RANDOM
+from armwright.proof.results import read_summary
+from armwright.runs.history import BBO, RANDOM, History
 from armwright.search.samplers import SamplerFactory, sampler_for, sampler_name
+from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
 from armwright.spaces.optuna_distributions import distributions
 
@@ -55,6 +60,45 @@ def test_resumed_run_equals_uninterrupted_one(tmp_path: Path) -> None:
     resumed = run(7, tmp_path)
     assert [t.design for t in resumed.trials] == [t.design for t in whole.trials]
     assert {t.source for t in whole.trials} == {RANDOM, BBO, "rules"}
+
+
+@pytest.mark.slow
+def test_summary_and_terminal_state_the_errors_of_predictions(tmp_path: Path) -> None:
+    run = aw.optimize(problem(), proposer="none", n_init=10, n_total=2, out=tmp_path)
+    summary = read_summary(tmp_path)
+    assert summary is not None
+    assert summary["surrogate"] == left_out_errors(Surrogate(problem()), run.history)
+    output = io.StringIO()
+    show_result(Console(file=output, width=200), run, [])
+    assert f", span {summary['surrogate']['errors']['span']:.2g}\n" in output.getvalue()
+
+
+def history_of(problem: aw.Problem, values: np.ndarray) -> History:
+    """Return random trials of designs with these values (N, M)."""
+    designs = problem.space.sample(len(values), 3)
+    pairs = enumerate(zip(designs, values.tolist(), strict=True))
+    return History(
+        problem, [aw.FinishedTrial(i, RANDOM, design, tuple(row)) for i, (design, row) in pairs], len(values)
+    )
+
+
+@pytest.mark.slow
+def test_errors_tell_what_is_predictable_from_what_is_not() -> None:
+    designs = problem().space.sample(40, 3)
+    length = np.array([sum(design.links) for design in designs])
+    noise = 2.0 + np.sin(1e4 * length)
+    found = left_out_errors(Surrogate(problem()), history_of(problem(), np.column_stack([noise, length])))
+    assert found is not None
+    assert found["errors"]["span"] < 0.1
+    assert found["errors"]["height"] > 0.8
+
+
+def test_constant_objective_and_few_designs_have_no_error() -> None:
+    assert left_out_errors(Surrogate(problem()), history_of(problem(), np.ones((9, 2)))) is None
+    values = np.column_stack([np.full(12, 3.0), np.random.default_rng(8).uniform(1.0, 2.0, 12)])
+    found = left_out_errors(Surrogate(problem()), history_of(problem(), values))
+    assert found is not None
+    assert found["errors"]["height"] is None
 
 
 @pytest.mark.slow
