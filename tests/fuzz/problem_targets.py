@@ -11,6 +11,7 @@ from armwright.spaces.design_space import DesignSpace, load_space
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 from tests.fuzz.target import DefectError, file_of, folder
+from tests.support.arms import LIGHT
 
 MAX_POSTURES = 300  # of an arm that is evaluated here: more takes longer, and is no other code
 
@@ -182,6 +183,6 @@ def actuator_seeds() -> list[bytes]:
               "estimates": ["rotor_inertia"]}  # fmt: skip
     plain = {"name": "plain", "mass": 0.1}
     records = ([record], [record, plain | {"rated_torque": 3.0, "kind": "harmonic"}], [plain | {"peak_torque": 3.0}])
-    spaces = [{"name": "a", "actuators": listed, "safety_factor": 2.0, "motor_bodies": i == 0}
+    spaces = [{"name": "a", **LIGHT, "actuators": listed, "safety_factor": 2.0, "motor_bodies": i == 0}
               for i, listed in enumerate(records)]  # fmt: skip
     return [yaml.safe_dump(space).encode() for space in spaces]

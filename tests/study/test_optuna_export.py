@@ -19,9 +19,12 @@ from armwright.exceptions import RunFolderError, SettingsError
 from armwright.proof.results import read_summary
 from armwright.spaces.optuna_distributions import distributions
 from armwright.study.optuna_export import STUDY_DB, export_study
+from tests.support.arms import LIGHT
 from tests.support.controlled_runs import after, interrupt
 
-SPACE = DesignSpace.model_validate({"name": "some", "joints": [2, 4], "actuators": ["XL430-W250", "XM430-W350"]})
+SPACE = DesignSpace.model_validate(
+    {"name": "some", "joints": [2, 4], **LIGHT, "actuators": ["XL430-W250", "XM430-W350"]}
+)
 TASK = Task.model_validate(
     {
         "name": "some",

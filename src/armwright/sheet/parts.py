@@ -1,5 +1,6 @@
 """The mass of a design by parts, and parts lists with prices and sources."""
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 
@@ -33,7 +34,8 @@ def mass_lines(arm: Arm) -> tuple[MassLine, ...]:
 def parts_list(arm: Arm, space: DesignSpace) -> tuple[Part, ...]:
     """Return the parts list of a design of a space; a price is None if the space or the catalogue states none."""
     records = {record.name: record for record in space.actuators}
-    used = [records[joint.actuator.name] for joint in arm.joints if joint.actuator is not None]
+    motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
+    used = [records[motor.name].at_supply(motor.voltage or math.nan) for motor in motors]
     return (*actuator_parts(used), *_tubes(arm, space), *_others(arm, space))
 
 
@@ -76,7 +78,10 @@ def _tubes(arm: Arm, space: DesignSpace) -> Iterator[Part]:
 
 def _others(arm: Arm, space: DesignSpace) -> Iterator[Part]:
     n = sum(joint.kind != "fixed" for joint in arm.joints)
-    if space.bracket_mass > 0.0:
-        yield Part("brackets and screws", n, detail=f"{1e3 * space.bracket_mass:.4g} g for each joint")
+    masses = dict(zip([record.name for record in space.actuators], space.bracket_masses, strict=False))
+    used = [joint.actuator for joint in arm.joints if joint.actuator is not None]
+    total = sum(masses[actuator.name] for actuator in used) if masses else n * space.bracket_masses[0]
+    if total > 0.0:
+        yield Part("brackets and screws", n, detail=f"{1e3 * total:.4g} g in all")
     if arm.tool.mass > 0.0:
         yield Part("tool", 1, detail=f"{1e3 * arm.tool.mass:.4g} g")
