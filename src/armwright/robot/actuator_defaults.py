@@ -40,20 +40,15 @@ DEFAULTS: Mapping[ActuatorKind, KindDefaults] = {
 
 
 def default_values(
-    kind: ActuatorKind,
-    mass: float,
-    torque: float,
-    speed: float | None,
-    voltage: float | None,
-    position_gain: float | None,
+    kind: ActuatorKind, mass: float, torque: float, speed: float | None, voltage: float | None, gain: float | None
 ) -> dict[str, float]:
     """Return the defaults of a kind, without those for which speed or voltage is missing.
 
     mass: of the actuator [kg].  torque: its reference torque [N m].  speed: its no-load speed [rad/s].  voltage: its
-    supply voltage [V].  position_gain: its position gain [N m/rad]; None for the default.
+    supply voltage [V].  gain: its position gain [N m/rad]; None for the default.
     """
     ratios = DEFAULTS[kind]
-    gain = ratios.gain * torque if position_gain is None else position_gain
+    gain = ratios.gain * torque if gain is None else gain
     speed, voltage = (math.nan if value is None else value for value in (speed, voltage))
     values = {
         "bracket_mass": max(BRACKET_SHARE * mass, MIN_BRACKET_MASS),

@@ -80,9 +80,8 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         stated = [one[0] for one in self.at_voltages]
         if stated and (self.voltage is None or self.speed is None or min(map(min, self.at_voltages)) <= 0.0):
             raise ValueError(f"actuator {self.name}: at_voltages needs voltage, speed, and values above 0")
-        for volts in (*stated, *(() if self.voltage is None else (self.voltage,))):
-            if not low <= volts <= high:
-                raise ValueError(f"actuator {self.name}: {volts:g} V is outside its range of {low:g} to {high:g} V")
+        if not all(low <= volts <= high for volts in (self.voltage or low, *stated)):
+            raise ValueError(f"actuator {self.name} states voltages outside its range of {low:g} to {high:g} V")
         for name in self.estimates:
             if name not in UNITS or getattr(self, name) is None:
                 raise ValueError(f"actuator {self.name}: estimates names {name}, which has no value")

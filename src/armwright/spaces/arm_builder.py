@@ -125,10 +125,7 @@ class _Parts:
             tensor = tensor + tube_inertia(rails, rail, section) + point_inertia(rails, rail / 2 - both)
             centre, tensor = both, tensor + point_inertia(carried - rails, centre - both)
         nothing = np.zeros((columns.n, 1, 3, 3))
-        return (
-            np.concatenate([centre[:, 1:], nothing[..., 0]], axis=1),
-            np.concatenate([tensor[:, 1:], nothing], axis=1),
-        )
+        return np.append(centre[:, 1:], nothing[..., 0], axis=1), np.append(tensor[:, 1:], nothing, axis=1)
 
     def _limits(self, sign: Array) -> tuple[Array, Array]:
         """Return (N, M, K) lower and upper limits [rad] or [m]; sign: 1 if an axis of the base is one of the world."""

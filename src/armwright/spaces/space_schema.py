@@ -32,7 +32,6 @@ MAX_LENGTH = 1000.0  # [m]; beyond it float32 kernels lose the millimetre
 MAX_ANGLE = 2 * math.pi  # [rad]
 MIN_JOINT_RANGE = math.radians(3.0)  # [rad]
 MIN_STROKE = 3e-3  # [m]
-ROUNDING = 1e-9  # relative, of voltages
 
 Count = Annotated[int, Field(ge=1, le=MAX_MODULES)]
 Coordinate = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]  # [m]
@@ -165,7 +164,7 @@ class SpaceSchema(
             )
         for record in self.actuators:
             low, high = record.supply_range
-            if self.supply and not low * (1.0 - ROUNDING) <= self.supply <= high * (1.0 + ROUNDING):
+            if self.supply is not None and not low <= self.supply <= high:
                 raise ValueError(
                     f"actuators: {record.name} takes {low:g} to {high:g} V, not the supply of {self.supply:g} V; leave "
                     "it out, or change the supply"
