@@ -116,7 +116,7 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "description": one_line(task.description, MAX_DESCRIPTION_LENGTH),
         "tool": _describe_tool(task.tool),
         "payload": _describe_payload(task),
-        "rigid_bodies": _describe_bodies(problem),
+        "point_load": task.load_shape == POINT_LOAD,
         "obstacles": [obstacle.describe() for obstacle in task.obstacles],
         "collisions": problem.uses("clearance"),
         "oriented": task.target_arrays.oriented,
@@ -130,14 +130,6 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "objectives": [_task_specific(objective, task) for objective in problem.objectives],
         "cases": task.cases_description,
     }
-
-
-def _describe_bodies(problem: Problem) -> str:
-    """Describe what has inertia along a cycle, besides a tool."""
-    space, shape = problem.space, problem.task.load_shape
-    links = "solid round bars" if space.link_section.material is None else "round tubes"
-    motors = "actuators and brackets of uniform density" if space.has_motor_bodies else "actuators point masses"
-    return f"links are {links}, {motors}{', the payload a point mass' if shape == POINT_LOAD else ''}"
 
 
 def _task_specific(objective: Objective, task: Task) -> Objective:

@@ -191,9 +191,8 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         if self.speed is not None:  # the slope of the line stays
             corner = torque * (self.corner_speed or 0.0) + (speed - torque) * self.speed
             values["corner_speed"] = max(0.0, corner)
-        if self.voltage is not None:
-            values |= dict.fromkeys(("voltage_min", "voltage_max"), values["voltage"])
-        return self.model_copy(update={**values, "at_voltages": ()})
+        pinned = {"voltage_min": values.get("voltage"), "voltage_max": values.get("voltage"), "at_voltages": ()}
+        return self.model_copy(update=values | pinned)
 
     def _defaults(self) -> dict[str, float]:
         """Return the defaults of the values that are not stated. The stall torque is a peak torque, if it is stated."""

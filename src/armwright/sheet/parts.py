@@ -78,10 +78,9 @@ def _tubes(arm: Arm, space: DesignSpace) -> Iterator[Part]:
 
 def _others(arm: Arm, space: DesignSpace) -> Iterator[Part]:
     n = sum(joint.kind != "fixed" for joint in arm.joints)
-    masses = dict(zip([record.name for record in space.actuators], space.bracket_masses, strict=False))
-    used = [joint.actuator for joint in arm.joints if joint.actuator is not None]
-    total = sum(masses[actuator.name] for actuator in used) if masses else n * space.bracket_masses[0]
-    if total > 0.0:
-        yield Part("brackets and screws", n, detail=f"{1e3 * total:.4g} g in all")
+    low, high = min(space.bracket_masses), max(space.bracket_masses)
+    if high > 0.0:
+        each = f"{1e3 * low:.4g} g" if low == high else f"{1e3 * low:.3g} to {1e3 * high:.3g} g"
+        yield Part("brackets and screws", n, detail=f"{each} for each joint")
     if arm.tool.mass > 0.0:
         yield Part("tool", 1, detail=f"{1e3 * arm.tool.mass:.4g} g")
