@@ -234,8 +234,8 @@ class DesignSpace(SpaceSchema, frozen=True):
         """One sentence on the assumed masses; it accompanies all torques."""
         toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if self.is_toy else ""
         names = ", ".join(record.name for record in self.actuators)
-        at = "" if self.supply is None else f" at {self.supply:g} V"
-        actuators = f"; actuators: {names}{at}" if self.actuators else ""
+        supply = "the highest voltage that those of an arm share" if self.supply is None else f"{self.supply:g} V"
+        actuators = f"; actuators: {names}, at {supply}" if self.actuators else ""
         low, high = min(self.bracket_masses), max(self.bracket_masses)
         brackets = f"; brackets: {low:.3g}{f' to {high:.3g}' if high > low else ''} kg for each joint that moves"
         brackets = f"{brackets}{', assumed' if self.bracket_mass is None else ''}" if high > 0.0 else ""
