@@ -136,3 +136,13 @@ def test_actuators_of_a_design_are_pinned_at_its_supply() -> None:
 def test_unusable_supplies_and_links_are_refused(actuators: Any, keys: dict[str, Any], words: str) -> None:
     with pytest.raises(SpaceError, match=words):
         space(actuators, **keys)
+
+
+def test_changed_assumed_values_keep_the_supply() -> None:
+    own = space([OWN])
+    changed = own.model_copy(update={"actuators": (own.actuators[0].scaled(["rotor_inertia"], 2.0),)})
+    (before, after) = (one.arm(one.sample(1, 0)[0]).joints[0].actuator for one in (own, changed))
+    assert before is not None
+    assert after is not None
+    assert (after.voltage, after.speed) == (before.voltage, before.speed) == (12.0, 5.0)
+    assert after.rotor_inertia == pytest.approx(2.0 * (before.rotor_inertia or 0.0))

@@ -143,7 +143,8 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         values = {name: factor * value for name in names if (value := value_of(record, name)) is not None}
         if "stall_torque" in values and self.peak_torque is None:
             values["peak_torque"] = values["stall_torque"]
-        record = record.model_copy(update=values)
+        own = {"voltage_min": self.voltage_min, "voltage_max": self.voltage_max}  # not those that are assumed
+        record = record.model_copy(update=values | own)
         if record.corner_speed is None or record.speed is None:
             return record
         return record.model_copy(update={"corner_speed": min(record.corner_speed, record.speed)})
