@@ -94,7 +94,7 @@ CYCLE_SPACE = DesignSpace.model_validate(
         "name": "six-axis", "joints": 6,
         "restrict": {f"joint_{j}": letter for j, letter in enumerate("YPPPYR", start=1)},
         "link": [0.05, 0.25], "origin_x": [-0.1, 0.1], "origin_y": [-0.1, 0.1], "origin_z": [0.0, 0.1],
-        "actuators": ["XM540-W270"],
+        "mass": {"kind": "per_metre", "kg": 0.0121}, "bracket_mass": 0.0, "supply": 12.0, "actuators": ["XM540-W270"],
     }
 )  # fmt: skip
 MOTORS = ("XM540-W270", "AK60-6")  # a box and a cylinder

@@ -25,7 +25,7 @@ PYDANTIC = re.compile(
 # Keys of numbers without a unit
 BARE = {
     "joints", "safety_factor", "payload_factors", "restarts", "weight", "axis", "points", "to", "gear_ratio",
-    "reference_point", "resolution", "restrict", "grid", "range", "orientation", "count", "share",
+    "reference_point", "resolution", "restrict", "grid", "range", "orientation", "count", "share", "at_voltages",
 }  # fmt: skip
 
 

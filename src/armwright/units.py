@@ -28,7 +28,7 @@ _KEYS = {
     "USD": "price",
     "USD/m": "price_per_metre",
     "USD/kg": "price_per_kg",
-    "V": "voltage",
+    "V": "voltage voltage_min voltage_max supply",
     "A": "current",
     "N m": "stall_torque rated_torque peak_torque coulomb_friction",
     "rad/s": "speed corner_speed",

@@ -27,6 +27,7 @@ from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests import ROOT
 from tests.support import command_line
+from tests.support.arms import LIGHT
 from tests.support.documentation import PAGES, Block, Command, blocks, code_spans, commands, sections
 from tests.support.robots import robot
 
@@ -311,7 +312,7 @@ def test_files_shown_on_a_page_load(block: Block, in_folder: Path) -> None:
         named = "" if "name" in content else "name: shown\n"  # a part of a file
         some = "" if {"targets", "workspace"} & content.keys() else "targets: [[0.3, 0.0, 0.2]]\n"
         file.write_text(named + some + block.text, encoding="utf-8")
-        space = DesignSpace(actuators=("XL430-W250",), joints=3)  # type: ignore[arg-type]
+        space = DesignSpace.model_validate({"actuators": ["XL430-W250"], "joints": 3, **LIGHT})
         problem = aw.Problem(aw.load_task("shown.yaml"), space)
         assert len(problem.evaluate(problem.space.sample(2, 0)).values) == 2
     else:

@@ -26,6 +26,7 @@ from armwright.page.page import write_report
 from armwright.pictures.figures import draw_front, write_figures
 from armwright.pictures.style import RC
 from armwright.problem.objectives import named_objectives
+from armwright.robot.actuators import named_actuator
 from armwright.robot.mounting import Mounting
 from armwright.robot.robot_descriptions import find_urdf
 from armwright.robot.urdf_reader import read_urdf
@@ -49,7 +50,7 @@ SPACE = DesignSpace(
     link=(0.05, 0.4),
     link_section={"tubes": [[0.06, 0.004]], "material": "aluminium"},  # type: ignore[arg-type]
 )
-WITH_MOTORS = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
+WITH_MOTORS = SPACE.model_copy(update={"actuators": (named_actuator("XM540-W270"),)})
 UR5, PANDA = robot("ur5_robot"), robot("panda")
 
 

@@ -20,6 +20,7 @@ from armwright.tasks.obstacles import Ground
 from armwright.tasks.task import Task
 from tests.kinematics.test_clearance import agree
 from tests.kinematics.test_motor_bodies import Exported, postures, touching_solids
+from tests.support.arms import LIGHT
 
 CONTENT: Mapping[str, Any] = {
     "name": "columns",
@@ -31,6 +32,7 @@ CONTENT: Mapping[str, Any] = {
     "column": {"foot": 0.1},
     "link": [0.06, 0.25],
     "link_directions": ["+z", "-x", "+y"],
+    **LIGHT,
     "actuators": ["XM540-W270", "AK60-6", "PH42-020-S300-R", "XL330-M288"],
 }
 SPACE = DesignSpace.model_validate(CONTENT)

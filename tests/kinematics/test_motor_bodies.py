@@ -28,6 +28,7 @@ from armwright.tasks.obstacles import Ground, Obstacle
 from armwright.tasks.targets import position_targets
 from armwright.tasks.task import Task
 from tests.kinematics.test_clearance import SHAPES, agree, apart, capsule, coal_shape, random_obstacle
+from tests.support.arms import LIGHT
 
 Array = NDArray[np.float64]
 CONTENT: Mapping[str, Any] = {
@@ -39,11 +40,12 @@ CONTENT: Mapping[str, Any] = {
     "mount": ["floor", "ceiling", "wall+x", "wall-y"],
     "link": [0.06, 0.25],
     "link_directions": ["+z", "-x", "+y"],
+    **LIGHT,
     "actuators": ["XM540-W270", "AK60-6", "PH42-020-S300-R", "XL330-M288"],
 }
 SPACE = DesignSpace.model_validate(CONTENT)
 PITCH = DesignSpace.model_validate(
-    {"joints": 3, "joint_types": ["P"], "link": [0.02, 0.3], "actuators": ["XM540-W270"]}
+    {"joints": 3, "joint_types": ["P"], "link": [0.02, 0.3], **LIGHT, "actuators": ["XM540-W270"]}
 )
 
 
@@ -267,11 +269,17 @@ def test_contacts_in_mujoco_agree_with_the_clearance() -> None:
 )  # fmt: skip
 def test_spaces_that_cannot_have_bodies_are_refused(content: dict[str, Any], message: str) -> None:
     with pytest.raises((SpaceError, ValueError), match=message):
-        DesignSpace.model_validate({"actuators": ["XM430-W350"], **content})
+        DesignSpace.model_validate({**LIGHT, "actuators": ["XM430-W350"], **content})
 
 
 def test_bracket_mass_adds_to_each_joint_that_moves() -> None:
-    content = {"joints": 3, "restrict": {"joint_2": "F"}, "joint_types": ["P", "F"], "actuators": ["XL330-M288"]}
+    content = {
+        "joints": 3,
+        "restrict": {"joint_2": "F"},
+        "joint_types": ["P", "F"],
+        **LIGHT,
+        "actuators": ["XL330-M288"],
+    }
     plain = DesignSpace.model_validate(content)
     heavy = DesignSpace.model_validate({**content, "bracket_mass": 0.05})
     for design in plain.sample(20, 2):

@@ -20,6 +20,7 @@ from armwright.problem.objectives import OBJECTIVES
 from armwright.robot.actuators import catalogue
 from armwright.yaml_documents import document_keys
 from tests.support import wire_formats as wires
+from tests.support.arms import LIGHT
 from tests.support.chat_server import Answer, ChatServer, Request
 from tests.support.command_line import PATIENCE, armwright, press_ctrl_c
 from tests.support.wire_formats import model_options
@@ -38,6 +39,7 @@ SPACE = {
     "joints": 5,
     "origin_z": [0.3, 0.3],
     "link": [0.1, 0.4],
+    **LIGHT,
     "actuators": ["STS3215-12V", "XM430-W350"],
 }
 ASSUMPTIONS = ["the wall stands 0.6 m in front of the cart", "its lower edge is 0.4 m above the floor"]

@@ -16,9 +16,12 @@ from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace
 from armwright.study.study import optimize
 from armwright.tasks.task import Task
+from tests.support.arms import LIGHT
 from tests.support.browser import Tab
 
-SPACE = DesignSpace.model_validate({"name": "five", "joints": 5, "link": [0.15, 0.3], "actuators": ["XL430-W250"]})
+SPACE = DesignSpace.model_validate(
+    {"name": "five", "joints": 5, "link": [0.15, 0.3], **LIGHT, "actuators": ["XL430-W250"]}
+)
 TASK = Task(name="near", targets=((0.3, 0.0, 0.2), (0.0, 0.3, 0.3)), payload=0.05)
 SMALL = ("--spacing", "0.2", "--directions", "12")
 

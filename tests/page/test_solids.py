@@ -19,6 +19,7 @@ from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace
 from armwright.study.study import optimize
 from armwright.tasks.task import Task
+from tests.support.arms import LIGHT
 from tests.support.browser import Tab
 
 CONTENT: dict[str, Any] = {
@@ -27,6 +28,7 @@ CONTENT: dict[str, Any] = {
     "joint_types": ["R", "P", "Y", "S", "F"],
     "link": [0.1, 0.3],
     "link_directions": ["+z", "-x"],
+    **LIGHT,
     "actuators": ["XM540-W270", "AK60-6"],
 }
 SPACE = DesignSpace.model_validate({**CONTENT, "mount": ["floor", "wall+x"]})

@@ -8,6 +8,7 @@ from armwright.robot.actuators import named_actuator
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests.proof.test_simulation import DESK, SPACE, Desk
+from tests.support.arms import LIGHT
 
 SERVO = ["rated_torque", "corner_speed", "rotor_inertia", "coulomb_friction", "viscous_friction", "shaft_offset"]
 SIZE = {"width": 0.03, "height": 0.04, "depth": 0.03}
@@ -15,7 +16,7 @@ SIZE = {"width": 0.03, "height": 0.04, "depth": 0.03}
 
 def assumed_of(actuators: list[Any], with_cycle: bool = True) -> dict[str, list[str]]:
     task = Task.model_validate(DESK if with_cycle else {**DESK, "cycle": None})
-    problem = aw.Problem(task, DesignSpace.model_validate({**SPACE, "actuators": actuators}))
+    problem = aw.Problem(task, DesignSpace.model_validate({**SPACE, "supply": None, "actuators": actuators}))
     return {name: list(values) for name, values in assumed_values(problem).items()}
 
 
@@ -46,7 +47,7 @@ def test_only_actuators_in_use_count() -> None:
 
 def test_backlash_is_assumed_only_if_a_quantity_depends_on_it() -> None:
     servo = {"name": "servo", "mass": 0.1, "stall_torque": 5.0}
-    space = DesignSpace.model_validate({"actuators": [servo], "motor_bodies": False})
+    space = DesignSpace.model_validate({**LIGHT, "actuators": [servo], "motor_bodies": False})
     for constraints, names in ((["mass <= 3"], []), (["mass <= 3", "backlash_error <= 0.01"], ["backlash"])):
         task = Task.model_validate({"name": "one", "targets": [[0.3, 0.0, 0.2]], "constraints": constraints})
         problem = aw.Problem(task, space)

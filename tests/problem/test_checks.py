@@ -17,6 +17,7 @@ from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace, default_space, load_space, paper_space
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task
+from tests.support.arms import LIGHT
 from tests.support.examples import With, example_tasks
 
 DOWN = [0, 0, -1]
@@ -25,8 +26,8 @@ TABLE = {"kind": "ground", "name": "table"}
 MOTORS = ["XL430-W250", "XM430-W350", "XM540-W270"]
 SPACES = {
     "paper": {},
-    "motors": {"joints": [2, 5], "joint_types": ["R", "P", "S", "F"], "actuators": MOTORS, "stroke": [0.1, 0.4],
-               "bracket_mass": 0.05},
+    "motors": {"joints": [2, 5], "joint_types": ["R", "P", "S", "F"], "stroke": [0.1, 0.4],
+               **LIGHT, "actuators": MOTORS, "bracket_mass": 0.05},
     "restricted": {"joints": 3, "restrict": {"link_1": [0.1, 0.2], "joint_2": ["O"], "motor_3": ["XL430-W250"]},
                    "joint_types": ["R", "O", "X"], "actuators": MOTORS, "motor_bodies": False,
                    "link_section": {"tubes": [[0.03, 0.002]], "material": "aluminium"}},
@@ -41,7 +42,8 @@ SPACES = {
 
 
 def space(**keys: Any) -> DesignSpace:
-    return DesignSpace.model_validate({"name": "mine", **keys})
+    light = LIGHT if "actuators" in keys and "link_section" not in keys else {}
+    return DesignSpace.model_validate({"name": "mine", **light, **keys})
 
 
 def problem(targets: Any = (HERE,), of: DesignSpace | None = None, **keys: Any) -> Problem:
@@ -155,7 +157,7 @@ def test_proven_obstacles_leave_no_feasible_design(height: float, bounds: list[s
 @pytest.mark.parametrize(("height", "is_proven"), [(0.0, True), (0.0169, True), (0.0171, False), (0.1, False)])
 def test_bases_too_low_for_the_first_motor_are_proven(height: float, is_proven: bool) -> None:
     """An XL430-W250 or XM430-W350 reaches 17 mm below the base of a turntable, an XM540-W270 22 mm."""
-    keys = {"joints": 2, "restrict": {"joint_1": "Y"}, "actuators": MOTORS, "origin_z": [-0.1, height]}
+    keys = {"joints": 2, "restrict": {"joint_1": "Y"}, **LIGHT, "actuators": MOTORS, "origin_z": [-0.1, height]}
     checked = problem(obstacles=[TABLE], of=space(**keys))
     if not is_proven:
         assert found(checked) == []

@@ -19,13 +19,15 @@ from armwright.spaces.design_space import DesignSpace
 from armwright.study.study import optimize
 from armwright.tasks.moments import MAX_MASS
 from armwright.tasks.task import Task
-from tests.support.arms import moving_arms
+from tests.support.arms import LIGHT, moving_arms
 from tests.support.frame_program import frame_displacement
 
 TARGETS = [[0.3, 0.2, 0.1], [-0.2, 0.4, 0.3]]
 PAYLOADS = (0.2, 0.6)  # [kg]
 MOTOR = named_actuator("XM540-W270").actuator()
-SPACE = DesignSpace.model_validate({"joints": 4, "actuators": ["XM540-W270", "XM430-W350"], "origin_z": [0.0, 0.0]})
+SPACE = DesignSpace.model_validate(
+    {"joints": 4, **LIGHT, "actuators": ["XM540-W270", "XM430-W350"], "origin_z": [0.0, 0.0]}
+)
 TUBES = DesignSpace.model_validate(
     {
         "joints": [2, 4],

@@ -11,6 +11,7 @@ from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.tolerance import TOLERANCE, perturbed
 from armwright.tasks.task import Task
+from tests.support.arms import LIGHT
 
 DOWN = [0, 0, -1]
 TARGETS = [
@@ -30,7 +31,7 @@ ARM: dict[str, Any] = {
     "origin_y": [-0.1, 0.1],
     "origin_z": [0.0, 0.1],
 }
-BARE, DRIVEN = (DesignSpace.model_validate({**ARM, **more}) for more in ({}, {"actuators": ["XM540-W270"]}))
+BARE, DRIVEN = (DesignSpace.model_validate({**ARM, **more}) for more in ({}, {**LIGHT, "actuators": ["XM540-W270"]}))
 N = 12
 
 

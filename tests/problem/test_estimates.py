@@ -11,6 +11,7 @@ from armwright.proof.front_gap import known_front
 from armwright.spaces.design_space import DesignSpace, default_space, paper_space
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task
+from tests.support.arms import LIGHT
 
 N = {False: 150, True: 20}  # random designs without and with a cycle
 
@@ -58,7 +59,13 @@ def test_quantities_of_an_arm_at_rest_are_exact() -> None:
         "objectives": ["price", "mass", "length", "joints", "worst_error"],
         "constraints": ["price <= 900", "mass >= 1.5", "voltages <= 1"],
     }
-    space = {"name": "mixed", "joints": [3, 5], "actuators": ["XM540-W270", "RobStride-00"], "motor_bodies": False}
+    space = {
+        "name": "mixed",
+        "joints": [3, 5],
+        **LIGHT,
+        "actuators": ["XM540-W270", "RobStride-00"],
+        "motor_bodies": False,
+    }
     problem = Problem(Task.model_validate(content), DesignSpace.model_validate(space))
     matrix = sampled(problem, 200)
     bounds, outcomes = lower_bounds(problem, matrix), problem.evaluate(matrix)

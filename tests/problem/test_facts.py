@@ -39,8 +39,8 @@ def test_records_state_values_or_reasons(tmp_path: Path) -> None:
 def test_several_voltages_have_no_common_one() -> None:
     weak = {**WEAK, "stall_torque": 10.0, "voltage": 24.0}
     motors = {"restrict": {**SPACE["restrict"], "motor_1": "weak", **{f"motor_{k}": "XM540-W270" for k in range(2, 6)}}}
-    desk = Desk(space={**SPACE, "actuators": ["XM540-W270", weak], **motors})
-    assert {joint.actuator.voltage for joint in desk.arm.joints if joint.actuator} == {12.0, 24.0}
+    desk = Desk(space={**SPACE, "supply": None, "actuators": ["XM540-W270", weak], **motors})
+    assert {joint.actuator.voltage for joint in desk.arm.joints if joint.actuator} == {14.8, 24.0}
     (facts,) = facts_of(desk.evaluation, [desk.arm])
     assert facts["voltage"].value is None
     assert describe_supply(facts).endswith("at several voltages")

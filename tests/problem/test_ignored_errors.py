@@ -13,6 +13,7 @@ from armwright.spaces.design_space import DesignSpace, default_space, paper_spac
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.targets import ALIGNED, REACHED
 from armwright.tasks.task import Task
+from tests.support.arms import LIGHT
 
 HERE, THERE = [0.3, 0.1, 0.2], [0.2, 0.3, 0.1]
 DOWN = {"axis": [0, 0, -1]}
@@ -111,7 +112,7 @@ def test_objectives_that_no_feasible_design_can_improve_are_reported(
 def test_objectives_that_suit_the_task_are_suggested() -> None:
     """The suggestion can be evaluated, and the check has nothing against it."""
     cycle = {"steps": [{"to": 1}, {"to": 2}]}
-    motors = DesignSpace.model_validate({"name": "m", "joints": 4, "actuators": ["XL430-W250", "XM430-W350"]})
+    motors = DesignSpace.model_validate({"name": "m", "joints": 4, **LIGHT, "actuators": ["XL430-W250", "XM430-W350"]})
     for keys, space in (
         ({"constraints": ["unreached_targets <= 0"]}, paper_space()),
         ({"cycle": cycle}, paper_space()),

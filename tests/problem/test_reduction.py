@@ -11,6 +11,7 @@ from armwright.robot.arm import Arm
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import MODULES, MOUNTS
 from armwright.tasks.task import Task
+from tests.support.arms import LIGHT
 from tests.support.exported_arms import moving, peer_of, postures
 
 EVERYTHING: dict[str, Any] = {
@@ -22,6 +23,7 @@ EVERYTHING: dict[str, Any] = {
     "mount": list(MOUNTS),
     "stroke": [0.1, 0.6],
     "limit": [0.5, 2.4],
+    **LIGHT,
     "actuators": ["XL430-W250", "XM430-W350"],
     "motor_bodies": False,  # two joints at one place have no room for them
 }
@@ -29,8 +31,8 @@ TUBES: dict[str, Any] = {"tubes": [[0.03, 0.002], [0.02, 0.001]], "material": "a
 SPACES = {
     "everything": EVERYTHING,
     "without-fixed": {**EVERYTHING, "joint_types": ["R", "P", "Y"]},
-    "tubes": {**EVERYTHING, "link_section": TUBES},
-    "one-tube": {**EVERYTHING, "link_section": {**TUBES, "per_link": False}},
+    "tubes": {**EVERYTHING, "mass": None, "link_section": TUBES},
+    "one-tube": {**EVERYTHING, "mass": None, "link_section": {**TUBES, "per_link": False}},
     "constant-number": {**EVERYTHING, "joints": 4},
     "straight-on-a-grid": {**EVERYTHING, "joint_types": ["P", "Y"], "link_directions": "+z", "grid": {"link": 0.03}},
 }

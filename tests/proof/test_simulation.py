@@ -19,6 +19,7 @@ from armwright.robot.arm import Arm
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests import ROOT
+from tests.support.arms import LIGHT
 
 DESK: dict[str, Any] = {
     "name": "desk",
@@ -42,6 +43,8 @@ SPACE: dict[str, Any] = {
     "joint_types": ["Y", "P"],
     "restrict": {"joint_1": "Y", **{f"joint_{k}": "P" for k in range(2, 6)}},
     "link": [0.05, 0.3],
+    **LIGHT,
+    "supply": 12.0,
     "actuators": ["XM540-W270"],
 }
 LINKS = (0.12, 0.26, 0.22, 0.08, 0.06)

@@ -21,12 +21,13 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.design_space import DesignSpace, load_space
 from armwright.tasks.task import Task
 from tests import ROOT
+from tests.support.arms import LIGHT
 
 BIG = {"name": "big", "mass": 0.165, "stall_torque": 10.6, "rated_torque": 4.0, "speed": 3.1, "price": 400.0}
 MID = {"name": "mid", "mass": 0.082, "stall_torque": 4.1, "price": 250.0}
 SMALL = {"name": "small", "mass": 0.0572, "stall_torque": 1.5, "price": 50.0}
 SPACE = DesignSpace.model_validate(
-    {"name": "motors", "actuators": [BIG, MID, SMALL], "safety_factor": 2.0, "motor_bodies": False}
+    {"name": "motors", **LIGHT, "actuators": [BIG, MID, SMALL], "safety_factor": 2.0, "motor_bodies": False}
 )
 TASK = Task(name="loaded", targets=((0.3, 0.0, 0.2), (0.2, 0.2, 0.3)), payload=0.1)
 
@@ -89,13 +90,13 @@ def test_actuation_is_by_the_motion_of_the_joint() -> None:
 
 
 def test_voltages_counts_different_supplies() -> None:
-    space = DesignSpace.model_validate({"joints": 3, "actuators": ["XL330-M288", "XM430-W350", "XM540-W270"]})
+    space = DesignSpace.model_validate({"joints": 3, **LIGHT, "actuators": ["XL330-M288", "XM430-W350", "XM540-W270"]})
     problem = Problem(TASK.model_copy(update={"constraints": ("voltages <= 1",)}), space)
     base = space.sample(1, 0)[0].params
     rows = [("XL330-M288", "XM430-W350", "XM540-W270"), ("XM540-W270", "XM430-W350", "XM540-W270"), ("XL330-M288",) * 3]
     designs = [space.design(base | {f"motor_{j}": m for j, m in enumerate(row, start=1)}) for row in rows]
     assert problem.evaluate(designs).violations[:, 0].tolist() == [1.0, 0.0, 0.0]
-    unknown = DesignSpace.model_validate({"actuators": [MID], "motor_bodies": False})
+    unknown = DesignSpace.model_validate({**LIGHT, "actuators": [MID], "motor_bodies": False})
     with pytest.raises(SettingsError, match="voltages needs the voltage of every actuator"):
         Problem(problem.task, unknown).evaluate(unknown.sample(1, 0))
 
@@ -114,7 +115,7 @@ def test_torque_utilisation_is_the_worst_share_of_peak_torque_with_the_safety_fa
     ("space", "words"),
     [
         ({"actuators": ["XM430-W35"]}, 'unknown actuator "XM430-W35".*Did you mean'),
-        ({"actuators": [BIG, dict(BIG)]}, "actuators: expected different ones"),
+        ({**LIGHT, "actuators": [BIG, dict(BIG)]}, "actuators: expected different ones"),
         ({"actuators": [{"name": "x", "mass": 1.0}]}, "actuator x states no torque; give stall_torque"),
         ({"actuators": [BIG | {"corner_speed": 4.0}]}, "corner_speed is above the no-load speed of 3.1 rad/s"),
         ({"actuators": [MID | {"estimates": ["speed"]}]}, "estimates names speed, which has no value"),

@@ -40,6 +40,7 @@ from armwright.sheet.writer import sheet_record
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests.proof.test_simulation import DESK
+from tests.support.arms import LIGHT
 from tests.support.command_line import armwright, refused
 from tests.support.robots import robot
 
@@ -57,6 +58,7 @@ SPACE: dict[str, Any] = {
     },
     "actuators": ["XM540-W270", "XM430-W350"],
     "bracket_mass": 0.02,
+    "supply": 12.0,
 }
 NUMBER = 3
 
@@ -157,7 +159,13 @@ def test_impossible_changes_say_so(sheet: DataSheet) -> None:
 
 def test_parts_are_numbered_like_the_joints_of_the_arm() -> None:
     """A module of two joints has two actuators, and its link is after the second."""
-    content = {"joints": 2, "joint_types": ["O", "P"], "actuators": ["XM540-W270", "XM430-W350"], "motor_bodies": False}
+    content = {
+        "joints": 2,
+        "joint_types": ["O", "P"],
+        **LIGHT,
+        "actuators": ["XM540-W270", "XM430-W350"],
+        "motor_bodies": False,
+    }
     space = DesignSpace.model_validate(content)
     design = space.clipped((0.0, 0.0, 0.0), "OP", (0.1, 0.2))
     weaker = aw.Design({**design.params, "motor_1": "XM430-W350", "motor_2": "XM430-W350"})

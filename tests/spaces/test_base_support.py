@@ -14,6 +14,7 @@ from armwright.problem.problem import Problem
 from armwright.spaces.base_support import supported_space
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
+from tests.support.arms import LIGHT
 
 TABLE = {"kind": "box", "name": "table", "center": [0.2, 0.0, 0.35], "size": [0.6, 0.4, 0.7]}
 GROUND = {"kind": "ground", "name": "floor", "z": -0.2}
@@ -23,7 +24,7 @@ EXACT = (mass, price)
 
 def space(**keys: Any) -> DesignSpace:
     return DesignSpace.model_validate(
-        {"name": "s", "joints": 2, "actuators": ["XL430-W250"], "motor_bodies": False, **keys}
+        {"name": "s", "joints": 2, **LIGHT, "actuators": ["XL430-W250"], "motor_bodies": False, **keys}
     )
 
 

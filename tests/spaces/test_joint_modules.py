@@ -22,6 +22,7 @@ from armwright.spaces.design_space import DesignSpace, builtin_spaces, load_spac
 from armwright.spaces.joint_modules import MODULES, MOUNTS
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.tool import Tool
+from tests.support.arms import LIGHT
 from tests.support.exported_arms import peer_of
 
 EVERYTHING: dict[str, Any] = {
@@ -44,10 +45,16 @@ ONE_TUBE = {
     "name": "one-tube", "joints": [2, 4], "joint_types": ["R", "O", "S"], "restrict": {"tube": ["20x1", "40x1"]},
     "link_section": {"tubes": [[0.03, 0.002], [0.02, 0.001], [0.04, 0.001]], "per_link": False, "material": "carbon"},
 }  # fmt: skip
-ON_COLUMN = {"name": "on-column", "joints": 2, "column": {"price_per_metre": 20.0}, "actuators": ["XL430-W250"]}
+ON_COLUMN = {
+    "name": "on-column",
+    "joints": 2,
+    "column": {"price_per_metre": 20.0},
+    **LIGHT,
+    "actuators": ["XL430-W250"],
+}
 WITH_MOTORS = {
     "name": "with-motors", "joints": [2, 4], "joint_types": ["R", "P", "Y", "S", "F"], "mount": list(MOUNTS),
-    "link_directions": ["+x", "-y", "+z"], "actuators": ["XM430-W350", "RobStride-00"], "bracket_mass": 0.05,
+    "link_directions": ["+x", "-y", "+z"], **LIGHT, "actuators": ["XM430-W350", "RobStride-00"], "bracket_mass": 0.05,
 }  # fmt: skip
 TOOL = Tool(
     tip=(0.05, -0.02, 0.1), rpy=(0.3, -0.7, 2.0), mass=0.4, center=(0.01, 0.03, 0.06), inertia=(3e-4, 2e-4, 1e-4)

@@ -13,6 +13,7 @@ from armwright.problem.reduction import reduced
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_config
 from armwright.study.front.reported_front import reported_front
+from tests.support.arms import LIGHT
 
 SPACE = {
     "name": "plane",
@@ -20,6 +21,7 @@ SPACE = {
     "origin_y": [0.0, 0.0],
     "joint_types": ["P", "Y"],
     "link": [0.05, 0.3],
+    **LIGHT,
     "actuators": ["XL430-W250", "XC430-W240"],
 }
 

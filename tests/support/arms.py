@@ -5,6 +5,8 @@ import numpy as np
 from armwright.robot.arm import AXES, Arm, Joint, Link
 from armwright.spaces.design_space import paper_space
 
+LIGHT = {"mass": {"kind": "per_metre", "kg": 0.0121}, "bracket_mass": 0.0}  # of a space: motors on the paper's links
+
 
 def paper_arms(n: int, dof: int, seed: int) -> list[Arm]:
     """Arms of the paper's space: links along z, centre of mass half way, limits ±2.4 rad."""

@@ -107,6 +107,8 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
         Column("", lambda name: UNITS[name]), Column("source", source_of, rank=1, least=24),
     )  # fmt: skip
     print_table(console, columns, [name for name in UNITS if value_of(completed, name) is not None])
+    for volts, torque, speed in record.at_voltages:
+        console.print(f"at {volts:g} V: {torque:g} N m at rest, {speed:.4g} rad/s without load")
     if record.body_shape is not None:
         console.print(f"body: {_describe_body(record, record.body_shape)}")
 

@@ -116,7 +116,7 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "description": one_line(task.description, MAX_DESCRIPTION_LENGTH),
         "tool": _describe_tool(task.tool),
         "payload": _describe_payload(task),
-        "point_masses": "actuators and payload" if task.load_shape == POINT_LOAD else "actuators",
+        "point_load": task.load_shape == POINT_LOAD,
         "obstacles": [obstacle.describe() for obstacle in task.obstacles],
         "collisions": problem.uses("clearance"),
         "oriented": task.target_arrays.oriented,

@@ -29,6 +29,7 @@ def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None, also: It
         records = [record for record in records if record.name in used]
     entering = {*(STATIC if problem.task.cycle is None else ALONG_CYCLE), *also}
     entering |= {*YIELDING} & {rating for quantity in problem.quantities for rating in quantity.ratings}
+    entering |= {"bracket_mass"} if problem.space.bracket_mass is None else set()
     if problem.space.has_motor_bodies:
         entering.add("shaft_offset")
     return assumed_of(records, entering)

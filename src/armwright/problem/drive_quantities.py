@@ -74,6 +74,6 @@ def mean_current(e: Evaluation) -> Array:
 
 @quantity("voltages", over="arm", ratings=("voltage",))
 def voltages(e: Evaluation) -> Array:
-    """The number of different supply voltages of the actuators."""
+    """The least number of supplies that the voltages of the actuators allow."""
     voltage = np.sort(e.drives.voltage, axis=1)  # (N, J) [V]; 0 for fixed joints
     return (np.diff(voltage, axis=1, prepend=0.0) > 0.0).sum(axis=1).astype(np.float64)

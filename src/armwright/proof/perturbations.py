@@ -172,13 +172,15 @@ def _with_changed_motors(history: History, numbers: Sequence[int]) -> tuple[list
     """Return the index of a design and its change for each design with changed motors, and these arms."""
     rows: list[tuple[int, Change]] = []
     arms: list[Arm] = []
-    actuators = history.problem.space.actuators
+    space = history.problem.space
     for owner, number in enumerate(numbers):
+        actuators = space.supplied_actuators(history.trials[number].design)
         changed = {Change(SUPPLY, SUPPLY): tuple(record.at_voltage(VOLTAGE_SHARE) for record in actuators)}
         for text, names in _assumed(history, number).items():
             for verb, factor in FACTORS.items():
                 changed[Change(ASSUMED, f"{text} {verb}")] = tuple(
-                    record.scaled(names & set(record.assumed), factor) for record in actuators
+                    supplied.scaled(names & set(record.assumed), factor)
+                    for supplied, record in zip(actuators, space.actuators, strict=True)
                 )
         for change, records in changed.items() if actuators else ():
             rows.append((owner, change))
@@ -195,7 +197,7 @@ def _assumed(history: History, number: int) -> dict[str, set[str]]:
 
 def _arm(history: History, number: int, actuators: tuple[ActuatorRecord, ...]) -> Arm:
     """Return the arm of a design with other actuators of the same names."""
-    changed = history.problem.space.model_copy(update={"actuators": actuators})
+    changed = history.problem.space.model_copy(update={"actuators": actuators, "supply": None})
     return changed.arm(history.trials[number].design, history.problem.task.tool)
 
 

@@ -9,6 +9,9 @@ from armwright.robot.motor_body import BodyShape
 
 ActuatorKind = Literal["servo", "coreless servo", "geared drive", "quasi-direct-drive", "harmonic"]
 
+SUPPLY_TOLERANCE = 0.1  # of a voltage beside which the maker states no range
+BRACKET_SHARE, MIN_BRACKET_MASS = 0.25, 0.01  # of the mass of an actuator; [kg]
+
 
 @dataclass(frozen=True)
 class KindDefaults:
@@ -37,17 +40,20 @@ DEFAULTS: Mapping[ActuatorKind, KindDefaults] = {
 
 
 def default_values(
-    kind: ActuatorKind, torque: float, speed: float | None, voltage: float | None, position_gain: float | None
+    kind: ActuatorKind, mass: float, torque: float, speed: float | None, voltage: float | None, gain: float | None
 ) -> dict[str, float]:
     """Return the defaults of a kind, without those for which speed or voltage is missing.
 
-    torque: its reference torque [N m].  speed: its no-load speed [rad/s].  voltage: its supply voltage [V].
-    position_gain: its position gain [N m/rad]; None for the default.
+    mass: of the actuator [kg].  torque: its reference torque [N m].  speed: its no-load speed [rad/s].  voltage: its
+    supply voltage [V].  gain: its position gain [N m/rad]; None for the default.
     """
     ratios = DEFAULTS[kind]
-    gain = ratios.gain * torque if position_gain is None else position_gain
+    gain = ratios.gain * torque if gain is None else gain
     speed, voltage = (math.nan if value is None else value for value in (speed, voltage))
     values = {
+        "bracket_mass": max(BRACKET_SHARE * mass, MIN_BRACKET_MASS),
+        "voltage_min": (1.0 - SUPPLY_TOLERANCE) * voltage,
+        "voltage_max": (1.0 + SUPPLY_TOLERANCE) * voltage,
         "rated_torque": ratios.continuous * torque,
         "coulomb_friction": ratios.coulomb * torque,
         "backlash": ratios.backlash,

@@ -5,12 +5,14 @@ and get the default of the actuator's kind.
 """
 
 import csv
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import resources
 from typing import Any, Literal, get_args
 
+import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.exceptions import SpaceError, did_you_mean
@@ -22,9 +24,11 @@ from armwright.units import KEY_UNITS
 
 CATALOGUE = "actuators.csv"
 SOURCES = "actuator_sources.csv"
+VOLTAGES = "actuator_voltages.csv"
 ESTIMATE = "~"  # before the code of a source from which a value is estimated
 Edge = Literal["width", "height", "depth"]
 
+VOLTAGE_DRIVEN: tuple[ActuatorKind, ...] = ("servo", "coreless servo")  # without a limit of the current
 DIMENSIONS: tuple[Edge, ...] = get_args(Edge)
 
 
@@ -35,7 +39,12 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     maker: str = Field(default="", max_length=100)
     kind: ActuatorKind = "servo"  # selects the defaults of missing values
     voltage: float | None = Field(default=None, gt=0.0)  # for which the values hold [V]
+    voltage_min: float | None = Field(default=None, gt=0.0)  # lowest supply [V]
+    voltage_max: float | None = Field(default=None, gt=0.0)  # highest supply [V]
+    # other supplies [V], with the torque at rest [N m] and the no-load speed [rad/s] there
+    at_voltages: tuple[tuple[float, float, float], ...] = Field(default=(), max_length=20)
     mass: float = Field(ge=0.0, le=1e4)  # [kg]
+    bracket_mass: float | None = Field(default=None, ge=0.0, le=1e4)  # of brackets and screws that hold it [kg]
     stall_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # [N m]
     rated_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # continuous [N m]
     peak_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # intermittent [N m]
@@ -67,10 +76,30 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             raise ValueError(f"actuator {self.name} states no torque; give stall_torque, peak_torque or rated_torque")
         if self.speed is not None and (self.corner_speed or 0.0) > self.speed:
             raise ValueError(f"actuator {self.name}: corner_speed is above the no-load speed of {self.speed:g} rad/s")
+        low, high = self.supply_range
+        stated = [one[0] for one in self.at_voltages]
+        if stated and (self.voltage is None or self.speed is None or min(map(min, self.at_voltages)) <= 0.0):
+            raise ValueError(f"actuator {self.name}: at_voltages needs voltage, speed, and values above 0")
+        if not all(low <= volts <= high for volts in (self.voltage or low, *stated)):
+            raise ValueError(f"actuator {self.name} states voltages outside its range of {low:g} to {high:g} V")
         for name in self.estimates:
             if name not in UNITS or getattr(self, name) is None:
                 raise ValueError(f"actuator {self.name}: estimates names {name}, which has no value")
         return self
+
+    @property
+    def supply_range(self) -> tuple[float, float]:
+        """The lowest and the highest supply [V]; without a voltage, 0 and infinity."""
+        if self.voltage is None:
+            return 0.0, math.inf
+        defaults = self._defaults()
+        return self.voltage_min or defaults["voltage_min"], self.voltage_max or defaults["voltage_max"]
+
+    @property
+    def stated_supply(self) -> float:
+        """The highest supply that its maker states [V]; without a voltage, infinity."""
+        points = [volts for volts, *_ in self.at_voltages]
+        return self.voltage_max or max((self.voltage or math.inf, *points))
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -114,42 +143,67 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         values = {name: factor * value for name in names if (value := value_of(record, name)) is not None}
         if "stall_torque" in values and self.peak_torque is None:
             values["peak_torque"] = values["stall_torque"]
-        record = record.model_copy(update=values)
+        own = {"voltage_min": self.voltage_min, "voltage_max": self.voltage_max}  # not those that are assumed
+        record = record.model_copy(update=values | own)
         if record.corner_speed is None or record.speed is None:
             return record
         return record.model_copy(update={"corner_speed": min(record.corner_speed, record.speed)})
+
+    def at_supply(self, volts: float) -> "ActuatorRecord":
+        """Return the completed record at a supply [V], which is then the only one that it takes.
+
+        Between the voltages for which torque and speed are stated, both are interpolated. Beyond, `at_voltage` applies.
+        Without a stated voltage, the values are those of any supply.
+        """
+        record = self.completed()
+        if record.voltage is None or not math.isfinite(volts):
+            return record
+        if record.at_voltages and record.peak_torque and record.speed:
+            points = sorted([(record.voltage, record.peak_torque, record.speed), *record.at_voltages])
+            stated = [point[0] for point in points]
+            near = min(max(volts, stated[0]), stated[-1])
+            torque, speed = (float(np.interp(near, stated, [point[i] for point in points])) for i in (1, 2))
+            record = record._at(near / record.voltage, speed / record.speed, torque / record.peak_torque)
+        return record.at_voltage(volts / (record.voltage or volts))
 
     def at_voltage(self, share: float) -> "ActuatorRecord":
         """Return the completed record at a share of its supply voltage.
 
         The falling line of torque over speed shifts in parallel with the voltage, because the back-EMF takes what the
-        winding lacks (Siciliano et al. 2009, section 5.2). So the no-load speed falls with the voltage, and the stall
+        winding lacks (Siciliano et al. 2009, section 5.2). So the no-load speed grows with the voltage, and the stall
         torque of a motor without a corner speed, too. Up to a corner speed, the controller limits the current: the peak
-        torque stays as long as the line allows it. Copper loss at a torque does not change, nor does the continuous
-        torque; the current from the supply grows accordingly. Without a known speed, the peak torque falls with the
-        voltage.
+        torque stays as long as the line allows it, and more voltage raises the corner speed only. A DC servo whose line
+        starts at rest has no such limit. Copper loss at a torque does not change, nor does the continuous torque; the
+        current from the supply follows. Without a known speed, the peak torque grows with the voltage.
         """
         record = self.completed()
-        values: dict[str, float] = {}
-        torque = share
-        if record.speed is not None:
-            corner = record.corner_speed or 0.0
-            falling = record.speed - corner
-            torque = min(1.0, share * record.speed / falling) if falling > 0.0 else 1.0
-            values |= {
-                "speed": share * record.speed,
-                "corner_speed": max(0.0, corner - (1.0 - share) * record.speed),
-            }
-        factors = {"peak_torque": torque, "stall_torque": torque, "voltage": share, "current": torque**2 / share}
-        known = {name: value for name in factors if (value := value_of(record, name)) is not None}
-        return record.model_copy(update=values | {name: factors[name] * value for name, value in known.items()})
+        speed, corner = record.speed or 1.0, record.corner_speed or 0.0
+        torque = share * speed / (speed - corner) if corner < speed else math.inf
+        if corner > 0.0 or self.kind not in VOLTAGE_DRIVEN:
+            torque = min(1.0, torque)
+        return record._at(share, share, torque)
+
+    def _at(self, share: float, speed: float, torque: float) -> "ActuatorRecord":
+        """Return a completed record at a share of its voltage, by the factors of no-load speed and torque at rest."""
+        factors = {"voltage": share, "speed": speed, "peak_torque": torque, "stall_torque": torque}
+        factors |= {"current": torque**2 / share}  # copper loss over the voltage
+        factors |= {"position_gain": torque} if self.kind in VOLTAGE_DRIVEN else {}  # a share of the voltage by angle
+        values = {name: factor * value for name, factor in factors.items() if (value := value_of(self, name))}
+        if self.speed is not None:  # the slope of the line stays
+            corner = torque * (self.corner_speed or 0.0) + (speed - torque) * self.speed
+            values["corner_speed"] = max(0.0, corner)
+        pinned = {"voltage_min": values.get("voltage"), "voltage_max": values.get("voltage"), "at_voltages": ()}
+        return self.model_copy(update=values | pinned)
 
     def _defaults(self) -> dict[str, float]:
         """Return the defaults of the values that are not stated. The stall torque is a peak torque, if it is stated."""
         rated = self.rated_torque or 0.0
         # Without a published peak, the rated torque is all that may be drawn; rotor and friction suit twice as much.
         reference = self.stall_torque or self.peak_torque or 2.0 * rated
-        values = default_values(self.kind, reference, self.speed, self.voltage, self.position_gain)
+        values = default_values(self.kind, self.mass, reference, self.speed, self.voltage, self.position_gain)
+        for volts, *_ in self.at_voltages:
+            values["voltage_min"] = min(volts, values.get("voltage_min", volts))
+            values["voltage_max"] = max(volts, values.get("voltage_max", volts))
         if self.stall_torque is None:
             values["peak_torque"] = rated
         if (body := self._default_body()) is not None:
@@ -188,9 +242,16 @@ class Source:
 def catalogue() -> Mapping[str, ActuatorRecord]:
     """Return the actuators that come with armwright, by name."""
     records: dict[str, ActuatorRecord] = {}
+    supplies: dict[str, list[list[float]]] = {}
+    for row in _rows(VOLTAGES):
+        supplies.setdefault(row.pop("name"), []).append([float(value) for value in row.values() if value])
     for row in _rows(CATALOGUE):
         codes = _codes(row.pop("sources"))
         values: dict[str, Any] = {key: value for key, value in row.items() if value}
+        if stated := supplies.get(row["name"]):
+            volts = [float(row["voltage"]), *(one for one, *_ in stated)]
+            values |= {"voltage_min": min(volts), "voltage_max": max(volts)}
+            values["at_voltages"] = [one for one in stated if len(one) > 1]
         values["estimates"] = tuple(name for name, code in codes.items() if code.startswith(ESTIMATE))
         records[row["name"]] = ActuatorRecord.model_validate(values)
     return records

@@ -7,9 +7,12 @@ from typing import Literal, get_args
 from armwright.exceptions import ArmError
 from armwright.robot.axes import AXES, Axis, Vector
 from armwright.robot.motor_body import ActuatorShape, MotorBody
+from armwright.robot.tubes import section_square
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
 
+Tensor = tuple[Vector, Vector, Vector]
+NO_INERTIA: Tensor = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 GRAVITY = 9.81  # [m/s²] along -z
 UNIT = 1e-6  # tolerance on the length of a unit vector
 
@@ -98,8 +101,9 @@ class Link:
     mass: float  # mass without the end mass [kg]
     com: Vector  # centre of mass, from this joint [m]
     radius: float  # radius of its round section [m]
-    end_mass: float = 0.0  # point mass that it carries at its end, such as the next joint's actuator [kg]
-    end_shift: Vector = (0.0, 0.0, 0.0)  # vector from its end to that point [m]
+    end_mass: float = 0.0  # mass that it carries at its end, such as the next joint's actuator [kg]
+    end_shift: Vector = (0.0, 0.0, 0.0)  # vector from its end to the centre of that mass [m]
+    end_inertia: Tensor = NO_INERTIA  # (3, 3) of that mass about its centre [kg m²]
     # Young's modulus times the second moment of area of its section, EI [N m²]; infinite if rigid, None if unknown
     bending_stiffness: float | None = None
     torsional_stiffness: float | None = None  # shear modulus times the polar second moment of area, GJ [N m²]; likewise
@@ -108,6 +112,7 @@ class Link:
 
     def __post_init__(self) -> None:
         values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass, *self.end_shift, self.price)
+        values = (*values, *sum(self.end_inertia, ()))
         if not all(math.isfinite(v) for v in values):
             raise ArmError(f"a link's numbers must be finite: {self}")
         if min(self.mass, self.end_mass) < 0.0 or self.radius <= 0.0:
@@ -144,6 +149,11 @@ class Link:
         """The position of the end mass, from this joint [m]."""
         (x, y, z), (u, v, w) = self.offset, self.end_shift
         return (x + u, y + v, z + w)
+
+    @property
+    def section(self) -> float:
+        """The sum of the squares of outer and inner radius [m²]; a solid bar if its wall is unknown."""
+        return section_square(self.radius, self.wall)
 
     @property
     def length(self) -> float:
@@ -188,7 +198,7 @@ class MountedTool:
     mass: float = 0.0  # [kg]
     com: Vector = (0.0, 0.0, 0.0)  # centre of mass [m]
     # (3, 3) about the centre of mass [kg m²]
-    inertia: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    inertia: Tensor = NO_INERTIA
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(v) for v in (*self.tip, self.mass, *self.com, *sum(self.inertia, ()))):

@@ -10,6 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.axes import Vector, unit_vector
+from armwright.robot.link_inertia import point_inertia, tube_inertia
 from armwright.robot.motor_body import MotorBody
 from armwright.rotations import rpy_from_rotation
 
@@ -81,17 +82,10 @@ def home_position(joint: Joint) -> float:
 
 
 def inertia_tensor(link: Link) -> Array:
-    """Return (3, 3) of the cylinder and the mass at its end, about their common centre of mass, in the link frame."""
-    r2, l2 = link.radius**2, link.length**2
-    across = link.mass * (3.0 * r2 + l2) / 12.0
-    axis = np.array(link.offset) / link.length if link.length > 0.0 else np.array([0.0, 0.0, 1.0])
-    around = np.outer(axis, axis)
-    tensor = across * (np.eye(3) - around) + link.mass * r2 / 2.0 * around
-    centre = np.array(link.total_com)
-    for mass, place in ((link.mass, link.com), (link.end_mass, link.end_mass_position)):
-        away = np.array(place) - centre
-        tensor += mass * (away @ away * np.eye(3) - np.outer(away, away))
-    return tensor
+    """Return (3, 3) of the tube and the mass at its end, about their common centre of mass, in the link frame."""
+    mass, end_mass, centre = np.array(link.mass), np.array(link.end_mass), np.array(link.total_com)
+    own = tube_inertia(mass, np.array(link.offset), np.array(link.section)) + point_inertia(mass, centre - link.com)
+    return own + link.end_inertia + point_inertia(end_mass, centre - link.end_mass_position)
 
 
 def inertia_rpy(link: Link) -> Vector:
@@ -102,10 +96,10 @@ def inertia_rpy(link: Link) -> Vector:
 def inertia_moments(link: Link) -> dict[str, str]:
     """Return the moments about the centre of mass in the frame of `inertia_rpy` [kg m²], by their URDF names.
 
-    A cylinder has m (3 r² + l²) / 12 across its axis and m r² / 2 around it. Without length it is a disc, for which
-    2 across = around holds; all digits are written, since MuJoCo refuses a value below it by rounding.
+    A tube without length is a disc, for which 2 across = around holds; all digits are written, since MuJoCo refuses a
+    value below it by rounding.
     """
-    around = link.mass * link.radius**2 / 2.0
+    around = link.mass * link.section / 2.0
     across = around / 2.0 + link.mass * link.length**2 / 12.0
     tensor = inertia_tensor(link) if link.end_mass else np.diag([across, across, around])
     return _moments(tensor)

@@ -53,6 +53,18 @@ class MotorBody:
         return self.size[AXES.index(self.axis)]
 
     @property
+    def gyration(self) -> Vector:
+        """The moments of inertia about its centre around x, y and z, per mass, at uniform density [m²].
+
+        A box has (b² + c²) / 12 around its edge a, a cylinder d² / 8 around its axis and d² / 16 + l² / 12 across it.
+        """
+        round_across = [self.shape == "cylinder" and axis != self.axis for axis in AXES]
+        x, y, z = (
+            edge**2 / (16.0 if is_round else 12.0) for edge, is_round in zip(self.size, round_across, strict=True)
+        )
+        return (y + z, x + z, x + y)
+
+    @property
     def radius(self) -> float:
         """The radius of a cylinder [m]."""
         return self.size[AXES.index(self.axis) - 1] / 2

@@ -40,6 +40,11 @@ class Tube:
         return density * math.pi * (self.radius**2 - (self.radius - self.wall) ** 2)
 
 
+def section_square(radius: float, wall: float | None) -> float:
+    """Return R² + r² of outer and inner radius [m²]; r is 0 if the wall is unknown."""
+    return radius**2 if wall is None else radius**2 + (radius - wall) ** 2
+
+
 def check_tube(outer: float, wall: float) -> None:
     """Raise ValueError for an outer diameter and a wall [m] of no tube."""
     if outer > MAX_DIAMETER:

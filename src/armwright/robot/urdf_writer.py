@@ -34,10 +34,10 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
     """Return the URDF of an arm: `world`, a fixed joint to `base`, then joint_1, link_1, …, and a frame `tip`.
 
     Link frames are at their joints; with all joints at 0 they are parallel to the world frame. The z axis of the tip
-    frame is the tool's axis, its x axis the tool's side. Links are solid cylinders of uniform density from joint to
-    joint, for inertia, collision and display. A tool with mass is a link `tool` at the end of the last link. The body
-    of an actuator is a massless link motor_1, …, fixed to the link before its joint. The column that the base stands on
-    is a massless link `column`, fixed to `base`.
+    frame is the tool's axis, its x axis the tool's side. Links are cylinders from joint to joint for collision and
+    display; their inertia is that of tubes of uniform density and of what they carry. A tool with mass is a link `tool`
+    at the end of the last link. The body of an actuator is a massless link motor_1, …, fixed to the link before its
+    joint. The column that the base stands on is a massless link `column`, fixed to `base`.
 
     Example:
         >>> import armwright as aw

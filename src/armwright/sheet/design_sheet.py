@@ -112,7 +112,7 @@ def _assumptions(history: History, member: FrontMember, payload: float, unpriced
         "sensitivities": "each change alone, with postures of its own; errors are the largest at the targets",
     }
     if any(joint.actuator is not None for joint in arm.joints):
-        found["utilisation"] = f"with a safety factor of {arm.safety_factor:g}; motors at their stated voltage"
+        found["utilisation"] = f"with a safety factor of {arm.safety_factor:g}; motors at the voltage of their supply"
         found["current"] = "positive mechanical power and copper loss; standby current comes on top"
     if assumed := assumed_values(problem, [arm], also=SHEET_VALUES):
         found["actuators"] = f"defaults of their kind or estimates: {describe_assumed(assumed)}"

@@ -1,5 +1,6 @@
 """The mass of a design by parts, and parts lists with prices and sources."""
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 
@@ -33,7 +34,8 @@ def mass_lines(arm: Arm) -> tuple[MassLine, ...]:
 def parts_list(arm: Arm, space: DesignSpace) -> tuple[Part, ...]:
     """Return the parts list of a design of a space; a price is None if the space or the catalogue states none."""
     records = {record.name: record for record in space.actuators}
-    used = [records[joint.actuator.name] for joint in arm.joints if joint.actuator is not None]
+    motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
+    used = [records[motor.name].at_supply(motor.voltage or math.nan) for motor in motors]
     return (*actuator_parts(used), *_tubes(arm, space), *_others(arm, space))
 
 
@@ -76,7 +78,9 @@ def _tubes(arm: Arm, space: DesignSpace) -> Iterator[Part]:
 
 def _others(arm: Arm, space: DesignSpace) -> Iterator[Part]:
     n = sum(joint.kind != "fixed" for joint in arm.joints)
-    if space.bracket_mass > 0.0:
-        yield Part("brackets and screws", n, detail=f"{1e3 * space.bracket_mass:.4g} g for each joint")
+    low, high = min(space.bracket_masses), max(space.bracket_masses)
+    if high > 0.0:
+        each = f"{1e3 * low:.4g} g" if low == high else f"{1e3 * low:.3g} to {1e3 * high:.3g} g"
+        yield Part("brackets and screws", n, detail=f"{each} for each joint")
     if arm.tool.mass > 0.0:
         yield Part("tool", 1, detail=f"{1e3 * arm.tool.mass:.4g} g")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints, ratings_of
+from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints
 from armwright.kinematics.arms.arm_arrays import (
     FIXED,
     PRISMATIC,
@@ -26,11 +26,13 @@ from armwright.kinematics.arms.arm_arrays import (
 )
 from armwright.kinematics.arms.motor_bodies import MotorBodies, bodies_in, body_values, without_bodies
 from armwright.kinematics.arms.rigid_bodies import Bodies, Tools
-from armwright.robot.arm import AXES, Arm, Joint, Link, Vector
+from armwright.robot.arm import AXES, NO_INERTIA, Arm, Joint, Link, Vector
+from armwright.robot.link_inertia import point_inertia, tube_inertia
 from armwright.robot.motor_body import placed_body
 from armwright.spaces.design_columns import DesignColumns, Indices
 from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS, mounted_body
 from armwright.spaces.space_schema import SpaceSchema
+from armwright.spaces.supply import supplied, supplied_ratings, supply_voltages
 from armwright.spaces.tool_mount import mounted_tools
 from armwright.tasks.tool import NO_TOOL, Tool
 
@@ -87,31 +89,43 @@ class _Parts:
             columns.choices("motor", [a.name for a in actuators].index, actuators[0].name) if actuators else None
         )
         self._direction = columns.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
+        moves = np.asarray(self._moves.any(axis=2))
+        self._volts = None if self._motor is None else supply_voltages(space, self._motor, moves)
         self._weigh()
 
     def _weigh(self) -> None:
         """Find the masses of links, and of the rails and actuators that modules add to the end of the link before."""
         space, columns, count = self._space, self._columns, self._moves.sum(axis=2)
         self._rails = np.where(self._slides[..., -1], space.link_mass(self._stroke, columns.tubes), 0.0)
-        each = 0.0 if self._motor is None else _catalogue(space)[0][self._motor]
-        self._carried = self._rails + count * (each + space.bracket_mass)
+        each = space.bracket_masses[0] if self._motor is None else _catalogue(space)[0][self._motor]
+        self._carried = self._rails + count * each
         self._mass = np.where(columns.present, space.link_mass(columns.links, columns.tubes), 0.0)
         vectors = _rotate(_VECTORS[self._direction], columns.mount)
         self._middle = vectors * (columns.links / 2)[..., None]
         self._offset = vectors * columns.links[..., None]
         self._end_mass = np.concatenate([self._carried[:, 1:], np.zeros((columns.n, 1))], axis=1)
-        self._end_shift = self._shifts()
+        self._end_shift, self._end_inertia = self._carried_bodies()
 
-    def _shifts(self) -> Array | float:
-        """Return the (N, M, 3) vectors from the end of each link to the centre of the mass carried there [m]."""
-        rails, carried = self._rails, self._carried
-        if not rails.any():
-            return 0.0
-        share = np.where(rails > 0.0, rails / np.where(carried > 0.0, carried, 1.0), 0.0)
-        local = np.eye(3)[self._plan[..., -1] % PRISMATIC] * (share * (self._stroke / 2))[..., None]
-        shifts = np.zeros_like(local)
-        shifts[:, :-1] = _rotate(local, self._columns.mount)[:, 1:]
-        return shifts
+    def _carried_bodies(self) -> tuple[Array, Array]:
+        """Return what each link carries at its end: rail, motors and their brackets, of the motor's shape.
+
+        (N, M, 3) vectors from the end of the link to its centre of mass [m]; (N, M, 3, 3) inertia about it [kg m²].
+        """
+        space, columns, rails, carried = self._space, self._columns, self._rails, self._carried
+        centre, tensor = np.zeros((*carried.shape, 3)), np.zeros((*carried.shape, 3, 3))
+        if space.has_motor_bodies:
+            bodies = self._motor_bodies = self._find_motor_bodies()
+            centre = bodies["centre"][:, :, 0]
+            tensor = ((carried - rails)[..., None] * bodies["gyration"][:, :, 0])[..., None] * np.eye(3)
+        if rails.any():
+            share = np.where(rails > 0.0, rails / np.where(carried > 0.0, carried, 1.0), 0.0)[..., None]
+            rail = _rotate(np.eye(3)[self._plan[..., -1] % PRISMATIC] * self._stroke[..., None], columns.mount)
+            both = share * (rail / 2) + (1.0 - share) * centre
+            section = space.tube_values("section")[columns.tubes]
+            tensor = tensor + tube_inertia(rails, rail, section) + point_inertia(rails, rail / 2 - both)
+            centre, tensor = both, tensor + point_inertia(carried - rails, centre - both)
+        nothing = np.zeros((columns.n, 1, 3, 3))
+        return np.append(centre[:, 1:], nothing[..., 0], axis=1), np.append(tensor[:, 1:], nothing, axis=1)
 
     def _limits(self, sign: Array) -> tuple[Array, Array]:
         """Return (N, M, K) lower and upper limits [rad] or [m]; sign: 1 if an axis of the base is one of the world."""
@@ -156,11 +170,12 @@ class _Parts:
             per_joint[name] = _in_last_slot(self._of_links(name, np.inf), n_slots, np.inf)
         per_joint |= {f"body_{f.name}": _in_last_slot(getattr(bodies, f.name), n_slots) for f in fields(Bodies)}
         if self._motor is not None:
-            ratings = np.repeat(_catalogue(space)[2][self._motor][:, :, None], n_slots, axis=2)
+            assert self._volts is not None
+            ratings = np.repeat(supplied_ratings(space, self._motor, self._volts)[:, :, None], n_slots, axis=2)
             ratings[~self._moves] = FIXED_RATINGS
             per_joint["ratings"] = ratings
         if space.has_motor_bodies:
-            per_joint |= {f"motor_{name}": values for name, values in self._motor_bodies().items()}
+            per_joint |= {f"motor_{f.name}": self._motor_bodies[f.name] for f in fields(MotorBodies)}
         present = _flatten(self._has)
         flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
         below, column = self._columns_below(), space.column
@@ -202,8 +217,8 @@ class _Parts:
         total = mass + end_mass
         both = mass[..., None] * self._middle + end_mass[..., None] * place
         com = np.where(end_mass[..., None] > 0.0, both / np.where(total > 0.0, total, 1.0)[..., None], self._middle)
-        radius = np.where(self._columns.present, self._space.tube_values("radius")[self._columns.tubes], 0.0)
-        return Bodies(mass, self._middle, self._offset, radius, end_mass, place), com
+        section = np.where(self._columns.present, self._space.tube_values("section")[self._columns.tubes], 0.0)
+        return Bodies(mass, self._middle, self._offset, section, end_mass, place, self._end_inertia), com
 
     def _actuation(self, flat: dict[str, Any]) -> Actuation | None:
         if self._motor is None:
@@ -217,10 +232,10 @@ class _Parts:
         """Return the (N, M) direction of the link before each module, or from the surface to the first joint."""
         return np.concatenate([np.full((self._columns.n, 1), _UPRIGHT), self._direction[:, :-1]], axis=1)
 
-    def _motor_bodies(self) -> dict[str, NDArray[Any]]:
-        """Return the bodies of actuators by field of `MotorBodies`, (N, M, 1, ...)."""
+    def _find_motor_bodies(self) -> dict[str, NDArray[Any]]:
+        """Return the bodies of actuators by field of `MotorBodies`, and their gyrations, (N, M, 1, ...)."""
         plan, mount = self._plan[..., 0], self._columns.mount[:, None]
-        values = without_bodies(*self._plan.shape)
+        values = without_bodies(*self._plan.shape) | {"gyration": np.zeros((*self._plan.shape, 3))}
         for name, table in _body_table(self._space).items():
             found = table[self._motor, plan % PRISMATIC, self._carriers(), mount]
             values[name][self._moves] = found[self._moves[..., 0]]
@@ -251,7 +266,9 @@ class _Parts:
             if motion == FIXED:
                 joints.append(Joint("fixed", AXES[int(_WORLD_AXES[self._columns.mount[row], AXES.index("z")])]))
                 continue
-            actuator = None if self._motor is None else space.arm_actuators[int(self._motor[row, i])]
+            actuator = None
+            if self._motor is not None and self._volts is not None:
+                actuator = supplied(space.actuators[int(self._motor[row, i])], float(self._volts[row, i]))
             body = None
             if space.has_motor_bodies and actuator is not None and actuator.shape is not None:
                 carrier = carriers[int(self._carriers()[row, i])]
@@ -265,10 +282,8 @@ class _Parts:
         """Return the links of module `i`: massless ones between its joints, then its own."""
         tube = self._space.link_section.options[int(self._columns.tubes[row, i])]
         x, y, z = self._offset[row, i].tolist()
-        shift = ORIGIN
-        if i + 1 < self._columns.modules and self._rails[row, i + 1] > 0.0:
-            u, v, w = np.broadcast_to(self._end_shift, self._offset.shape)[row, i].tolist()
-            shift = (u, v, w)
+        u, v, w = self._end_shift[row, i].tolist()
+        xx, yy, zz = map(tuple, self._end_inertia[row, i].tolist())
         length = float(self._columns.links[row, i])
         link = Link(
             offset=(x, y, z),
@@ -276,37 +291,36 @@ class _Parts:
             com=(x / 2, y / 2, z / 2),
             radius=tube.radius,
             end_mass=float(self._end_mass[row, i]),
-            end_shift=shift,
+            end_shift=(u, v, w),
+            end_inertia=(xx, yy, zz),
             bending_stiffness=tube.bending_stiffness,
             torsional_stiffness=tube.torsional_stiffness,
             wall=tube.wall,
             price=tube.price_per_metre * length,
         )
-        between = replace(link, offset=ORIGIN, mass=0.0, com=ORIGIN, end_mass=0.0, end_shift=ORIGIN, price=0.0)
+        bare = {"end_mass": 0.0, "end_shift": ORIGIN, "end_inertia": NO_INERTIA}
+        between = replace(link, offset=ORIGIN, mass=0.0, com=ORIGIN, price=0.0, **bare)
         return [between] * (int(self._has[row, i].sum()) - 1) + [link]
 
 
 @cache
-def _catalogue(space: SpaceSchema) -> tuple[Array, Array, Array]:
-    """Return mass [kg], price [USD] and (A, R) ratings of the A actuators of a space."""
-    actuators = space.arm_actuators
-    return (
-        np.array([actuator.mass for actuator in actuators]),
-        np.array([np.nan if actuator.price is None else actuator.price for actuator in actuators]),
-        np.array([ratings_of(actuator) for actuator in actuators]),
-    )
+def _catalogue(space: SpaceSchema) -> tuple[Array, Array]:
+    """Return mass with brackets [kg] and price [USD] of the A actuators of a space."""
+    masses = np.array([one.mass for one in space.actuators]) + space.bracket_masses
+    return masses, np.array([np.nan if one.price is None else one.price for one in space.actuators])
 
 
 @cache
 def _body_table(space: SpaceSchema) -> dict[str, NDArray[Any]]:
-    """Return the values of bodies by actuator, local axis of the joint, direction of the link before and mount."""
+    """Return the values and gyrations of bodies by actuator, axis of the joint, direction of the link before, mount."""
     shapes = [actuator.shape for actuator in space.arm_actuators]
-    values = without_bodies(len(shapes), len(AXES), len(DIRECTIONS), len(MOUNTS))
+    size = len(shapes), len(AXES), len(DIRECTIONS), len(MOUNTS)
+    values = without_bodies(*size) | {"gyration": np.zeros((*size, 3))}
     cases = product(enumerate(shapes), enumerate(AXES), enumerate(DIRECTIONS.values()), enumerate(MOUNTS))
     for (a, shape), (i, axis), (d, carrier), (m, mount) in cases:
         if shape is not None and mount in space.mount:
             body = mounted_body(placed_body(shape, axis, carrier), mount)
-            for name, value in zip(values, body_values(body), strict=True):
+            for name, value in zip(values, (*body_values(body), body.gyration), strict=True):
                 values[name][a, i, d, m] = value
     return values
 

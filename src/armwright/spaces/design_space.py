@@ -4,6 +4,7 @@ A matrix of designs has one row per design and one column per parameter. A choic
 parameters have their default value: the middle of a range, the first of the choices.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -15,6 +16,7 @@ from pydantic import model_validator
 
 from armwright.arrays import Array
 from armwright.exceptions import DesignError, SpaceError, did_you_mean
+from armwright.robot.actuators import ActuatorRecord
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import build_arm
 from armwright.spaces.custom_parameters import NUMBERED
@@ -215,19 +217,28 @@ class DesignSpace(SpaceSchema, frozen=True):
             self.design(design.params)  # raises the reason
         return build_arm(self, self.matrix([design]), tool)
 
+    def supplied_actuators(self, design: Design) -> tuple[ActuatorRecord, ...]:
+        """Return the actuators, those of a design at its supply."""
+        used = [joint.actuator for joint in self.arm(design).joints if joint.actuator is not None]
+        volts = {actuator.name: actuator.voltage or math.nan for actuator in used}
+        return tuple(record.at_supply(volts.get(record.name, math.nan)) for record in self.actuators)
+
     @property
     def is_toy(self) -> bool:
         """True if even the heaviest arm is nearly massless, as in the paper."""
         heaviest = max((record.mass for record in self.actuators), default=0.0)
-        return self.max_joints * (self.heaviest_link + heaviest + self.bracket_mass) < TOY_MASS
+        return self.max_joints * (self.heaviest_link + heaviest + max(self.bracket_masses)) < TOY_MASS
 
     @property
     def mass_note(self) -> str:
         """One sentence on the assumed masses; it accompanies all torques."""
         toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if self.is_toy else ""
         names = ", ".join(record.name for record in self.actuators)
-        actuators = f"; actuators: {names}" if self.actuators else ""
-        brackets = f"; brackets: {self.bracket_mass:g} kg for each joint that moves" if self.bracket_mass else ""
+        supply = "the highest voltage that those of an arm share" if self.supply is None else f"{self.supply:g} V"
+        actuators = f"; actuators: {names}, at {supply}" if self.actuators else ""
+        low, high = min(self.bracket_masses), max(self.bracket_masses)
+        brackets = f"; brackets: {low:.3g}{f' to {high:.3g}' if high > low else ''} kg for each joint that moves"
+        brackets = f"{brackets}{', assumed' if self.bracket_mass is None else ''}" if high > 0.0 else ""
         column = f"; the base on a column of {self.column.description}" if self.column else ""
         return f"links: {self.link_description}{toy}{actuators}{brackets}{column}"
 

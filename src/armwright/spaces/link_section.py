@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field, field_validator
 
-from armwright.robot.tubes import Material, Tube, check_tube, resolve_material
+from armwright.robot.tubes import Material, Tube, check_tube, resolve_material, section_square
 
 MAX_TUBES = 20
 
@@ -22,6 +22,11 @@ class LinkTube:
     bending_stiffness: float | None = None  # EI [N m²]; None without a material
     torsional_stiffness: float | None = None  # GJ [N m²]; None without a material
     price_per_metre: float = 0.0  # [USD/m]
+
+    @property
+    def section(self) -> float:
+        """The sum of the squares of outer and inner radius [m²]; a solid bar without a material."""
+        return section_square(self.radius, self.wall)
 
 
 class LinkSection(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):

@@ -111,8 +111,11 @@ class SpaceSchema(
     """Factor of the torque that the actuators have to deliver."""
     motor_bodies: bool = True
     """Whether the actuators, if there are any, are solid bodies, which count in collisions."""
-    bracket_mass: float = Field(default=0.0, ge=0.0, le=1e4)
-    """Mass of brackets and screws at each joint that moves, where its actuator is [kg]."""
+    supply: float | None = Field(default=None, gt=0.0, le=1e4)
+    """Voltage of the supply of all actuators [V]; if not stated, the highest that those of a design have in common."""
+    bracket_mass: float | None = Field(default=None, ge=0.0, le=1e4)
+    """Mass of brackets and screws at each joint that moves, where its actuator is [kg]; by default that of its record:
+    a quarter of the mass of the actuator, at least 10 g."""
     restrict: Pairs[Restriction] = ()
     """Single parameters, fixed (joint_1: Y) or narrowed (joint_2: [P, R], link_1: [0.1, 0.2])."""
     grid: Pairs[float] = ()
@@ -154,6 +157,18 @@ class SpaceSchema(
         names = [record.name for record in self.actuators]
         if len(set(names)) < len(names):
             raise ValueError(f"actuators: expected different ones, got {', '.join(names)}")
+        if self.actuators and self.mass is None and self.link_section.material is None:
+            raise ValueError(
+                "actuators: expected links of a material, or a mass, got neither: the default of 12 g per metre is a "
+                "toy's; try link_section: {tubes: [[0.03, 0.002]], material: aluminium}"
+            )
+        for record in self.actuators:
+            low, high = record.supply_range
+            if self.supply is not None and not low <= self.supply <= high:
+                raise ValueError(
+                    f"actuators: {record.name} takes {low:g} to {high:g} V, not the supply of {self.supply:g} V; leave "
+                    "it out, or change the supply"
+                )
         if self.has_motor_bodies:
             _check_motor_bodies(self)
         return self
@@ -185,8 +200,15 @@ class SpaceSchema(
 
     @property
     def arm_actuators(self) -> tuple[Actuator, ...]:
-        """The actuators as an arm has them, in the order of the file."""
+        """The actuators at the supply, or each at the highest voltage that its maker states, in the file's order."""
         return _arm_actuators(self)
+
+    @property
+    def bracket_masses(self) -> tuple[float, ...]:
+        """The mass of the brackets of each actuator, or of any joint without actuators [kg]."""
+        if self.bracket_mass is not None or not self.actuators:
+            return (self.bracket_mass or 0.0,) * max(len(self.actuators), 1)
+        return tuple(record.completed().bracket_mass or 0.0 for record in self.actuators)
 
     def link_mass(self, length: Length, tube: Any = 0) -> Length:
         """Return the mass of links or rails [kg], from their lengths [m] and the indices of their tubes."""
@@ -222,7 +244,7 @@ class SpaceSchema(
 
 @lru_cache(maxsize=64)
 def _arm_actuators(space: SpaceSchema) -> tuple[Actuator, ...]:
-    return tuple(record.actuator() for record in space.actuators)
+    return tuple(record.at_supply(space.supply or record.stated_supply).actuator() for record in space.actuators)
 
 
 @lru_cache(maxsize=512)

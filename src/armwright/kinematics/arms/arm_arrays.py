@@ -142,7 +142,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
     mass, radius = np.zeros((2, n, dof))
     stiffness = np.full((2, n, dof), np.inf)  # bending and torsional
     offset, com = np.zeros((2, n, dof, 3))
-    bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,))))
+    bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,), (3, 3))))
     for i, arm in enumerate(arms):
         own = slice(len(arm.joints))
         motion[i, own] = [_motion(joint) for joint in arm.joints]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
+from armwright.robot.link_inertia import point_inertia, tube_inertia
 
 
 class PerArm:
@@ -21,24 +22,25 @@ class PerArm:
 class Bodies(PerArm):
     """Rigid bodies of the links of N arms of up to D joints, in float64 whatever the precision of the arms.
 
-    A link is a solid cylinder that carries a point mass at its end (`armwright.robot.arm.Link`).
+    A link is a tube that carries a body at its end (`armwright.robot.arm.Link`).
     """
 
-    mass: Array  # (N, D) of the cylinder [kg]
-    com: Array  # (N, D, 3) of the cylinder, from its joint [m]
-    offset: Array  # (N, D, 3) along the cylinder, from its joint to the next or to the end of the last link [m]
-    radius: Array  # (N, D) [m]
-    end_mass: Array  # (N, D) [kg]
-    end_mass_position: Array  # (N, D, 3) of the point mass, from the link's joint [m]
+    mass: Array  # (N, D) of the tube [kg]
+    com: Array  # (N, D, 3) of the tube, from its joint [m]
+    offset: Array  # (N, D, 3) along the tube, from its joint to the next or to the end of the last link [m]
+    section: Array  # (N, D) squares of outer and inner radius together [m²]
+    end_mass: Array  # (N, D) of the body at its end [kg]
+    end_mass_position: Array  # (N, D, 3) centre of that body, from the link's joint [m]
+    end_inertia: Array  # (N, D, 3, 3) of that body about its centre, in the link's frame [kg m²]
 
     @property
     def total_mass(self) -> Array:
-        """(N, D) mass of cylinder and point mass [kg]."""
+        """(N, D) mass of tube and carried body [kg]."""
         return self.mass + self.end_mass
 
     @property
     def total_com(self) -> Array:
-        """(N, D, 3) centre of mass of cylinder and point mass, from the joint [m]."""
+        """(N, D, 3) centre of mass of tube and carried body, from the joint [m]."""
         total = self.total_mass[..., None]
         both = self.mass[..., None] * self.com + self.end_mass[..., None] * self.end_mass_position
         return both / np.where(total > 0.0, total, 1.0)
@@ -46,16 +48,10 @@ class Bodies(PerArm):
     @property
     def inertia(self) -> Array:
         """(N, D, 3, 3) about the total centre of mass, in the link's frame [kg m²]; equal to the exported files'."""
-        square = (self.offset**2).sum(axis=-1)
-        length = np.sqrt(square)[..., None]
-        axis = np.where(length > 0.0, self.offset / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
-        along = axis[..., :, None] * axis[..., None, :]
-        across_axis = (self.mass * (3.0 * self.radius**2 + square) / 12.0)[..., None, None]
-        around_axis = (self.mass * self.radius**2 / 2.0)[..., None, None]
-        tensor = across_axis * (np.eye(3) - along) + around_axis * along
+        tensor = tube_inertia(self.mass, self.offset, self.section) + self.end_inertia
         centre = self.total_com
         for mass, position in ((self.mass, self.com), (self.end_mass, self.end_mass_position)):
-            tensor += _point_inertia(mass, position - centre)
+            tensor += point_inertia(mass, position - centre)
         return tensor
 
 
@@ -88,8 +84,8 @@ def rigid_bodies(bodies: Bodies, tools: Tools, last: NDArray[np.integer]) -> Rig
         position = bodies.offset[own] + tools.com
         link_mass, link_com = mass[own].copy(), com[own].copy()
         mass[own], com[own] = joined(link_mass, link_com, tools.mass, position)
-        inertia[own] += _point_inertia(link_mass, link_com - com[own])
-        inertia[own] += _point_inertia(tools.mass, position - com[own]) + tools.inertia
+        inertia[own] += point_inertia(link_mass, link_com - com[own])
+        inertia[own] += point_inertia(tools.mass, position - com[own]) + tools.inertia
     return RigidBodies(mass, com, inertia)
 
 
@@ -101,9 +97,3 @@ def joined(mass: Array, com: Array, added: Array, position: Array) -> tuple[Arra
     total = mass + added
     both = mass[:, None] * com + added[:, None] * position
     return total, np.where(added[:, None] > 0.0, both / np.where(total > 0.0, total, 1.0)[:, None], com)
-
-
-def _point_inertia(mass: Array, lever: Array) -> Array:
-    """Return the inertia (..., 3, 3) of point masses (...) [kg] about points at (..., 3) from them [kg m²]."""
-    squared = (lever**2).sum(axis=-1)[..., None, None] * np.eye(3)
-    return mass[..., None, None] * (squared - lever[..., :, None] * lever[..., None, :])
