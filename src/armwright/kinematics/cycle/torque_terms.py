@@ -9,9 +9,11 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
-from armwright.kinematics.cycle.cycle_path import CyclePaths
+from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device, load_kernels
+
+NO_WRENCHES = np.empty((0, 0, 0, 0, 6))
 
 
 @dataclass(frozen=True)
@@ -32,18 +34,35 @@ def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> l
     """Return, for each group of arms, the terms along each motion; payload: its mass when carried [kg]."""
     found: list[tuple[TorqueTerms, ...]] = []
     for group in paths.groups:
-        q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
-        counts = [path.q.shape[1] for path in group.paths]
-        carried = np.repeat([float(path.motion.carries) for path in group.paths], counts)
-        terms = _terms(group.arms, q, q_s, q_ss, carried, payload, device)  # (3, n, S, D)
-        spans = np.cumsum([0, *counts])
-        found.append(
-            tuple(
-                TorqueTerms(terms[0, :, a:b], terms[1, :, a:b], terms[2, :, a:b], q_s[:, a:b], q_ss[:, a:b])
-                for a, b in pairwise(spans)
-            )
-        )
+        states, carried, spans = _along(group)
+        terms = _terms(group.arms, *states, carried, payload, device)  # (3, n, S, D)
+        parts = (*terms, *states[1:])
+        found.append(tuple(TorqueTerms(*(values[:, a:b] for values in parts)) for a, b in spans))
     return found
+
+
+def wrench_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[Array, ...]]:
+    """Return, for each group of arms, (3, n, R, D, 2, 3) terms of the wrenches of the joints along each motion.
+
+    The terms are those of `TorqueTerms`, each of the force on a link [N] and the moment about its joint [N m], in the
+    frame of the link.  payload: its mass when carried [kg].
+    """
+    found: list[tuple[Array, ...]] = []
+    for group in paths.groups:
+        states, carried, spans = _along(group)
+        wrenches = np.empty((3, *states[0].shape, 6))
+        _terms(group.arms, *states, carried, payload, device, wrenches)
+        whole = wrenches.reshape(*wrenches.shape[:-1], 2, 3)
+        found.append(tuple(whole[:, :, a:b] for a, b in spans))
+    return found
+
+
+def _along(group: CycleGroup) -> tuple[tuple[Array, Array, Array], Array, list[tuple[int, int]]]:
+    """Return (n, S, D) q, q_s and q_ss along all motions, (S,) carried shares of the payload, ends of motions."""
+    q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
+    counts = [path.q.shape[1] for path in group.paths]
+    carried = np.repeat([float(path.motion.carries) for path in group.paths], counts)
+    return (q, q_s, q_ss), carried, list(pairwise(np.cumsum([0, *counts]).tolist()))
 
 
 def inverse_dynamics_torques(
@@ -75,8 +94,11 @@ def _values(path: MotionPath, order: int) -> Array:
     return np.broadcast_to(path.at(path.share, order), path.q.shape)
 
 
-def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device) -> Array:
-    """Return (3, N, S, D) gravity, drag and push of N arms at S samples."""
+def _terms(
+    arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device,
+    wrenches: Array = NO_WRENCHES,
+) -> Array:  # fmt: skip
+    """Return (3, N, S, D) gravity, drag and push of N arms at S samples; fill (3, N, S, D, 6) wrenches, if any."""
     loaded = load_kernels("cycle.dynamics_kernels", device)
     terms = np.empty((3, *q.shape))
 
@@ -86,9 +108,9 @@ def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, p
         values |= vars(part.rigid_bodies) | {"payload_mass": loaded.warp.float64(payload)}
         values |= {"payload_com": part.payload_center, "payload_inertia": payload * part.payload_gyration}
         bodies, found = loaded.struct("Bodies", values), np.empty((3, *q[chunk].shape))
-        states = (q[chunk], q_s[chunk], q_ss[chunk])
-        loaded.launch("torque_terms", found.shape[1:3], bodies, *states, carried, outputs=[found])
-        terms[:, chunk] = found
+        states, full = (q[chunk], q_s[chunk], q_ss[chunk]), np.empty_like(wrenches[:, chunk])
+        loaded.launch("torque_terms", found.shape[1:3], bodies, *states, carried, outputs=[found, full])
+        terms[:, chunk], wrenches[:, chunk] = found, full
 
     in_chunks(solve, len(arms), max(1, SAMPLES[device] // q.shape[1]), device)
     return terms
