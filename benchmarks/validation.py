@@ -170,8 +170,8 @@ def print_servos(arm: Arm) -> None:
     print(f"  largest torque: {own:.2f} N m, with {PAYLOAD:g} kg {full:.2f} N m")
     mass, lever, angle = SERVO_TEST
     torque = mass * GRAVITY * lever * np.cos(np.radians(angle))
-    held = torque, torque / (1.0 + GEAR) - COULOMB, (1.0 + GEAR) * torque + COULOMB
-    still, above, below = np.degrees(held) / (SERVO.position_gain or np.inf)
+    exerted = torque, torque / (1.0 + GEAR) - COULOMB, (1.0 + GEAR) * torque + COULOMB
+    still, above, below = np.degrees(exerted) / (SERVO.position_gain or np.inf)
     print(f"  a servo that holds {torque:.2f} N m yields by {still:.1f}° of its position gain")
     print(f"  with friction, {above:.1f}° on arrival from above, {below:.1f}° from below")
 
