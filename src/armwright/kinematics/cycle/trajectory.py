@@ -30,7 +30,7 @@ class Trajectory:
     q: Array  # (R, D) joint values [rad] or [m]
     qd: Array  # (R, D) speeds [rad/s] or [m/s]
     qdd: Array  # (R, D) accelerations [rad/s²] or [m/s²]
-    tau: Array  # (R, D) torques of the drives before all friction [N m], or forces [N]
+    tau: Array  # (R, D) torques of the drives, all friction included [N m], or forces [N]
 
 
 def sample_trajectory(
@@ -82,7 +82,7 @@ def _events(plan: CyclePlan, motion: IndexArray) -> tuple[IndexArray, IndexArray
 
 
 def _drive_torques(arm: ArmArrays, q: Array, qd: Array, qdd: Array, carried: Array, payload: float) -> Array:
-    """Return (R, D) torques of the drives before all friction [N m], or forces [N].
+    """Return (R, D) torques of the drives, all friction included [N m], or forces [N].
 
     The friction of a gear is its share of the lesser of the torques before and after it, which both push or brake.
     """
