@@ -103,8 +103,8 @@ def reach_facts(farthest: ReachLine) -> Facts:
         PAYLOAD_AT_FULL_REACH: Fact(
             "Payload at full reach",
             "kg",
-            "The mass that the actuators hold at that distance in every posture found, with the safety factor, and that "
-            "their bearings carry.",
+            "The mass that the actuators hold at that distance in every posture found, with the safety factor, and "
+            "that their bearings carry.",
             held,
             reason,
         ),
