@@ -100,7 +100,7 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
         >>> from armwright.kinematics.arms.actuation import actuation_at_joints, ratings_of
         >>> from armwright.robot.arm import Actuator
         >>> motor = Actuator("servo", 0.1, peak_torque=2.0, speed=10.0, corner_speed=0.0, rotor_inertia=0.1,
-        ...                  coulomb_friction=0.0, viscous_friction=0.0)
+        ...                  coulomb_friction=0.0, viscous_friction=0.0, limit_friction=0.0)
         >>> ratings = np.array([[ratings_of(motor)]])
         >>> drives = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
         >>> still, turn = np.zeros((1, 1, 1)), np.ones((1, 1, 1))
