@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.cycle.torque_terms import wrench_terms
+from armwright.kinematics.cycle.torque_terms import torque_terms
 from armwright.problem.evaluation import Evaluation, evaluate
 from armwright.problem.objectives import (
     axial_force,
@@ -62,11 +62,12 @@ def rates(share: Array, time: float) -> tuple[Array, Array]:
 def test_wrenches_along_a_whole_cycle_agree_with_pinocchio(dof: int, kind: str) -> None:
     """About the joints, at all samples of all motions, with the payload where it is carried."""
     found, evaluation = case(dof, kind)
-    of_groups = wrench_terms(evaluation.paths, found.task.payload.mass)
+    of_groups = torque_terms(evaluation.paths, found.task.payload.mass, wrenches=True)
     carried = set()
     for group, of_motions in zip(evaluation.paths.groups, of_groups, strict=True):
         for at, row in enumerate(group.index):
-            for i, (path, terms) in enumerate(zip(group.paths, of_motions, strict=True)):
+            for i, (path, part) in enumerate(zip(group.paths, of_motions, strict=True)):
+                terms = part.wrenches
                 arm = found.arms[row]
                 s, ss = rates(path.share, evaluation.loads.durations[row, i])
                 values = [np.broadcast_to(path.at(path.share, n), path.q.shape)[at] for n in range(3)]
@@ -74,9 +75,7 @@ def test_wrenches_along_a_whole_cycle_agree_with_pinocchio(dof: int, kind: str) 
                 acceleration = q_ss * s[:, None] ** 2 + q_s * ss[:, None]
                 peer = loaded_peer(found, row, path.motion.carries)
                 theirs = joint_wrenches(peer, q, q_s * s[:, None], acceleration)
-                ours = (
-                    terms[0, at] + terms[1, at] * (s**2)[:, None, None, None] + terms[2, at] * ss[:, None, None, None]
-                )
+                ours = terms[0, at] + terms[1, at] * (s**2)[:, None, None] + terms[2, at] * ss[:, None, None]
                 ours = ours[:, [number - 1 for number, _ in moving(arm)]].reshape(theirs.shape)
                 assert np.abs(ours - theirs).max() <= 1e-6 * max(1.0, np.abs(theirs).max())
                 carried.add(path.motion.carries)

@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arms.actuation import Actuation
-from armwright.kinematics.arms.arm_arrays import ArmArrays, carrying, stack_arms
-from armwright.kinematics.arms.bearings import across_axis, bearing_loads
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays, carrying, stack_arms
+from armwright.kinematics.arms.bearings import across_axis, bearing_limits, bearing_loads
 from armwright.kinematics.arms.forward import Frames, forward_kinematics, jacobian_of
 from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_bearing_loads, cycle_loads, holding_torques
 from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths, rough_paths
 from armwright.kinematics.cycle.supply import SupplyCurrents, supply_currents
-from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms, wrench_terms
+from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik.ik import UPDATES, Postures, solve_postures
 from armwright.kinematics.reach.compliance import joint_loads, own_loads, unit_payload
@@ -77,7 +77,9 @@ class Evaluation(Scene):
     @cached_property
     def torque_terms(self) -> list[tuple[TorqueTerms, ...]]:
         """Terms of the torques along the cycle, for each group of arms."""
-        return torque_terms(self.paths, float(self.payload.max()), self.device)
+        drives = self.arms.actuation
+        limited = drives is not None and bool(np.isfinite(bearing_limits(drives)[self.arms.motion < FIXED]).any())
+        return torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=limited)
 
     @cached_property
     def loads(self) -> CycleLoads:
@@ -124,8 +126,10 @@ class Evaluation(Scene):
         at_targets = bearing_loads(own + self.payload[:, None, None, None] * unit)
         if self.cycle_paths is None:
             return at_targets
-        wrenches = wrench_terms(self.paths, float(self.payload.max()), self.device)
-        return self.largest_on_motions(cycle_bearing_loads(self.paths, wrenches, self.loads.durations), at_targets)
+        terms = self.torque_terms
+        if not terms[0][0].wrenches.size:
+            terms = torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=True)
+        return self.largest_on_motions(cycle_bearing_loads(self.paths, terms, self.loads.durations), at_targets)
 
     def largest_on_motions(self, along: Array, at_targets: Array | float = 0.0) -> Array:
         """Return (N, T, ...) the larger of a target's value and those of the motions (N, M, ...) of steps to it."""

@@ -38,6 +38,23 @@ def bearing_loads(across: Array) -> Array:
     return np.concatenate([size[..., :2].max(axis=-1, keepdims=True), size[..., 2:]], axis=-1)
 
 
+def largest_bearing_loads(arms: ArmArrays, wrenches: Array) -> Array:
+    """Return the (N, D, 3) largest `bearing_loads` of (N, F, D, 6) forces and moments in the frames of the links.
+
+    There, the axis is one of the frame's: |M ± d a × F|² = |M|² + d² |F|² ± 2 d M·(a × F), of what is across the axis.
+    """
+    along = np.where((arms.motion < PRISMATIC)[..., None], np.eye(3)[arms.motion % PRISMATIC], 0.0)  # (N, D, 3)
+    across = np.where((arms.motion < PRISMATIC)[..., None], 1.0 - along, 0.0)
+    force, moment = wrenches[..., :3], wrenches[..., 3:]
+    axial, radial = (np.einsum("nfdi,nfdi,ndi->nfd", force, force, part) for part in (along, across))
+    tilting = np.einsum("nfdi,nfdi,ndi->nfd", moment, moment, across)
+    if arms.actuation is not None and np.nan_to_num(arms.actuation.bearing_offset).any():
+        offset = np.nan_to_num(arms.actuation.bearing_offset)[:, None]
+        mixed = np.abs((moment * np.cross(along[:, None], force)).sum(axis=-1))
+        tilting += offset**2 * radial + 2.0 * offset * mixed
+    return np.sqrt(np.stack([each.max(axis=1) for each in (tilting, axial, radial)], axis=-1))
+
+
 def bearing_limits(drives: Actuation) -> Array:
     """Return the (N, D, 3) largest tilting moment [N m], axial and radial force [N]; NaN where a maker states none."""
     return np.stack([drives.tilting_limit, drives.axial_limit, drives.radial_limit], axis=-1)

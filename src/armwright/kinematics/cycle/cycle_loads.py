@@ -15,7 +15,7 @@ from armwright.arrays import Array
 from armwright.exceptions import UnknownQuantityError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.arms.bearings import across_axis, bearing_loads
+from armwright.kinematics.arms.bearings import largest_bearing_loads
 from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
 from armwright.kinematics.cycle.drive_limits import MotionLoad, least_time, motion_load
 from armwright.kinematics.cycle.torque_terms import TorqueTerms
@@ -94,21 +94,19 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
     return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding)
 
 
-def cycle_bearing_loads(paths: CyclePaths, wrenches: Sequence[tuple[Array, ...]], durations: Array) -> Array:
+def cycle_bearing_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]], durations: Array) -> Array:
     """Return the (N, M, D, 3) largest tilting moment [N m], axial and radial force [N] of the joints in each motion.
 
-    wrenches: from `wrench_terms`.  durations: (N, M) of the motions [s].
+    terms: with wrenches.  durations: (N, M) of the motions [s].
     """
     largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
-    for group, of_motions in zip(paths.groups, wrenches, strict=True):
-        axis = np.eye(3)[group.arms.motion % 3][:, None]  # in the frames of the links, of joints that turn
-        for i, terms in enumerate(of_motions):
-            weights, rate, change = _instants(terms.shape[2], paths.instants, _density(group))
-            flat = weights @ terms.reshape(*terms.shape[:3], -1)  # (3, n, F, D 6)
+    for group, of_motions in zip(paths.groups, terms, strict=True):
+        for i, part in enumerate(of_motions):
+            weights, rate, change = _instants(part.gravity.shape[1], paths.instants, _density(group))
+            flat = weights @ part.wrenches.reshape(*part.wrenches.shape[:3], -1)  # (3, n, F, D 6)
             s, ss = rate[:, None] / durations[group.index, i, None, None], change[:, None]
             total = flat[0] + flat[1] * s**2 + flat[2] * ss / durations[group.index, i, None, None] ** 2
-            force, moment = np.moveaxis(total.reshape(*total.shape[:2], -1, 2, 3), -2, 0)
-            largest[group.index, i] = bearing_loads(across_axis(group.arms, axis, force, moment)).max(axis=1)
+            largest[group.index, i] = largest_bearing_loads(group.arms, total.reshape(*total.shape[:2], -1, 6))
     return largest
 
 

@@ -28,32 +28,25 @@ class TorqueTerms:
     push: Array  # (N, R, D)
     q_s: Array  # (N, R, D) derivative of the joint values by s [rad] or [m]
     q_ss: Array  # (N, R, D) second derivative
+    wrenches: Array
+    """(3, N, R, D, 6) terms of the forces on the links and moments about their joints, in the frames of the links [N],
+    [N m]; empty if they were not wanted."""
 
 
-def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[TorqueTerms, ...]]:
-    """Return, for each group of arms, the terms along each motion; payload: its mass when carried [kg]."""
+def torque_terms(
+    paths: CyclePaths, payload: float, device: Device = "cpu", wrenches: bool = False
+) -> list[tuple[TorqueTerms, ...]]:
+    """Return, for each group of arms, the terms along each motion.
+
+    payload: its mass when carried [kg].  wrenches: compute those of the joints, too.
+    """
     found: list[tuple[TorqueTerms, ...]] = []
     for group in paths.groups:
         states, carried, spans = _along(group)
-        terms = _terms(group.arms, *states, carried, payload, device)  # (3, n, S, D)
+        whole = np.empty((3, *states[0].shape, 6)) if wrenches else NO_WRENCHES
+        terms = _terms(group.arms, *states, carried, payload, device, whole)  # (3, n, S, D)
         parts = (*terms, *states[1:])
-        found.append(tuple(TorqueTerms(*(values[:, a:b] for values in parts)) for a, b in spans))
-    return found
-
-
-def wrench_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[Array, ...]]:
-    """Return, for each group of arms, (3, n, R, D, 2, 3) terms of the wrenches of the joints along each motion.
-
-    The terms are those of `TorqueTerms`, each of the force on a link [N] and the moment about its joint [N m], in the
-    frame of the link.  payload: its mass when carried [kg].
-    """
-    found: list[tuple[Array, ...]] = []
-    for group in paths.groups:
-        states, carried, spans = _along(group)
-        wrenches = np.empty((3, *states[0].shape, 6))
-        _terms(group.arms, *states, carried, payload, device, wrenches)
-        whole = wrenches.reshape(*wrenches.shape[:-1], 2, 3)
-        found.append(tuple(whole[:, :, a:b] for a, b in spans))
+        found.append(tuple(TorqueTerms(*(values[:, a:b] for values in parts), whole[:, :, a:b]) for a, b in spans))
     return found
 
 

@@ -147,8 +147,9 @@ def _of_links(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Stiffnes
 
 def _of_joints(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Array) -> Array:
     """Return the (N, K, 3) displacements of the tips by the motion of the joints [m]; stiffness: (N, D)."""
-    force, torque = ((values * frames.axis).sum(axis=-1) for values in joint_loads(frames, loads))  # 0 if fixed
-    motion = np.where(arms.prismatic[:, None], force, torque) / stiffness[:, None]  # (N, K, D)
+    force, moment = joint_loads(frames, loads)
+    acting = np.where(arms.prismatic[:, None, :, None], force, moment)
+    motion = (acting * frames.axis).sum(axis=-1) / stiffness[:, None]  # (N, K, D); 0 for fixed joints
     return np.cumsum(jacobian_of(arms, frames) * motion[:, :, None], axis=-1)[..., -1]
 
 
