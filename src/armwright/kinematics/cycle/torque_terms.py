@@ -46,7 +46,9 @@ def torque_terms(
         whole = np.empty((3, *states[0].shape, 6)) if wrenches else NO_WRENCHES
         terms = _terms(group.arms, *states, carried, payload, device, whole)  # (3, n, S, D)
         parts = (*terms, *states[1:])
-        found.append(tuple(TorqueTerms(*(values[:, a:b] for values in parts), whole[:, :, a:b]) for a, b in spans))
+        found.append(
+            tuple(TorqueTerms(*(values[:, a:b] for values in parts), wrenches=whole[:, :, a:b]) for a, b in spans)
+        )
     return found
 
 

@@ -90,9 +90,9 @@ def _drive_torques(arm: ArmArrays, q: Array, qd: Array, qdd: Array, carried: Arr
     drives = arm.actuation
     if drives is None:
         return torques
-    inertia, coulomb, viscous, gear = (
-        np.nan_to_num(values[0])
-        for values in (drives.rotor_inertia, drives.coulomb, drives.viscous, drives.load_friction)
+    inertia, coulomb, viscous = (
+        np.nan_to_num(values[0]) for values in (drives.rotor_inertia, drives.coulomb, drives.viscous)
     )
-    share: Array = np.where(torques * qd > 0.0, gear, gear / (1.0 + gear))
+    gear: Array = np.nan_to_num(drives.load_friction[0])
+    share = np.where(torques * qd > 0.0, gear, gear / (1.0 + gear))
     return torques + inertia * qdd + viscous * qd + (coulomb + share * np.abs(torques)) * np.sign(qd)
