@@ -28,6 +28,7 @@ def check(folder: Path) -> list[str]:
     mass, inertia = model.body_mass[payload], model.body_inertia[payload].copy()
     substeps = round((float(rows[1]["time"]) - float(rows[0]["time"])) / model.opt.timestep)
     limit = np.where(model.jnt_actfrclimited, model.jnt_actfrcrange[:, 1], np.inf)
+    coulomb, gear = model.dof_frictionloss.copy(), model.jnt_user[:, 0] if model.nuser_jnt else 0.0
     faults, saturated, steps = [], np.zeros(n), 0
     data.qpos[:] = q[0]
     for i, row in enumerate(rows):
@@ -53,6 +54,8 @@ def check(folder: Path) -> list[str]:
         for s in range(substeps):
             now = (s + 0.5) / substeps if rows[i + 1]["payload"] == row["payload"] else 0.0
             data.ctrl[servo], data.ctrl[forward] = ((1.0 - now) * x[i] + now * x[i + 1] for x in (q, tau))
+            after = data.qfrc_actuator + data.qfrc_passive + data.qfrc_constraint - model.dof_armature * data.qacc
+            model.dof_frictionloss[:] = coulomb + gear * np.minimum(np.abs(data.qfrc_actuator), np.abs(after))
             mujoco.mj_step(model, data)
             saturated += np.abs(data.qfrc_actuator) >= (1.0 - 1e-6) * limit
             steps += 1

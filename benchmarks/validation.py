@@ -39,6 +39,7 @@ KG_CM = 0.01 * GRAVITY  # [N m]
 FAR = 1e3  # [m]
 SERVO = named_actuator("STS3215-12V").completed()
 STALL = SERVO.stall_torque or 0.0  # [N m]
+GEAR, COULOMB = SERVO.load_friction or 0.0, SERVO.coulomb_friction or 0.0  # friction: share of the torque, [N m]
 COUNT = 360.0 / 4096  # [°] of the servo's encoder
 BACKLASHES = {"maker": 0.5, "measured on a servo": 1.0, "measured on the base of an SO-101": 8.75 * COUNT}  # [°]
 PAYLOAD = 0.25  # [kg] rated, of the SO-101
@@ -78,6 +79,8 @@ class Case:
 CASES = (
     Case("so101", "STS3215 at 7.4 V, stall", (19.5 * KG_CM,)),
     Case("so101", "STS3215 at 12 V, stall", (STALL,)),
+    Case("so101", "STS3215 at 7.4 V, lifting", (19.5 * KG_CM / (1.0 + GEAR) - COULOMB,)),
+    Case("so101", "STS3215 at 12 V, lifting", (STALL / (1.0 + GEAR) - COULOMB,)),
     Case("so101", "STS3215 at 12 V, stall / 1.5", (STALL / 1.5,)),
     Case("so101", "STS3215 at 12 V, rated", (SERVO.rated_torque or 0.0,)),
     Case("openarm", "peak", (40.0, 40.0, 27.0, 27.0, 7.0)),
@@ -134,7 +137,9 @@ def driven(arm: Arm, torques: Sequence[float]) -> Arm:
     moving = (joint for joint in arm.joints if joint.kind != "fixed")
     peaks = {id(joint): torques[min(i, len(torques) - 1)] for i, joint in enumerate(moving)}
     joints = (
-        replace(joint, actuator=Actuator("motor", 0.0, peaks[id(joint)])) if id(joint) in peaks else joint
+        replace(joint, actuator=Actuator("motor", 0.0, peaks[id(joint)], tilting_limit=1e9))
+        if id(joint) in peaks
+        else joint
         for joint in arm.joints
     )
     return replace(arm, joints=tuple(joints), safety_factor=1.0)
@@ -165,8 +170,10 @@ def print_servos(arm: Arm) -> None:
     print(f"  largest torque: {own:.2f} N m, with {PAYLOAD:g} kg {full:.2f} N m")
     mass, lever, angle = SERVO_TEST
     torque = mass * GRAVITY * lever * np.cos(np.radians(angle))
-    error = np.degrees(torque / (SERVO.position_gain or np.inf))
-    print(f"  a servo that holds {torque:.2f} N m yields by {error:.1f}° of its position gain")
+    exerted = torque, torque / (1.0 + GEAR) - COULOMB, (1.0 + GEAR) * torque + COULOMB
+    still, above, below = np.degrees(exerted) / (SERVO.position_gain or np.inf)
+    print(f"  a servo that holds {torque:.2f} N m yields by {still:.1f}° of its position gain")
+    print(f"  with friction, {above:.1f}° on arrival from above, {below:.1f}° from below")
 
 
 def print_droop(read: UrdfArm) -> None:

@@ -17,7 +17,7 @@ OTHER_UNITS: Mapping[str, tuple[str, float]] = {
 }
 _KEYS = {
     "m": "targets position tolerance target_noise tip center size radius height z approach path low high stroke "
-    "origin_x origin_y origin_z link outer_diameter wall foot tubes width depth shaft_offset",
+    "origin_x origin_y origin_z link outer_diameter wall foot tubes width depth shaft_offset bearing_offset",
     "rad": "angle_tolerance angle half_angle rpy yaw joint_range limit backlash",
     "kg": "payload mass bracket_mass kg",
     "s": "dwell time",
@@ -30,7 +30,8 @@ _KEYS = {
     "USD/kg": "price_per_kg",
     "V": "voltage voltage_min voltage_max supply",
     "A": "current",
-    "N m": "stall_torque rated_torque peak_torque coulomb_friction",
+    "N m": "stall_torque rated_torque peak_torque coulomb_friction tilting_limit",
+    "N": "axial_limit radial_limit",
     "rad/s": "speed corner_speed",
     "N m s/rad": "viscous_friction damping_gain",
     "N m/rad": "joint_stiffness position_gain",

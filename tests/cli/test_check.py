@@ -56,7 +56,8 @@ def test_cycle_is_shown_with_its_durations_and_constraints(in_folder: Path) -> N
         "joints: 5\nmass: {kind: per_metre, kg: 0.5}\nactuators: [XM430-W350]\n", encoding="utf-8"
     )
     bounds = ["unreached_targets <= 0", "path_error <= 0.003", "path_angle <= 0.02", "jumps <= 0"]
-    drives = ["dynamic_utilisation <= 1", "speed_utilisation <= 1", "thermal_utilisation <= 1", "voltages <= 1"]
+    drives = ["dynamic_utilisation <= 1", "speed_utilisation <= 1", "thermal_utilisation <= 1", "voltages <= 1",
+              "bearing_utilisation <= 1"]  # fmt: skip
     assert "durations: 2.5 s, 1.5 s; 0.2 s at rest" in armwright("tasks", "task.yaml").stdout
     checked = armwright("check", "task.yaml", "--space", "space.yaml", "--no-picture")
     assert checked.returncode == 0, checked.stderr

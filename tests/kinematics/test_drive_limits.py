@@ -31,7 +31,8 @@ def drives(n: int, d: int, rng: np.random.Generator) -> Actuation:
     corner = no_load * rng.choice([0.0, 0.3, 0.9, 1.0], (n, d))
     columns = (rng.uniform(0.5, 5.0, (n, d)), np.ones((n, d)), corner, no_load, rng.uniform(0.0, 0.2, (n, d)))
     friction = (rng.uniform(0.0, 0.4, (n, d)), rng.uniform(0.0, 0.3, (n, d)) * rng.choice([1, 20], (n, d)))
-    ratings = np.stack([*columns, *friction, *np.ones((4, n, d))], axis=-1)
+    gear = np.random.default_rng(d + 9).choice([0.0, 0.3], (n, d))
+    ratings = np.stack([*columns, *friction, gear, gear, *np.ones((9, n, d))], axis=-1)
     return actuation_at_joints(ratings, np.ones((n, d)), np.zeros(n), rng.uniform(1.0, 2.0, n))
 
 
@@ -81,6 +82,22 @@ def test_least_time_is_the_least_of_all_times(samples: int, joints: int) -> None
     assert joints > 2 or begins.max() > 1  # some of few joints are possible again after a gap between times
 
 
+def test_lifting_takes_the_friction_of_the_gear_and_lowering_gets_none_of_it() -> None:
+    """2 N m of gravity, up, down and at rest, with a share of 25 % of which a limit of 2.4 N m allows the last two."""
+    velocity = np.array([1.0, -1.0, 0.0]).reshape(3, 1, 1)
+    still, gravity = np.zeros((3, 1, 1)), np.full((3, 1, 1), 2.0)
+    ratings = np.stack([np.full((3, 1), each) for each in (2.4, 1.0, 0.0, 9.0, *[0.0] * 3, 0.4, 0.25, *[1.0] * 9)], -1)
+    motors = actuation_at_joints(ratings, np.ones((3, 1)), np.zeros(3), np.ones(3))
+    load = motion_load(gravity, still, velocity, still, motors)
+    torques = load.torque(np.full(3, 10.0)).ravel()
+    assert torques.tolist() == [2.5, 2.0, 2.0]
+    use = torque_speed_utilisation(load.torque(np.full(3, 10.0)), velocity / 10.0, motors).ravel()
+    assert use.tolist() == [2.5 / 2.4 + 0.1 / 9.0, 2.0 / 2.4, 2.0 / 2.4]
+    assert np.isfinite(least_time(load, motors)).tolist() == [False, True, True]
+    at_output = replace(motors, limit_friction=np.zeros((3, 1)))
+    assert np.isfinite(least_time(motion_load(gravity, still, velocity, still, at_output), at_output)).all()
+
+
 def test_fixed_joints_do_not_limit_a_motion() -> None:
     load, motors = random_motions(17)
     names = ("peak", "continuous", "corner_speed", "no_load_speed")
@@ -93,7 +110,9 @@ def test_fixed_joints_do_not_limit_a_motion() -> None:
     assert not least_time(rest, fixed).any()
 
 
-@pytest.mark.parametrize("name", ["peak", "corner_speed", "no_load_speed", "coulomb", "viscous", "rotor_inertia"])
+@pytest.mark.parametrize(
+    "name", ["peak", "corner_speed", "no_load_speed", "coulomb", "viscous", "rotor_inertia", "limit_friction"]
+)
 def test_unknown_ratings_give_no_number(name: str) -> None:
     rng = np.random.default_rng(0)
     motors = drives(3, D, rng)
@@ -128,10 +147,11 @@ def quintic(n: int) -> tuple[Array, Array, Array]:
 
 
 def with_constant_limits(arms: ArmArrays) -> Actuation:
-    """The peak torque up to the no-load speed, and no viscous friction, which TOPP-RA does not know."""
+    """The peak torque up to the no-load speed, and no friction but Coulomb's, the only one that TOPP-RA knows."""
     drives = arms.actuation
     assert drives is not None
-    return replace(drives, corner_speed=drives.no_load_speed, viscous=np.zeros_like(drives.viscous))
+    nothing = np.zeros_like(drives.viscous)
+    return replace(drives, corner_speed=drives.no_load_speed, viscous=nothing, limit_friction=nothing)
 
 
 def fastest_by_toppra(arms: ArmArrays, motors: Actuation, start: Array, end: Array) -> float:

@@ -20,7 +20,8 @@ TARGETS = [[0.3, 0.2, 0.1], [-0.2, 0.4, 0.3], [0.1, -0.3, -0.2]]
 
 
 def driven(arm: Arm, peak: float) -> Arm:
-    joints = tuple(replace(joint, actuator=Actuator("motor", 0.0, peak)) for joint in arm.joints)
+    motor = Actuator("motor", 0.0, peak, tilting_limit=1e9)
+    joints = tuple(replace(joint, actuator=motor) for joint in arm.joints)
     return replace(arm, joints=joints, safety_factor=FACTOR)
 
 

@@ -10,7 +10,8 @@ from armwright.tasks.task import Task
 from tests.proof.test_simulation import DESK, SPACE, Desk
 from tests.support.arms import LIGHT
 
-SERVO = ["rated_torque", "corner_speed", "rotor_inertia", "coulomb_friction", "viscous_friction", "shaft_offset"]
+SERVO = ["rated_torque", "corner_speed", "rotor_inertia", "coulomb_friction", "viscous_friction", "load_friction",
+         "shaft_offset"]  # fmt: skip
 SIZE = {"width": 0.03, "height": 0.04, "depth": 0.03}
 
 

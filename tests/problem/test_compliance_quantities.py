@@ -10,11 +10,17 @@ from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.reach.compliance import Stiffness
 from armwright.problem.conditions import read_condition
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import backlash_error, deflection, payload_capacity, payload_deflection
+from armwright.problem.objectives import (
+    backlash_error,
+    deflection,
+    friction_error,
+    payload_capacity,
+    payload_deflection,
+)
 from armwright.problem.problem import Problem
 from armwright.proof.selection import pick
 from armwright.robot.actuators import named_actuator
-from armwright.robot.arm import Arm
+from armwright.robot.arm import GRAVITY, Arm, Joint, uniform_link
 from armwright.spaces.design_space import DesignSpace
 from armwright.study.study import optimize
 from armwright.tasks.moments import MAX_MASS
@@ -78,6 +84,16 @@ def test_deflection_is_that_of_the_worst_target() -> None:
         assert deflection(evaluation)[i] == pytest.approx(np.linalg.norm(found, axis=1).max(), rel=1e-3)
         by_payload = np.linalg.norm(np.subtract(found, bare), axis=1).max()
         assert payload_deflection(evaluation)[i] == pytest.approx(by_payload, rel=1e-3)
+
+
+def test_friction_stops_a_lifting_joint_where_its_control_does_not_move_it() -> None:
+    """A level link of 0.3 m and 0.2 kg with 0.5 kg at its end: the control must exceed the friction at 9.81 m/s²."""
+    joint = Joint("revolute", "y", -1.0, 1.0, MOTOR)
+    arm = Arm((0.0, 0.0, 0.0), (joint,), (uniform_link((0.3, 0.0, 0.0), 0.2, 0.01),))
+    torque = GRAVITY * (0.2 * 0.15 + 0.5 * 0.3)
+    friction = (MOTOR.coulomb_friction or 0.0) + (MOTOR.load_friction or 0.0) * torque
+    found = friction_error(evaluate([arm], [[0.3, 0.0, 0.0]], payload=0.5))
+    assert found == pytest.approx(0.3 * friction / (MOTOR.position_gain or 0.0), rel=1e-5)
 
 
 def test_designs_of_a_batch_yield_like_single_arms_to_the_bit() -> None:

@@ -21,7 +21,8 @@ TARGETS = [
 ]
 PICKS = [{"to": "bin", "do": "pick"}, {"to": "tray", "do": "place"}, {"to": "home", "by": "line"}]
 IMPLIED = ["unreached_targets <= 0", "path_error <= 0.002", "path_angle <= 0.02", "jumps <= 0", "collision <= 0"]
-DRIVES = ["dynamic_utilisation <= 1", "speed_utilisation <= 1", "thermal_utilisation <= 1", "voltages <= 1"]
+DRIVES = ["dynamic_utilisation <= 1", "speed_utilisation <= 1", "thermal_utilisation <= 1", "voltages <= 1",
+          "bearing_utilisation <= 1"]  # fmt: skip
 ARM: dict[str, Any] = {
     "name": "arm",
     "joints": 5,

@@ -79,11 +79,13 @@ def desk() -> Desk:
 
 
 def test_torques_of_the_trajectory_are_mujocos(desk: Desk) -> None:
+    """With the friction of the gears by hand: a share of the torques after them, of those before them in braking."""
     trajectory = trajectory_of(desk.arm, desk.evaluation, 0)
     model = mujoco.MjModel.from_xml_string(desk.files[MODEL])
     flags = mujoco.mjtDisableBit
     model.opt.disableflags |= flags.mjDSBL_FRICTIONLOSS | flags.mjDSBL_CONTACT | flags.mjDSBL_LIMIT
-    friction = model.dof_frictionloss.copy()
+    friction, gear = model.dof_frictionloss.copy(), model.jnt_user[:, 0]
+    assert (gear > 0.0).all()
     assert (friction > 0.0).all()
     assert (model.dof_armature > 0.0).all()
     data, payload = mujoco.MjData(model), model.body("payload").id
@@ -95,7 +97,9 @@ def test_torques_of_the_trajectory_are_mujocos(desk: Desk) -> None:
         model.body_mass[payload], model.body_inertia[payload] = share * mass, share * inertia
         data.qpos[:], data.qvel[:], data.qacc[:] = trajectory.q[row], trajectory.qd[row], trajectory.qdd[row]
         mujoco.mj_inverse(model, data)
-        expected = data.qfrc_inverse + friction * np.sign(trajectory.qd[row])
+        after = data.qfrc_inverse - model.dof_armature * data.qacc - model.dof_damping * data.qvel
+        share = np.where(after * data.qvel > 0.0, gear, gear / (1.0 + gear))
+        expected = data.qfrc_inverse + (friction + share * np.abs(after)) * np.sign(trajectory.qd[row])
         assert np.abs(trajectory.tau[row] - expected).max() < 1e-6
 
 
@@ -152,8 +156,12 @@ def test_a_feasible_arm_passes_with_the_claimed_torques(desk: Desk) -> None:
     for joint in result.joints:
         assert abs(joint.peak_torque - joint.claimed_peak_torque) < 0.15 * max(joint.claimed_peak_torque, 1.06)
     claimed = np.abs(desk.evaluation.loads.torques[0]).max(axis=(0, 1))
-    stated = [joint.claimed_peak_torque for joint in result.joints]
-    assert stated == pytest.approx(claimed, rel=0.05)
+    stated = np.array([joint.claimed_peak_torque for joint in result.joints])
+    gear = np.array(
+        [joint.actuator.load_friction for joint in desk.arm.joints]
+    )  # helps in braking, which is not claimed
+    assert (stated <= 1.05 * claimed).all()
+    assert (stated >= 0.95 * claimed / (1.0 + gear)).all()
     assert all(one.droop > 5.0 * one.tip_error for one in result.targets)
 
 

@@ -135,7 +135,8 @@ def test_invalid_actuator_is_refused(wrong: dict[str, float]) -> None:
 
 def test_catalogue_states_a_source_for_each_actuator_and_value_of_its_drives() -> None:
     own = ("gear_ratio", "rotor_inertia", "coulomb_friction", "viscous_friction", "corner_speed", "backlash",
-           "position_gain", "damping_gain", "current")  # fmt: skip
+           "position_gain", "damping_gain", "current", "load_friction", "bearing_offset", "tilting_limit",
+           "axial_limit", "radial_limit")  # fmt: skip
     for name, record in catalogue().items():
         assert record.source.startswith("https://")
         sources = catalogue_sources()[name]
@@ -148,8 +149,9 @@ def test_catalogue_completes_every_actuator_and_counts_assumed_values() -> None:
     records = catalogue().values()
     for record in records:
         completed = record.completed()
-        values = [getattr(completed, name) for name in UNITS if name not in ("stall_torque", "gear_ratio", "price")]
-        assert all(value is not None for value in values[:-4]), record.name  # sizes may be missing
+        open_ = {"stall_torque", "gear_ratio", "price", "width", "height", "depth", "shaft_offset", "tilting_limit",
+                 "axial_limit", "radial_limit"}  # fmt: skip
+        assert all(getattr(completed, name) is not None for name in UNITS.keys() - open_), record.name
         stated = [name for name in UNITS if getattr(record, name) is not None and name not in record.estimates]
         assert not set(stated) & set(record.assumed)
         assert completed.rated_torque <= completed.peak_torque, record.name

@@ -16,11 +16,13 @@ from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.failure import Failure
 from armwright.problem.objectives import (
     backlash_error,
+    bearing_utilisation,
     deflection,
     dynamic_utilisation,
     mass,
     speed_utilisation,
     thermal_utilisation,
+    tilting_moment,
     torque_utilisation,
     worst_error,
 )
@@ -115,6 +117,8 @@ def test_utilisation_of_joints_is_that_of_the_quantities(sheet: DataSheet, histo
     for key, quantity in (
         ("thermal_utilisation", thermal_utilisation),
         ("speed_utilisation", speed_utilisation),
+        ("tilting_moment", tilting_moment),
+        ("bearing_utilisation", bearing_utilisation),
     ):
         values = [getattr(joint, key) for joint in sheet.joints]
         assert max(values) == pytest.approx(float(quantity(evaluation)[0])), key

@@ -10,9 +10,9 @@ from armwright.text import rounded
 STATIC = ("mass", "stall_torque", "peak_torque")
 ALONG_CYCLE = (
     *STATIC, "voltage", "rated_torque", "speed", "corner_speed", "rotor_inertia", "coulomb_friction",
-    "viscous_friction", "position_gain", "current",
+    "viscous_friction", "load_friction", "position_gain", "current",
 )  # fmt: skip
-YIELDING = ("joint_stiffness", "backlash")  # enter only quantities that need them
+YIELDING = ("joint_stiffness", "backlash", "bearing_offset")  # enter only quantities that need them
 
 Assumed = Mapping[str, Mapping[str, float]]  # assumed values by actuator and name, in the units of UNITS
 

@@ -9,6 +9,7 @@ from armwright.kinematics.reach.compliance import (
     backlash_errors,
     own_loads,
     tip_displacements,
+    tip_errors,
     unit_payload,
 )
 from armwright.kinematics.reach.payload_limits import payload_limits, torques_by_payload
@@ -38,9 +39,20 @@ def backlash_error(e: Evaluation) -> Array:
     return backlash_errors(e.arms, e.frames, e.drives.backlash)
 
 
+@quantity("m", over="max", ratings=("coulomb", "load_friction", "position_gain"), symbol="E_friction")
+def friction_error(e: Evaluation) -> Array:
+    """How far the friction of all actuators together may stop the tip at most from where their position control and
+    gravity compensation send it in the kept posture, on arrival from below; above it, less.
+    """
+    friction = e.drives.coulomb[:, None] + e.drives.load_friction[:, None] * np.abs(e.joint_torques)
+    return tip_errors(e.arms, e.frames, friction / e.drives.position_gain[:, None])
+
+
 @quantity("kg", over="min", ratings=("peak",), symbol="payload_capacity")
 def payload_capacity(e: Evaluation) -> Array:
-    """The largest payload that all actuators hold in the kept posture, with the safety factor."""
+    """The largest payload that all actuators hold in the kept posture, with the safety factor, and that tilts no joint
+    beyond what the maker of its actuator allows, or beyond the strongest actuator's torque if none is stated.
+    """
     held = e.payload[:, None] * torques_by_payload(e.arms, e.frames)
     peak = e.drives.peak / e.drives.safety_factor[:, None]
     limits = payload_limits(e.arms, e.frames, e.joint_torques - held, peak)

@@ -19,7 +19,9 @@ from armwright.units import NUMBER
 
 Relation = Literal["<=", ">="]
 
-DRIVE_QUANTITIES = ("dynamic_utilisation", "speed_utilisation", "thermal_utilisation", "voltages")
+DRIVE_QUANTITIES = (
+    "dynamic_utilisation", "speed_utilisation", "thermal_utilisation", "voltages", "bearing_utilisation",
+)  # fmt: skip
 MIN_SCALE = 1e-9  # bounds nearer to 0 count as 0
 _CONSTRAINT = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=)\s*(\S+)\s*")
 _NUMBER = re.compile(NUMBER)

@@ -4,6 +4,8 @@
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import FIXED
+from armwright.kinematics.arms.bearings import bearing_limits
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import quantity
@@ -58,6 +60,37 @@ def thermal_utilisation(e: Evaluation) -> Array:
     cycle with its dwells, times the safety factor; above 1 it overheats.
     """
     return e.drives.safety_factor * (e.loads.rms_torques / e.drives.continuous).max(axis=1)
+
+
+@quantity("N m", over="max", needs=("motions", "durations"), ratings=("bearing_offset",), symbol="E_tilting")
+def tilting_moment(e: Evaluation) -> Array:
+    """The largest moment across the axis of any joint that turns, about the bearing of its actuator, at rest and on
+    the way to the target.
+    """
+    return e.bearing_loads[..., 0].max(axis=-1)
+
+
+@quantity("N", over="max", needs=("motions", "durations"), ratings=("bearing_offset",), symbol="E_axial")
+def axial_force(e: Evaluation) -> Array:
+    """The largest force along the axis of any joint that turns, at rest and on the way to the target."""
+    return e.bearing_loads[..., 1].max(axis=-1)
+
+
+@quantity("N", over="max", needs=("motions", "durations"), ratings=("bearing_offset",), symbol="E_radial")
+def radial_force(e: Evaluation) -> Array:
+    """The largest force across the axis of any joint that turns, at rest and on the way to the target."""
+    return e.bearing_loads[..., 2].max(axis=-1)
+
+
+@quantity("of allowed", over="max", needs=("motions", "durations"), ratings=("peak",), symbol="E_bearing")
+def bearing_utilisation(e: Evaluation) -> Array:
+    """The largest share of what the maker of an actuator allows across its shaft, of moment, axial and radial force,
+    that any joint takes at rest and on the way to the target; 0 where no maker states a limit.
+    """
+    limits = bearing_limits(e.drives)
+    if not (np.isfinite(limits).any(axis=-1) & (e.arms.motion < FIXED)).any():
+        return np.zeros(e.position_error.shape)
+    return np.nan_to_num(e.bearing_loads / limits[:, None]).max(axis=(-2, -1))
 
 
 @quantity("A", over="arm", needs=("cycle", "durations"), ratings=("peak", "voltage", "current"), symbol="I_peak")

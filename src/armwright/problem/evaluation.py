@@ -11,15 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arms.actuation import Actuation
-from armwright.kinematics.arms.arm_arrays import ArmArrays, carrying, stack_arms
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays, carrying, stack_arms
+from armwright.kinematics.arms.bearings import across_axis, bearing_limits, bearing_loads
 from armwright.kinematics.arms.forward import Frames, forward_kinematics, jacobian_of
 from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
-from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_loads, holding_torques
+from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_bearing_loads, cycle_loads, holding_torques
 from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths, rough_paths
 from armwright.kinematics.cycle.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik.ik import UPDATES, Postures, solve_postures
+from armwright.kinematics.reach.compliance import joint_loads, own_loads, unit_payload
 from armwright.problem.dexterous_volume import dexterous_volumes
 from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
@@ -75,7 +77,9 @@ class Evaluation(Scene):
     @cached_property
     def torque_terms(self) -> list[tuple[TorqueTerms, ...]]:
         """Terms of the torques along the cycle, for each group of arms."""
-        return torque_terms(self.paths, float(self.payload.max()), self.device)
+        drives = self.arms.actuation
+        limited = drives is not None and bool(np.isfinite(bearing_limits(drives)[self.arms.motion < FIXED]).any())
+        return torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=limited)
 
     @cached_property
     def loads(self) -> CycleLoads:
@@ -109,9 +113,27 @@ class Evaluation(Scene):
         torques, speeds = (values.reshape(n, m * f, dof) for values in (self.loads.torques, self.loads.speeds))
         return self.largest_on_motions(measure(torques, speeds).reshape(n, m, f).max(axis=2))
 
+    @cached_property
+    def bearing_loads(self) -> Array:
+        """(N, T, J, 3) largest tilting moment [N m], axial and radial force [N] of each joint; 0 if it does not turn.
+
+        They are of a target's posture and of the motions of steps to it; SettingsError if a duration is not known.
+        """
+        own, unit = (
+            across_axis(self.arms, self.frames.axis, *joint_loads(self.frames, loads))
+            for loads in (own_loads(self.arms, self.frames), unit_payload(self.arms, self.frames))
+        )
+        at_targets = bearing_loads(own + self.payload[:, None, None, None] * unit)
+        if self.cycle_paths is None:
+            return at_targets
+        terms = self.torque_terms
+        if not terms[0][0].wrenches.size:
+            terms = torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=True)
+        return self.largest_on_motions(cycle_bearing_loads(self.paths, terms, self.loads.durations), at_targets)
+
     def largest_on_motions(self, along: Array, at_targets: Array | float = 0.0) -> Array:
-        """Return (N, T) the larger of a target's value (N, T) and those of the motions (N, M) of steps to it."""
-        worst = np.zeros(self.position_error.shape) + at_targets
+        """Return (N, T, ...) the larger of a target's value and those of the motions (N, M, ...) of steps to it."""
+        worst = np.array(np.broadcast_to(at_targets, (*self.position_error.shape, *along.shape[2:])))
         for index, motion in enumerate(self.paths.plan.motions):
             target = self.paths.plan.targets[motion.step]
             worst[:, target] = np.maximum(worst[:, target], along[:, index])

@@ -27,7 +27,9 @@ _OVER: Mapping[Over, str] = {
     "rms": " The root mean square over the targets.",
     "arm": "",
 }
-KEYS = {"peak": "peak_torque", "continuous": "rated_torque", "no_load_speed": "speed"}  # of ratings in records
+KEYS = {  # of ratings in records
+    "peak": "peak_torque", "continuous": "rated_torque", "no_load_speed": "speed", "coulomb": "coulomb_friction",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

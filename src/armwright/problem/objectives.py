@@ -11,17 +11,22 @@ from armwright.kinematics.arms.arm_arrays import FIXED
 from armwright.problem.compliance_quantities import (
     backlash_error,
     deflection,
+    friction_error,
     payload_capacity,
     payload_deflection,
 )
 from armwright.problem.drive_quantities import (
+    axial_force,
+    bearing_utilisation,
     dynamic_torque,
     dynamic_utilisation,
     mean_current,
     peak_current,
     price,
+    radial_force,
     speed_utilisation,
     thermal_utilisation,
+    tilting_moment,
     torque_utilisation,
     voltages,
 )
@@ -245,7 +250,7 @@ OBJECTIVES: Mapping[str, Objective] = {
         price, joints, orientation_error, worst_angle, collision, clearance_shortfall, path_error, path_angle, jumps,
         cycle_time, dynamic_torque, dynamic_utilisation, speed_utilisation, thermal_utilisation, peak_current,
         mean_current, uncovered_fraction, undexterous_fraction, anisotropy, deflection, payload_deflection,
-        backlash_error,
+        backlash_error, friction_error, bearing_utilisation, tilting_moment, axial_force, radial_force,
     )
 }  # fmt: skip
 CLEARANCES = (clearance, self_clearance, obstacle_clearance)

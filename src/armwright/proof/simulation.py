@@ -1,7 +1,8 @@
 """The exported model of a design, driven through its trajectory in MuJoCo.
 
 Each joint is driven by the torque of the trajectory as feed-forward and by its servo, kp (q* - q), with q* from the
-trajectory, interpolated between its rows. What damps is the friction of the joints.
+trajectory, interpolated between its rows. What damps is the friction of the joints. That of a gear is a share of the
+lesser of the torques before and after it, by the step before.
 """
 
 from dataclasses import dataclass
@@ -109,6 +110,8 @@ class _Driver:
         self._full = float(self._model.body_mass[self._payload]), self._model.body_inertia[self._payload].copy()
         self._tip = self._model.site("tip").id
         self._contacts: dict[tuple[str, str], Contact] = {}
+        self._coulomb, user = self._model.dof_frictionloss.copy(), self._model.jnt_user
+        self._gear = user[:, 0] if user.shape[1] else np.zeros(self._n)  # share of friction
 
     def run(self) -> Drive:
         """Drive the whole cycle."""
@@ -134,6 +137,7 @@ class _Driver:
             for _ in range(SUBSTEPS):
                 data.ctrl[:n], data.ctrl[n:] = servo[at], forward[at]
                 speed[at] = data.qvel
+                self._rub()
                 self._mujoco.mj_step(model, data)
                 tau[at] = data.qfrc_actuator
                 at += 1
@@ -141,6 +145,13 @@ class _Driver:
                     self._note_contacts()
         stable = not any(warning.number for warning in data.warning) and bool(np.isfinite(q).all())
         return Drive(q, qd, tau, speed, tip, tuple(arrivals), tuple(self._contacts.values()), stable)
+
+    def _rub(self) -> None:
+        """Set the friction of the joints by the loads of their gears."""
+        data, model = self._data, self._model
+        passed = data.qfrc_actuator + data.qfrc_passive + data.qfrc_constraint - model.dof_armature * data.qacc
+        loads = np.minimum(np.abs(data.qfrc_actuator), np.abs(passed))
+        model.dof_frictionloss[:] = self._coulomb + self._gear * loads
 
     def _commands(self) -> tuple[Array, Array]:
         """Return the (S, D) positions for the servos and torques for the feed-forward, at the middle of substeps.

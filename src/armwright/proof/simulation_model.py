@@ -58,7 +58,8 @@ def to_simulation_mjcf(
     """Return the MJCF of an arm in its surroundings.
 
     Moving joints are joint_1, joint_2, …, each with the actuators servo_1, … (position) and ff_1, … (torque), whose sum
-    is limited to the actuator's peak torque. Link k is the capsule link_k, its actuator the sphere or body motor_k. The
+    is limited to the actuator's peak torque, before the friction of its gear; `user` is this friction relative to the
+    torque that the gear passes on. Link k is the capsule link_k, its actuator the sphere or body motor_k. The
     column below the base is the cylinder `column`, which touches no obstacle. A site target_NAME is at each target; its
     user data are the tolerance of the position [m], of the angle [rad], and how many angles count (2: the z axis, 3:
     all). The keyframe NAME is the posture there.
@@ -162,7 +163,7 @@ def _add_targets(world: Element, scene: Scene, target_names: Sequence[str], arm:
 
 
 def _joint(name: str, joint: Joint) -> dict[str, str]:
-    """Return the attributes of a joint with its drive: rotor inertia, friction and limit."""
+    """Return the attributes of a joint with its drive: rotor inertia, friction, and the limit before friction."""
     attributes, actuator = joint_attributes(name, joint), joint.actuator
     if actuator is None or joint.effort is None:
         return attributes
@@ -171,11 +172,12 @@ def _joint(name: str, joint: Joint) -> dict[str, str]:
         "armature": (actuator.rotor_inertia or 0.0) / travel**2,
         "damping": (actuator.viscous_friction or 0.0) / travel**2,
         "frictionloss": (actuator.coulomb_friction or 0.0) / travel,
+        "user": actuator.load_friction or 0.0,
     }
-    limit = f"{number(-joint.effort)} {number(joint.effort)}"
+    most = joint.effort * (1.0 + (actuator.load_friction or 0.0)) / (1.0 + (actuator.limit_friction or 0.0))
     drive = {key: number(value) for key, value in drive.items() if value}
-    friction = STIFF_FRICTION if "frictionloss" in drive else {}
-    return attributes | drive | friction | {"actuatorfrcrange": limit}
+    friction = STIFF_FRICTION if {"frictionloss", "user"} & drive.keys() else {}
+    return attributes | drive | friction | {"actuatorfrcrange": f"{number(-most)} {number(most)}"}
 
 
 def _add_link(body: Element, segment: Segment) -> None:

@@ -26,16 +26,18 @@ class KindDefaults:
     gain: float  # position gain / τ [1/rad]
     damping: float | None  # damping gain / position gain [s]; None for τ / ω, the back-EMF of a voltage-driven motor
     current: float  # supply current at the peak torque x V / (τ ω)
+    load_friction: float  # friction that grows with the load / torque at the output
+    before_friction: bool = False  # whether makers state torques before this friction, else at the output
     continuous: float = 0.25  # continuous torque / τ
 
 
-_GEARED = KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.1), 100.0, 4.0, 0.05, 2.5)
+_GEARED = KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.1), 100.0, 4.0, 0.05, 2.5, 0.24)
 DEFAULTS: Mapping[ActuatorKind, KindDefaults] = {
-    "servo": KindDefaults(0.047, 0.025, 0.09, 0.0, math.radians(0.5), 40.0, 4.6, None, 1.6),
-    "coreless servo": KindDefaults(0.016, 0.025, 0.09, 0.0, math.radians(0.25), 40.0, 4.6, None, 1.6),
+    "servo": KindDefaults(0.047, 0.025, 0.09, 0.0, math.radians(0.5), 40.0, 4.6, None, 1.6, 0.2, True),
+    "coreless servo": KindDefaults(0.016, 0.025, 0.09, 0.0, math.radians(0.25), 40.0, 4.6, None, 1.6, 0.2, True),
     "geared drive": _GEARED,
-    "quasi-direct-drive": KindDefaults(0.007, 0.02, 0.045, 0.3, math.radians(0.2), 100.0, 1.6, 0.05, 1.0),
-    "harmonic": KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.005), 190.0, 4.0, 0.05, 2.5),
+    "quasi-direct-drive": KindDefaults(0.007, 0.02, 0.045, 0.3, math.radians(0.2), 100.0, 1.6, 0.05, 1.0, 0.05),
+    "harmonic": KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.005), 190.0, 4.0, 0.05, 2.5, 0.24),
 }
 
 
@@ -56,6 +58,8 @@ def default_values(
         "voltage_max": (1.0 + SUPPLY_TOLERANCE) * voltage,
         "rated_torque": ratios.continuous * torque,
         "coulomb_friction": ratios.coulomb * torque,
+        "load_friction": ratios.load_friction,
+        "bearing_offset": 0.0,
         "backlash": ratios.backlash,
         "joint_stiffness": ratios.joint_stiffness * torque,
         "position_gain": gain,

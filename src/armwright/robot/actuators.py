@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.exceptions import SpaceError, did_you_mean
-from armwright.robot.actuator_defaults import ActuatorKind, default_shape, default_values
+from armwright.robot.actuator_defaults import DEFAULTS, ActuatorKind, default_shape, default_values
 from armwright.robot.arm import Actuator
 from armwright.robot.motor_body import ActuatorShape, BodyShape
 from armwright.schema_types import members_of
@@ -54,6 +54,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     rotor_inertia: float | None = Field(default=None, ge=0.0, le=1e6)  # of rotor and gear at the output [kg m²]
     coulomb_friction: float | None = Field(default=None, ge=0.0, le=1e6)  # [N m]
     viscous_friction: float | None = Field(default=None, ge=0.0, le=1e6)  # [N m s/rad]
+    load_friction: float | None = Field(default=None, ge=0.0, le=10.0)  # relative to the torque that it passes on
     backlash: float | None = Field(default=None, ge=0.0)  # [rad]
     joint_stiffness: float | None = Field(default=None, gt=0.0)  # of gear and output at rest [N m/rad]
     position_gain: float | None = Field(default=None, gt=0.0)  # of its position control [N m/rad]
@@ -65,6 +66,10 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     shape: BodyShape | None = None  # a cylinder is about its shaft
     shaft_edge: Edge | None = None  # the edge along the shaft
     shaft_offset: float | None = Field(default=None, ge=0.0)  # of the shaft from the middle, along the longer edge [m]
+    bearing_offset: float | None = Field(default=None, ge=0.0)  # of the bearing from the middle, along the shaft [m]
+    tilting_limit: float | None = Field(default=None, gt=0.0)  # largest moment across the shaft [N m]
+    axial_limit: float | None = Field(default=None, gt=0.0)  # largest force along the shaft [N]
+    radial_limit: float | None = Field(default=None, gt=0.0)  # largest force across the shaft [N]
     price: float | None = Field(default=None, ge=0.0)  # [USD]
     estimates: tuple[str, ...] = ()  # the stated values that are estimated from a source, not stated by it
     source: str = Field(default="", max_length=500)
@@ -214,6 +219,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         """Return the actuator of an arm, with the values of `completed`."""
         values = dict(self.completed())
         values |= {"continuous_torque": values["rated_torque"], "shape": self.body_shape}
+        values["limit_friction"] = values["load_friction"] if DEFAULTS[self.kind].before_friction else 0.0
         return Actuator(**{field.name: values[field.name] for field in fields(Actuator)})
 
 

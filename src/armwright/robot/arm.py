@@ -31,6 +31,8 @@ class Actuator:
     rotor_inertia: float | None = None  # inertia of rotor and gear [kg m²]
     coulomb_friction: float | None = None  # friction at any speed [N m]
     viscous_friction: float | None = None  # friction that is proportional to the speed [N m s/rad]
+    load_friction: float | None = None  # friction when it pushes, relative to the torque at its output
+    limit_friction: float | None = None  # the same if its torques are stated before this friction, 0 if at its output
     backlash: float | None = None  # backlash of its gear [rad]
     joint_stiffness: float | None = None  # torsional stiffness from its motor to its output [N m/rad]
     position_gain: float | None = None  # gain of its position control [N m/rad]
@@ -38,6 +40,10 @@ class Actuator:
     voltage: float | None = None  # supply voltage [V]
     current: float | None = None  # supply current at the peak torque [A]
     shape: ActuatorShape | None = None
+    bearing_offset: float | None = None  # distance of its output bearing from the middle of its body [m]
+    tilting_limit: float | None = None  # largest moment across its shaft [N m]; None if its maker states none
+    axial_limit: float | None = None  # largest force along its shaft [N]; likewise
+    radial_limit: float | None = None  # largest force across its shaft [N]; likewise
 
     def __post_init__(self) -> None:
         numbers = [getattr(self, field.name) for field in fields(self) if field.name not in ("name", "shape")]

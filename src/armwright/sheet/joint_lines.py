@@ -6,6 +6,7 @@ import numpy as np
 
 from armwright.arrays import Array, finite_or_none
 from armwright.exceptions import SettingsError
+from armwright.kinematics.arms.bearings import bearing_limits
 from armwright.kinematics.cycle.cycle_loads import CycleLoads, holding_torques
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
@@ -76,6 +77,10 @@ def _needs(evaluation: Evaluation) -> dict[str, Array]:
     need = {"torque": at_rest}
     if drives is not None:
         need["peak_utilisation"] = drives.safety_factor[0] * at_rest / drives.peak[0]
+    if drives is not None and (loads is not None or evaluation.cycle_paths is None):
+        across = evaluation.bearing_loads[0].max(axis=0)  # (D, 3)
+        need["tilting_moment"] = across[:, 0]
+        need["bearing_utilisation"] = np.fmax.reduce(across / bearing_limits(drives)[0], axis=-1)  # NaN without limits
     if loads is None:
         return need
     dof = loads.torques.shape[-1]

@@ -19,7 +19,8 @@ UNITS: Mapping[str, str] = {  # of all keys outside `facts`, which state their o
     "upper": "as lower", "used": "as lower", "unused": "as lower", "torque": "N m, or N of a prismatic joint",
     "peak_torque": "as torque", "peak_utilisation": "of the peak torque, safety factor included",
     "speed_utilisation": "of the no-load speed",
-    "thermal_utilisation": "of the continuous torque, safety factor included", "base": "m",
+    "thermal_utilisation": "of the continuous torque, safety factor included", "tilting_moment": "N m",
+    "bearing_utilisation": "of what the maker of the actuator allows across its shaft", "base": "m",
     "base_position": "m", "base_yaw": "rad", "points": "m", "targets": "m", "links": "m",
 }  # fmt: skip
 
@@ -43,6 +44,8 @@ class JointLine:
     """The largest use of it; along a cycle, of the torque that is available at the speed."""
     speed_utilisation: float | None = None  # the largest use of the speed along the cycle
     thermal_utilisation: float | None = None  # the use of the continuous torque over the cycle
+    tilting_moment: float | None = None  # the largest moment across its axis at the targets and along the cycle
+    bearing_utilisation: float | None = None  # the largest use of what its actuator may carry across its shaft
     body: str = ""  # the body of its actuator, with all joints at 0, in words; empty if bodies do not count
 
 

@@ -67,9 +67,10 @@ def key_figures(sheet: DataSheet) -> Table:
 
 def joint_table(sheet: DataSheet) -> Table:
     """Return ranges and drives of the joints; angles in degrees, slides in millimetres."""
-    header = ("#", "joint", "drive", "range", "used", "unused", "torque", "peak", "peak use", "speed use", "thermal")
+    header = ("#", "joint", "drive", "range", "used", "unused", "torque", "peak", "peak use", "speed use", "thermal",
+              "tilting", "bearing use")  # fmt: skip
     rows = tuple(_joint_row(sheet, joint) for joint in sheet.joints)
-    notes = ["Range in ° or mm, torque in N m or N (prismatic); unused: below and above."]
+    notes = ["Range in ° or mm, torque in N m or N (prismatic), tilting moment in N m; unused: below and above."]
     idle = [str(joint.number) for joint in sheet.joints if joint.used and joint.used[1] - joint.used[0] < 1e-3]
     if idle:
         notes.append(f"Joint {', '.join(idle)} does not move in this task.")
@@ -195,6 +196,8 @@ def _joint_row(sheet: DataSheet, joint: JointLine) -> tuple[str, ...]:
         number(joint.torque, missing="–"),
         number(joint.peak_torque, missing="–"),
         *map(share, (joint.peak_utilisation, joint.speed_utilisation, joint.thermal_utilisation)),
+        number(joint.tilting_moment, missing="–"),
+        share(joint.bearing_utilisation),
     )
 
 

@@ -19,10 +19,17 @@ RATINGS: Mapping[str, tuple[str, int, float]] = {
     "rotor_inertia": ("rotor_inertia", -2, 0.0),
     "coulomb": ("coulomb_friction", -1, 0.0),
     "viscous": ("viscous_friction", -2, 0.0),
+    "load_friction": ("load_friction", 0, 0.0),
+    "limit_friction": ("limit_friction", 0, 0.0),
     "voltage": ("voltage", 0, 0.0),
     "current": ("current", 0, 0.0),
     "backlash": ("backlash", 1, 0.0),
     "joint_stiffness": ("joint_stiffness", -2, np.inf),
+    "position_gain": ("position_gain", -2, np.inf),
+    "bearing_offset": ("bearing_offset", 0, 0.0),
+    "tilting_limit": ("tilting_limit", 0, np.inf),
+    "axial_limit": ("axial_limit", 0, np.inf),
+    "radial_limit": ("radial_limit", 0, np.inf),
 }
 FIXED_RATINGS = tuple(value for _, _, value in RATINGS.values())
 
@@ -41,10 +48,17 @@ class Actuation(PerArm):
     rotor_inertia: Array  # (N, D) of rotor and gear [kg m²] or [kg]
     coulomb: Array  # (N, D) friction at any speed [N m] or [N]
     viscous: Array  # (N, D) friction by speed [N m s/rad] or [N s/m]
+    load_friction: Array  # (N, D) friction of a motor that pushes, relative to the torque at its output
+    limit_friction: Array  # (N, D) the same where peak and continuous are stated before this friction; 0 elsewhere
     voltage: Array  # (N, D) of the supply [V]
     current: Array  # (N, D) from the supply at the peak torque [A]
     backlash: Array  # (N, D) [rad] or [m]
     joint_stiffness: Array  # (N, D) from the motor to the joint [N m/rad] or [N/m]
+    position_gain: Array  # (N, D) of the position control [N m/rad] or [N/m]
+    bearing_offset: Array  # (N, D) of the output bearing from the joint, along the axis [m]
+    tilting_limit: Array  # (N, D) largest moment across the axis of a motor [N m]
+    axial_limit: Array  # (N, D) largest force along it [N]
+    radial_limit: Array  # (N, D) largest force across it [N]
     price: Array  # (N,) of all actuators of an arm [USD]; NaN if one has no price
     safety_factor: Array  # (N,) by which required torques are multiplied
 

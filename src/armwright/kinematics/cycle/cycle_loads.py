@@ -15,6 +15,7 @@ from armwright.arrays import Array
 from armwright.exceptions import UnknownQuantityError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.arms.bearings import largest_bearing_loads
 from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
 from armwright.kinematics.cycle.drive_limits import MotionLoad, least_time, motion_load
 from armwright.kinematics.cycle.torque_terms import TorqueTerms
@@ -34,7 +35,7 @@ class CycleLoads:
 
     durations: Array  # (N, M) [s]
     dwells: Array  # (M,) time at rest after each motion [s]
-    torques: Array  # (N, M, F, D) torques of the drives at the joints [N m], or forces [N]
+    torques: Array  # (N, M, F, D) torques of the drives that count against their limits [N m], or forces [N]
     speeds: Array  # (N, M, F, D) joint speeds [rad/s] or [m/s]
     holding: Array  # (N, M, D) torques at rest after each motion [N m], or forces [N]
 
@@ -93,6 +94,22 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
     return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding)
 
 
+def cycle_bearing_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]], durations: Array) -> Array:
+    """Return the (N, M, D, 3) largest tilting moment [N m], axial and radial force [N] of the joints in each motion.
+
+    terms: with wrenches.  durations: (N, M) of the motions [s].
+    """
+    largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
+    for group, of_motions in zip(paths.groups, terms, strict=True):
+        for i, part in enumerate(of_motions):
+            weights, rate, change = _instants(part.gravity.shape[1], paths.instants, _density(group))
+            flat = weights @ part.wrenches.reshape(*part.wrenches.shape[:3], -1)  # (3, n, F, D 6)
+            s, ss = rate[:, None] / durations[group.index, i, None, None], change[:, None]
+            total = flat[0] + flat[1] * s**2 + flat[2] * ss / durations[group.index, i, None, None] ** 2
+            largest[group.index, i] = largest_bearing_loads(group.arms, total.reshape(*total.shape[:2], -1, 6))
+    return largest
+
+
 def _density(group: CycleGroup) -> int:
     """Return how many times as many instants are evaluated as are kept."""
     return BETWEEN if group.is_sharp else 1
@@ -118,9 +135,10 @@ def _load(terms: TorqueTerms, arms: ArmArrays, instants: int, density: int) -> M
     gravity, inertial, velocity = weights @ terms.gravity, drag * rate**2 + push * change, q_s * rate
     if arms.actuation is None:
         nothing = np.zeros(gravity.shape)
-        return MotionLoad(gravity, nothing, nothing, inertial, velocity)
+        return MotionLoad(gravity, nothing, nothing, inertial, velocity, nothing)
     drives = arms.actuation
-    known = {name: np.nan_to_num(getattr(drives, name)) for name in ("rotor_inertia", "coulomb", "viscous")}
+    names = ("rotor_inertia", "coulomb", "viscous", "limit_friction")
+    known = {name: np.nan_to_num(getattr(drives, name)) for name in names}
     return motion_load(gravity, inertial, velocity, q_ss * rate**2 + q_s * change, replace(drives, **known))
 
 

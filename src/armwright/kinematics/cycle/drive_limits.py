@@ -3,6 +3,10 @@
 A motor that pushes in the direction of its motion delivers the smaller of its peak torque P and the line through
 (corner speed, P) and (no-load speed, 0). A motor that brakes delivers P. Required torques count with the safety factor.
 Drives of which a rating is unknown give NaN.
+
+A gear takes a share μ of the torque that it passes on as friction, where makers state torques before it: a motor that
+pushes needs (1 + μ) τ. One that brakes or holds needs τ at most, since friction helps it, which counts for nothing. The
+share of limits that makers state at the output is 0 (`Actuation.limit_friction`).
 """
 
 from dataclasses import dataclass
@@ -24,8 +28,9 @@ ROUNDING = 1e-13  # of a sum relative to its terms
 class MotionLoad:
     """What a motion of N arms requires of D joints at S samples, for any duration T.
 
-    The torque at a sample is gravity + coulomb + viscous / T + inertial / T², the speed is velocity / T. Sliding joints
-    have N, m/s and m instead of N m, rad/s and rad.
+    The torque at a sample is gravity + coulomb + viscous / T + inertial / T², with the friction of the gear if it is in
+    the direction of the velocity. The speed is velocity / T. Sliding joints have N, m/s and m instead of N m, rad/s and
+    rad.
     """
 
     gravity: Array  # (N, S, D) [N m]
@@ -33,11 +38,13 @@ class MotionLoad:
     viscous: Array  # (N, S, D) friction at T = 1 s [N m s]
     inertial: Array  # (N, S, D) of links and rotors, with Coriolis terms, at T = 1 s [N m s²]
     velocity: Array  # (N, S, D) at T = 1 s [rad]
+    gear: Array  # (N, S, D) share of the torque that the gear takes, with the sign of the velocity, 0 at rest
 
     def torque(self, time: Array) -> Array:
         """Return the (N, S, D) torques [N m] for durations (N,) [s]."""
         duration = time[:, None, None]
-        return self.gravity + self.coulomb + self.viscous / duration + self.inertial / duration**2
+        torque = self.gravity + self.coulomb + self.viscous / duration + self.inertial / duration**2
+        return torque * (1.0 + np.maximum(self.gear * np.sign(torque), 0.0))
 
 
 def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: Array, drives: Actuation) -> MotionLoad:
@@ -47,12 +54,14 @@ def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: 
     without gravity [N m s²].  velocity, acceleration: (N, S, D) of the joints, for T = 1 s [rad].
     """
     coulomb, viscous, rotor = (each[:, None] for each in (drives.coulomb, drives.viscous, drives.rotor_inertia))
+    direction = np.sign(np.where(np.abs(velocity) > STILL, velocity, 0.0))
     return MotionLoad(
         gravity=gravity,
-        coulomb=coulomb * np.sign(np.where(np.abs(velocity) > STILL, velocity, 0.0)),
+        coulomb=coulomb * direction,
         viscous=viscous * velocity,
         inertial=inertial + rotor * acceleration,
         velocity=velocity,
+        gear=drives.limit_friction[:, None] * direction,
     )
 
 
@@ -73,9 +82,10 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
     """Return the least durations (N,) of motions of N arms that drives can follow [s]; infinite if there is none.
 
     With u = 1 / T, each limit at each sample is a quadratic inequality α u² + β u + γ <= 0. Turned so that the velocity
-    w is not negative, and with the safety factor k, the torque is τ(u) = a + b u + c u² and the limits are
+    w is not negative, with the safety factor k and η = 1 + μ by the friction μ of the gear, the torque without this
+    friction is τ(u) = a + b u + c u² and the limits are
 
-        k τ <= P,   -k τ <= P,   k τ + P w u / (ω₀ - ω_c) <= P ω₀ / (ω₀ - ω_c),   w u <= ω₀
+        k η τ <= P,   -k τ <= P,   k η τ + P w u / (ω₀ - ω_c) <= P ω₀ / (ω₀ - ω_c),   w u <= ω₀
 
     The third one, the falling line, always holds for τ <= 0 within the speed limit, so a motor that brakes needs no
     case of its own. α >= 0 allows an interval of u, α < 0 excludes one: gravity may permit a motion that is impossible
@@ -90,7 +100,7 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
         >>> from armwright.kinematics.arms.actuation import actuation_at_joints, ratings_of
         >>> from armwright.robot.arm import Actuator
         >>> motor = Actuator("servo", 0.1, peak_torque=2.0, speed=10.0, corner_speed=0.0, rotor_inertia=0.1,
-        ...                  coulomb_friction=0.0, viscous_friction=0.0)
+        ...                  coulomb_friction=0.0, viscous_friction=0.0, limit_friction=0.0)
         >>> ratings = np.array([[ratings_of(motor)]])
         >>> drives = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
         >>> still, turn = np.zeros((1, 1, 1)), np.ones((1, 1, 1))
@@ -108,7 +118,8 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
     with np.errstate(divide="ignore", over="ignore"):
         time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0))
     known = ~np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
-    return np.where(known & ~np.isnan(load.coulomb + load.viscous + load.inertial).any(axis=(1, 2)), time, np.nan)
+    friction = load.coulomb + load.viscous + load.gear
+    return np.where(known & ~np.isnan(friction + load.inertial).any(axis=(1, 2)), time, np.nan)
 
 
 def _falling_range(drives: Actuation) -> Array:
@@ -122,7 +133,8 @@ class _Limits:
     """Limits of N motions: a + b u + c u² within ±1, plus d u at most the level, for M joints and samples.
 
     Attributes:
-        a, b, c: (N, M) torque in the direction of the motion, with the safety factor, relative to the peak torque.
+        a, b, c: (N, M) torque of a motor that pushes, with the safety factor, relative to the peak torque.
+        braking: (N, M) η, the largest of the same terms of a motor that brakes.
         d: (N, M) speed relative to the range of falling torque [s].
         level: (N, M) no-load speed relative to that range; infinite without one.
         fastest: (N,) largest u by the no-load speeds, at most MAX_RATE [1/s].
@@ -131,6 +143,7 @@ class _Limits:
     a: Array
     b: Array
     c: Array
+    braking: Array
     d: Array
     level: Array
     fastest: Array
@@ -139,6 +152,7 @@ class _Limits:
     def of(cls, load: MotionLoad, drives: Actuation) -> Self:
         """Return the limits of a load."""
         n, samples, _ = load.gravity.shape
+        pushing = 1.0 + np.abs(load.gear)
         scale = np.where(load.velocity < 0.0, -1.0, 1.0) * (drives.safety_factor[:, None] / drives.peak)[:, None]
         torques = (load.gravity + load.coulomb, load.viscous, load.inertial)
         speed, gap = np.abs(load.velocity), _falling_range(drives)
@@ -148,7 +162,8 @@ class _Limits:
         with np.errstate(divide="ignore", over="ignore"):
             fastest = (drives.no_load_speed / speed.max(axis=1)).min(axis=1)
         return cls(
-            *((scale * torque).reshape(n, -1) for torque in torques),
+            *((pushing * scale * torque).reshape(n, -1) for torque in torques),
+            braking=pushing.reshape(n, -1),
             d=(speed * np.where(falls, 1.0 / width, 0.0)[:, None]).reshape(n, -1),
             level=np.repeat(level[:, None], samples, axis=1).reshape(n, -1),
             fastest=np.minimum(fastest, MAX_RATE),
@@ -161,11 +176,12 @@ class _Limits:
         """
         u = rate[rows, None]
         a, b, c, d, level = (each[rows] for each in (self.a, self.b, self.c, self.d, self.level))
+        braking = self.braking[rows]
         torque = a + (b + c * u) * u
         lower = np.full(len(rows), np.inf)
-        for sign, exceeded in ((1.0, torque > ALLOWED), (-1.0, torque < -ALLOWED)):
-            i, j = np.nonzero(exceeded)
-            roots = _largest_root_below(sign * c[i, j], sign * b[i, j], sign * a[i, j] - 1.0, u[i, 0])
+        for sign, most in ((1.0, np.ones_like(braking)), (-1.0, braking)):
+            i, j = np.nonzero(sign * torque > ALLOWED * most)
+            roots = _largest_root_below(sign * c[i, j], sign * b[i, j], sign * a[i, j] - most[i, j], u[i, 0])
             np.minimum.at(lower, i, roots)
         i, j = np.nonzero(torque + d * u > level + (ALLOWED - 1.0))
         roots = _largest_root_below(c[i, j], b[i, j] + d[i, j], a[i, j] - level[i, j], u[i, 0])

@@ -4,7 +4,8 @@ Along a motion, joint values are q(s) with the share s(t). The torque is
 
     gravity(q) + drag(q, q_s, q_ss) s'² + push(q, q_s) s'',   push = M q_s,   drag = M q_ss + C(q, q_s) q_s
 
-(Bobrow et al. 1985). The kernel computes the three terms from one pass of forward kinematics.
+(Bobrow et al. 1985). The kernel computes the three terms from one pass of forward kinematics, and on demand those of
+the whole wrench of each joint, of which the torque is one component.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -27,6 +28,7 @@ def dynamics_kernels() -> SimpleNamespace:
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
     advance, axis_of = base.advance, base.axis_of
     Vectors = wp.types.matrix(shape=(MAX_JOINTS, 3), dtype=real)
+    Wrench = wp.types.vector(length=6, dtype=real)
     zero, one, two = real(0.0), real(1.0), real(2.0)
 
     @wp.struct
@@ -73,11 +75,13 @@ def dynamics_kernels() -> SimpleNamespace:
         q_ss: wp.array3d(dtype=real),
         carried: wp.array(dtype=real),
         terms: wp.array4d(dtype=real),
+        wrenches: wp.array4d(dtype=Wrench),
     ):
         """Compute the terms of the torque along a motion.
 
         q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  carried: (S,) share of
-        the payload that is carried.  terms: (3, N, S, D) gravity, drag and push [N m] or [N].
+        the payload that is carried.  terms: (3, N, S, D) gravity, drag and push [N m] or [N].  wrenches: likewise the
+        force on each link and the moment about its joint, in its frame [N], [N m]; empty if they are not wanted.
         """
         arm, sample = wp.tid()
         # Frames of all links: position of the joint, its axis, and the x and y axes of what it carries.
@@ -146,6 +150,13 @@ def dynamics_kernels() -> SimpleNamespace:
                 elif bodies.motion[arm, j] < wp.static(FIXED):
                     load = wp.dot(row(axis, j), total_force)
                 terms[term, arm, sample, j] = load
+                if wrenches.shape[0] > 0:
+                    lx = row(along_x, j)
+                    ly = row(along_y, j)
+                    local = wp.transpose(wp.matrix_from_cols(lx, ly, wp.cross(lx, ly)))
+                    f = local * total_force
+                    n = local * total_moment
+                    wrenches[term, arm, sample, j] = Wrench(f[0], f[1], f[2], n[0], n[1], n[2])
                 after = here
 
     return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms)

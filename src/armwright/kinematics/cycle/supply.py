@@ -6,6 +6,8 @@ A drive draws its mechanical power, if it is positive, and its copper loss, whic
     i = max(τ v, 0) / V + I (τ / P)²
 
 with the torque τ, friction and rotor inertia included, the speed v, the voltage V, the peak torque P and the current I.
+Of a peak torque that is stated at the output, τ is at the output in the second term, for the same share of the peak
+torque before the friction of the gear, which the mechanical power includes.
 """
 
 from dataclasses import dataclass
@@ -35,6 +37,7 @@ def supply_currents(loads: CycleLoads, drives: Actuation) -> SupplyCurrents:
 def _drawn(torques: Array, speeds: Array, drives: Actuation) -> Array:
     """Return the (N, M, F) currents of all drives [A]; torques, speeds: (N, M, F, D)."""
     peak, voltage, current = (each[:, None, None] for each in (drives.peak, drives.voltage, drives.current))
-    power = np.maximum(torques * speeds, 0.0)
+    gear = (1.0 + np.nan_to_num(drives.load_friction)) / (1.0 + np.nan_to_num(drives.limit_friction))
+    power = gear[:, None, None] * np.maximum(torques * speeds, 0.0)
     supplied = np.where(voltage == 0.0, 1.0, voltage)  # of fixed joints, which have no power
     return (power / supplied + current * (torques / peak) ** 2).sum(axis=-1)

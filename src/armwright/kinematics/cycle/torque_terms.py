@@ -9,9 +9,11 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
-from armwright.kinematics.cycle.cycle_path import CyclePaths
+from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device, load_kernels
+
+NO_WRENCHES = np.empty((0, 0, 0, 0, 6))
 
 
 @dataclass(frozen=True)
@@ -26,24 +28,36 @@ class TorqueTerms:
     push: Array  # (N, R, D)
     q_s: Array  # (N, R, D) derivative of the joint values by s [rad] or [m]
     q_ss: Array  # (N, R, D) second derivative
+    wrenches: Array
+    """(3, N, R, D, 6) terms of the forces on the links and moments about their joints, in the frames of the links [N],
+    [N m]; empty if they were not wanted."""
 
 
-def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[TorqueTerms, ...]]:
-    """Return, for each group of arms, the terms along each motion; payload: its mass when carried [kg]."""
+def torque_terms(
+    paths: CyclePaths, payload: float, device: Device = "cpu", wrenches: bool = False
+) -> list[tuple[TorqueTerms, ...]]:
+    """Return, for each group of arms, the terms along each motion.
+
+    payload: its mass when carried [kg].  wrenches: compute those of the joints, too.
+    """
     found: list[tuple[TorqueTerms, ...]] = []
     for group in paths.groups:
-        q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
-        counts = [path.q.shape[1] for path in group.paths]
-        carried = np.repeat([float(path.motion.carries) for path in group.paths], counts)
-        terms = _terms(group.arms, q, q_s, q_ss, carried, payload, device)  # (3, n, S, D)
-        spans = np.cumsum([0, *counts])
+        states, carried, spans = _along(group)
+        whole = np.empty((3, *states[0].shape, 6)) if wrenches else NO_WRENCHES
+        terms = _terms(group.arms, *states, carried, payload, device, whole)  # (3, n, S, D)
+        parts = (*terms, *states[1:])
         found.append(
-            tuple(
-                TorqueTerms(terms[0, :, a:b], terms[1, :, a:b], terms[2, :, a:b], q_s[:, a:b], q_ss[:, a:b])
-                for a, b in pairwise(spans)
-            )
+            tuple(TorqueTerms(*(values[:, a:b] for values in parts), wrenches=whole[:, :, a:b]) for a, b in spans)
         )
     return found
+
+
+def _along(group: CycleGroup) -> tuple[tuple[Array, Array, Array], Array, list[tuple[int, int]]]:
+    """Return (n, S, D) q, q_s and q_ss along all motions, (S,) carried shares of the payload, ends of motions."""
+    q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
+    counts = [path.q.shape[1] for path in group.paths]
+    carried = np.repeat([float(path.motion.carries) for path in group.paths], counts)
+    return (q, q_s, q_ss), carried, list(pairwise(np.cumsum([0, *counts]).tolist()))
 
 
 def inverse_dynamics_torques(
@@ -75,8 +89,11 @@ def _values(path: MotionPath, order: int) -> Array:
     return np.broadcast_to(path.at(path.share, order), path.q.shape)
 
 
-def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device) -> Array:
-    """Return (3, N, S, D) gravity, drag and push of N arms at S samples."""
+def _terms(
+    arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device,
+    wrenches: Array = NO_WRENCHES,
+) -> Array:  # fmt: skip
+    """Return (3, N, S, D) gravity, drag and push of N arms at S samples; fill (3, N, S, D, 6) wrenches, if any."""
     loaded = load_kernels("cycle.dynamics_kernels", device)
     terms = np.empty((3, *q.shape))
 
@@ -86,9 +103,9 @@ def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, p
         values |= vars(part.rigid_bodies) | {"payload_mass": loaded.warp.float64(payload)}
         values |= {"payload_com": part.payload_center, "payload_inertia": payload * part.payload_gyration}
         bodies, found = loaded.struct("Bodies", values), np.empty((3, *q[chunk].shape))
-        states = (q[chunk], q_s[chunk], q_ss[chunk])
-        loaded.launch("torque_terms", found.shape[1:3], bodies, *states, carried, outputs=[found])
-        terms[:, chunk] = found
+        states, full = (q[chunk], q_s[chunk], q_ss[chunk]), np.empty_like(wrenches[:, chunk])
+        loaded.launch("torque_terms", found.shape[1:3], bodies, *states, carried, outputs=[found, full])
+        terms[:, chunk], wrenches[:, chunk] = found, full
 
     in_chunks(solve, len(arms), max(1, SAMPLES[device] // q.shape[1]), device)
     return terms

@@ -30,7 +30,7 @@ class Trajectory:
     q: Array  # (R, D) joint values [rad] or [m]
     qd: Array  # (R, D) speeds [rad/s] or [m/s]
     qdd: Array  # (R, D) accelerations [rad/s²] or [m/s²]
-    tau: Array  # (R, D) torques of the drives at the joints [N m], or forces [N]
+    tau: Array  # (R, D) torques of the drives, all friction included [N m], or forces [N]
 
 
 def sample_trajectory(
@@ -82,7 +82,10 @@ def _events(plan: CyclePlan, motion: IndexArray) -> tuple[IndexArray, IndexArray
 
 
 def _drive_torques(arm: ArmArrays, q: Array, qd: Array, qdd: Array, carried: Array, payload: float) -> Array:
-    """Return (R, D) torques of the drives [N m], or forces [N]."""
+    """Return (R, D) torques of the drives, all friction included [N m], or forces [N].
+
+    The friction of a gear is its share of the lesser of the torques before and after it, which both push or brake.
+    """
     torques = inverse_dynamics_torques(arm, q[None], qd[None], qdd[None], carried, payload)[0]
     drives = arm.actuation
     if drives is None:
@@ -90,4 +93,6 @@ def _drive_torques(arm: ArmArrays, q: Array, qd: Array, qdd: Array, carried: Arr
     inertia, coulomb, viscous = (
         np.nan_to_num(values[0]) for values in (drives.rotor_inertia, drives.coulomb, drives.viscous)
     )
-    return torques + inertia * qdd + viscous * qd + coulomb * np.sign(qd)
+    gear: Array = np.nan_to_num(drives.load_friction[0])
+    share = np.where(torques * qd > 0.0, gear, gear / (1.0 + gear))
+    return torques + inertia * qdd + viscous * qd + (coulomb + share * np.abs(torques)) * np.sign(qd)

@@ -69,6 +69,12 @@ def unit_payload(arms: ArmArrays, frames: Frames) -> Loads:
     return Loads(nothing, np.zeros(shape), np.ones(shape[:3]), np.broadcast_to(center[:, :, None], shape))
 
 
+def joint_loads(frames: Frames, loads: Loads) -> tuple[Array, Array]:
+    """Return the (N, K, D, 3) forces [N] of the weight of loads on the joints, and its moments about them [N m]."""
+    mass, moment = loads.mass + loads.link_mass, loads.moment + loads.link_moment
+    return mass[..., None] * DOWN, _moments(mass, moment, frames.position)
+
+
 def tip_displacements(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Stiffness) -> Array:
     """Return the (N, K, 3) displacements of the tips of N arms in K postures under the weight of loads [m]."""
     return _of_links(arms, frames, loads, stiffness) + _of_joints(arms, frames, loads, stiffness.joints)
@@ -79,9 +85,17 @@ def backlash_errors(arms: ArmArrays, frames: Frames, backlash: Array) -> Array:
 
     backlash: (N, D) of joints [rad], or of slides [m]; 0 for fixed joints.
     """
+    return tip_errors(arms, frames, (backlash / 2.0)[:, None])
+
+
+def tip_errors(arms: ArmArrays, frames: Frames, errors: Array) -> Array:
+    """Return the (N, K) sums over the joints of how far their errors move the tip: an upper bound [m].
+
+    errors: (N, K, D) of joints [rad], or of slides [m].
+    """
     lever = np.linalg.norm(jacobian_of(arms, frames), axis=2)  # (N, K, D)
     # A running sum has the same bits whatever the number of joints of other arms.
-    return np.cumsum(lever * (backlash / 2.0)[:, None], axis=-1)[..., -1]
+    return np.cumsum(lever * errors, axis=-1)[..., -1]
 
 
 def deflections_over_reach(postures: ReachPostures, stiffness: Stiffness, payload: float) -> Array:
@@ -133,10 +147,9 @@ def _of_links(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Stiffnes
 
 def _of_joints(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Array) -> Array:
     """Return the (N, K, 3) displacements of the tips by the motion of the joints [m]; stiffness: (N, D)."""
-    mass = loads.mass + loads.link_mass
-    moment = _moments(mass, loads.moment + loads.link_moment, frames.position)
-    torque, force = (moment * frames.axis).sum(axis=-1), mass * (frames.axis @ DOWN)  # 0 for fixed joints
-    motion = np.where(arms.prismatic[:, None], force, torque) / stiffness[:, None]  # (N, K, D)
+    force, moment = joint_loads(frames, loads)
+    acting = np.where(arms.prismatic[:, None, :, None], force, moment)
+    motion = (acting * frames.axis).sum(axis=-1) / stiffness[:, None]  # (N, K, D); 0 for fixed joints
     return np.cumsum(jacobian_of(arms, frames) * motion[:, :, None], axis=-1)[..., -1]
 
 

@@ -1,12 +1,14 @@
-"""Payloads that motors hold at rest, in known postures and over the reach of an arm."""
+"""Payloads that motors hold and their bearings carry at rest, in known postures and over the reach of an arm."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.arms.arm_arrays import PRISMATIC, ArmArrays
+from armwright.kinematics.arms.bearings import across_axis, bearing_limits
 from armwright.kinematics.arms.forward import Frames, forward_kinematics
+from armwright.kinematics.reach.compliance import joint_loads, own_loads, unit_payload
 from armwright.kinematics.reach.reach_postures import ReachPostures
 from armwright.robot.arm import GRAVITY
 from armwright.tasks.moments import MAX_MASS
@@ -33,9 +35,32 @@ def payload_limits(arms: ArmArrays, frames: Frames, torques: Array, peak: Array)
     by_mass, allowed = torques_by_payload(arms, frames), peak[:, None]
     loaded = by_mass != 0.0
     room = (allowed - np.sign(by_mass) * torques) / np.where(loaded, np.abs(by_mass), 1.0)
-    limits = np.where(loaded, room, np.inf).min(axis=-1)
+    limits = np.minimum(np.where(loaded, room, np.inf).min(axis=-1), _carried_by_bearings(arms, frames, peak))
     holds_itself = (np.abs(torques) <= allowed).all(axis=-1)
     return np.where(holds_itself, np.clip(limits, 0.0, MAX_MASS), 0.0)
+
+
+def _carried_by_bearings(arms: ArmArrays, frames: Frames, peak: Array) -> Array:
+    """Return the (N, K) largest payloads that load no joint across its axis more than allowed [kg], infinite if none.
+
+    If a maker states no limit, a joint may be tilted by as much as the strongest motor of the arm can turn (peak).
+    """
+    drives = arms.actuation
+    assert drives is not None, "expected arms with actuators"
+    strongest = np.where(arms.motion < PRISMATIC, peak, 0.0).max(axis=1, keepdims=True)
+    limits = bearing_limits(drives)
+    limits[..., 0] = np.where(np.isnan(limits[..., 0]), strongest, limits[..., 0])
+    limits = np.where(np.isnan(limits), np.inf, limits)[:, None, :, [0, 0, 1, 2]]  # (N, 1, D, 4)
+    own, unit = (
+        across_axis(arms, frames.axis, *joint_loads(frames, loads))
+        for loads in (own_loads(arms, frames), unit_payload(arms, frames))
+    )
+    # |own + m unit|² = limit² is a quadratic equation a m² + 2 b m + c = 0.
+    a, b = (unit**2).sum(axis=-1), (own * unit).sum(axis=-1)
+    c = (own**2).sum(axis=-1) - limits**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mass = np.where(a > 0.0, (np.sqrt(np.maximum(b**2 - a * c, 0.0)) - b) / a, np.inf)
+    return np.where(c > 0.0, 0.0, mass).min(axis=(-2, -1))
 
 
 def torques_by_payload(arms: ArmArrays, frames: Frames) -> Array:
