@@ -10,6 +10,7 @@ from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.payload import POINT_LOAD, LoadShape
 from armwright.tasks.targets import TargetArrays
 from armwright.tasks.task import Task
+from armwright.tasks.tip_rules import TipRules
 from armwright.tasks.workspace import Region
 
 # What a task may lack, by the need of a quantity: an error, and the reason alone
@@ -40,7 +41,8 @@ class Scene:
     obstacles: tuple[Obstacle, ...] = ()  # what clearances are measured from; the inverse kinematics ignores them
     plan: CyclePlan | None = None  # the motions of the task's cycle; None if it has none
     workspace: tuple[Region, ...] = ()  # boxes to cover
-    load_shape: LoadShape = POINT_LOAD  # how the mass of the payload is distributed
+    load_shape: LoadShape = POINT_LOAD  # how the mass of the payload is distributed, and its body
+    tip_rules: TipRules | None = None  # what tool and payload may touch at the targets; None if neither counts
 
     def require(self, need: str) -> None:
         """Raise UnknownQuantityError if the task lacks a cycle, a workspace, or one with directions."""
@@ -54,4 +56,5 @@ def task_scene(task: Task, targets: Array, payloads: Array) -> Scene:
     """Return the surroundings of a task with these targets (T, 3) [m] and payloads (T,) [kg]."""
     plan = task.plan(targets) if task.cycle else None
     held = payloads if plan is None else payloads * plan.holds_payload(len(targets))
-    return Scene(targets, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
+    rules = TipRules(held > 0.0, task.allowed_depths)
+    return Scene(targets, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape, rules)

@@ -17,6 +17,7 @@ from armwright.arrays import Array
 from armwright.rotations import rotation_about
 from armwright.tasks.cycle import By, Cycle
 from armwright.tasks.targets import ORIENTATION, TargetArrays
+from armwright.tasks.tip_rules import APART, TipRules
 
 LINE_STEP = 0.02  # [m] largest distance of two samples of a line
 ANGLE_STEP = 0.1  # [rad] likewise of the tool's angle
@@ -94,6 +95,7 @@ class CyclePlan:
     motions: tuple[Motion, ...]  # motions in their order, from rest at the target of the first step
     targets: tuple[int, ...]  # index of each step's target
     times: tuple[float | None, ...]  # duration of each step [s]; None for the fastest
+    allowed: Array  # (P, O) depth of tool and payload in each obstacle that does not count at a pose (`TipRules`) [m]
 
     def holds_payload(self, n_targets: int) -> NDArray[np.bool_]:
         """Return (T,) whether the payload is carried to or from each of T targets; True where the cycle never is."""
@@ -160,6 +162,28 @@ class CyclePlan:
             angle_tolerance=tolerance(allowed.largest_angle, poses.angle_tolerance),
         )
 
+    def rules(self, motion: Motion, n: int) -> TipRules:
+        """Return what holds at n samples along a motion: the rules of its targets, on the whole of a line."""
+        ends = self.allowed[[motion.start, motion.end]]
+        allowed = np.full((n, ends.shape[1]), ends.max(axis=0) if motion.by == "line" else APART)
+        allowed[[0, -1]] = np.maximum(allowed[[0, -1]], ends)
+        return TipRules(np.full(n, motion.carries), allowed)
+
+    def sampled_rules(self, samples: LineSamples) -> TipRules:
+        """Return what holds at samples of lines; at those that motions share, what holds for any of them."""
+        n, first = len(samples.poses), samples.first
+        found = TipRules(np.zeros(n, dtype=np.bool_), np.full((n, self.allowed.shape[1]), APART))
+        for index, motion in enumerate(self.motions):
+            if motion.by == "line":
+                at = np.arange(samples.of_motion[index][0], samples.of_motion[index][1] + 1)
+            else:
+                block = self.joint_motions.index(index)
+                at = np.array([first[block + 1] - 1, first[(block + 1) % len(self.blocks)]])
+            rules = self.rules(motion, len(at))
+            found.carries[at] |= rules.carries
+            found.allowed[at] = np.maximum(found.allowed[at], rules.allowed)
+        return found
+
     def sample(self, refinement: float = 1) -> LineSamples:
         """Return samples of all lines, `refinement` times as many as a path needs at least."""
         if refinement not in self._samples:
@@ -187,8 +211,13 @@ class CyclePlan:
         return LineSamples(stack_poses(parts), np.array(first), tuple(spans))
 
 
-def plan_cycle(cycle: Cycle, targets: Sequence[int], positions: Array, arrays: TargetArrays) -> CyclePlan:
-    """Return the motions of a cycle, given the index of each step's target and the positions of targets (T, 3) [m]."""
+def plan_cycle(
+    cycle: Cycle, targets: Sequence[int], positions: Array, arrays: TargetArrays, depths: Array
+) -> CyclePlan:
+    """Return the motions of a cycle.
+
+    targets: index of each step's target.  positions: (T, 3) of targets [m].  depths: (T, O) allowed there.
+    """
     poses = Poses(positions, arrays.rotation, arrays.n_angular, arrays.tolerance, arrays.angle_tolerance)
     for number, (target, step) in enumerate(zip(targets, cycle.steps, strict=True), start=1):
         if step.do and cycle.approach and arrays.n_angular[target] == 0:
@@ -206,7 +235,8 @@ def plan_cycle(cycle: Cycle, targets: Sequence[int], positions: Array, arrays: T
         )
         poses = stack_poses([poses, before])
     points = {target: len(positions) + i for i, target in enumerate(approached)}
-    plan = CyclePlan(cycle, poses, _motions(cycle, targets, points), tuple(targets), cycle.durations())
+    depths = np.concatenate([depths, np.full((len(approached), depths.shape[1]), APART)])
+    plan = CyclePlan(cycle, poses, _motions(cycle, targets, points), tuple(targets), cycle.durations(), depths)
     _check_lines(plan)
     return plan
 

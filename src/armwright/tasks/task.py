@@ -24,6 +24,7 @@ from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
 from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle
 from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload
 from armwright.tasks.targets import MAX_COORDINATE, Point, Target, TargetArrays, check_length, stack_targets
+from armwright.tasks.tip_rules import allowed_depths, check_names, resting_surfaces
 from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.tasks.workspace import MAX_POINTS, MAX_POSES, MAX_REGIONS, Region
 
@@ -143,6 +144,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             if name in seen:
                 raise ValueError(f'targets: two are named "{name}"; give each its own name')
             seen.add(name)
+        check_names(self.targets, self.obstacles)
         if self.cycle is not None:
             _check_obstacles(self.plan(self.target_positions), self.obstacles)
         return self
@@ -197,6 +199,23 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return self.payload.shape if isinstance(self.payload, Payload) else POINT_LOAD
 
     @property
+    def has_tip_bodies(self) -> bool:
+        """True if tool or payload are solid bodies."""
+        return any(self.load_shape.size) or self.tool.size is not None or self.tool.radius is not None
+
+    @property
+    def surfaces(self) -> tuple[int | None, ...]:
+        """Index of the obstacle that each target rests on: the one that it names, else the one beyond the tip."""
+        shape = self.load_shape
+        reach = max(0.0, shape.middle[2] + shape.size[2] / 2) if self.has_tip_bodies else None
+        return resting_surfaces(self.targets, self.target_arrays, self.obstacles, reach)
+
+    @property
+    def allowed_depths(self) -> Array:
+        """(T, O) how deep tool and payload may be in each obstacle at each target [m], as `TipRules.allowed`."""
+        return allowed_depths(self.targets, self.surfaces, self.obstacles, self.target_arrays.tolerance)
+
+    @property
     def target_names(self) -> tuple[str, ...]:
         """Name of each target; its number, counted from 1, if it has none."""
         return tuple(name or str(number) for number, name in enumerate(self._names, start=1))
@@ -226,7 +245,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if self.cycle is None:
             raise ValueError(f"task {self.name} has no cycle; try cycle: {IN_ORDER}")
         targets = target_indices(self.cycle.steps, self._numbers, len(positions))
-        return plan_cycle(self.cycle, targets, positions, self.target_arrays)
+        return plan_cycle(self.cycle, targets, positions, self.target_arrays, self.allowed_depths)
 
 
 def _check_obstacles(plan: CyclePlan, obstacles: Sequence[Obstacle]) -> None:
@@ -236,8 +255,9 @@ def _check_obstacles(plan: CyclePlan, obstacles: Sequence[Obstacle]) -> None:
         if motion.by == "joint":
             continue
         points = along_line(plan.poses, motion.start, motion.end, share).position
+        allowed = plan.rules(motion, len(share)).allowed
         for number, obstacle in enumerate(obstacles, start=1):
-            inside = obstacle.solid.contains(points, MAX_DEPTH)
+            inside = obstacle.solid.signed_distance(points) < -np.maximum(allowed[:, number - 1], MAX_DEPTH)
             if inside.any():
                 name = f'"{obstacle.name}"' if obstacle.name else str(number)
                 raise ValueError(

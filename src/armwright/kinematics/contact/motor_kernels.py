@@ -1,4 +1,4 @@
-"""Warp kernels of clearance for the bodies of actuators: from each other, links, obstacles and the column.
+"""Warp kernels of clearance for the bodies of actuators, tool and payload: from each other and everything else.
 
 A thread takes one arm at one target, and branches: bounds exclude distant pairs. docs/method.md §13 defines the
 distances and which pairs count.
@@ -29,10 +29,16 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
     zero, one = real(0.0), real(1.0)
 
     @kernel
-    def motor_frames(arms: Posed, axis: wp.array2d(dtype=int), centre: wp.array2d(dtype=Vector3), motors: Motors):
+    def motor_frames(
+        arms: Posed,
+        axis: wp.array2d(dtype=int),
+        centre: wp.array2d(dtype=Vector3),
+        tip_into: wp.array2d(dtype=Matrix3),
+        motors: Motors,
+    ):
         """Compute the middle of each body, and the rotation into its frame, by forward kinematics.
 
-        axis, centre [m]: (N, D), as of `MotorBodies`.
+        axis: (N, D), as of `MotorBodies`.  centre: (N, K) [m].  tip_into: (N, 2), as of `TipBodies`.
         """
         arm, target = wp.tid()
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
@@ -48,6 +54,26 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                 else:
                     motors.into[arm, target, j] = wp.matrix_from_rows(x, y, z)
             _place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z)
+        for b in range(arms.motion.shape[1], motors.shape.shape[1]):
+            c = centre[arm, b]
+            motors.middle[arm, target, b] = p + c[0] * x + c[1] * y + c[2] * z
+            motors.into[arm, target, b] = tip_into[arm, b - arms.motion.shape[1]] * wp.matrix_from_rows(x, y, z)
+
+    @wp.func
+    def kind_of(motors: Motors, arm: int, target: int, body: int, dof: int):
+        """Return the shape of a body, below 0 for none; of a payload where it is carried."""
+        if body > dof and motors.carries[target] == 0:
+            return -1
+        return motors.shape[arm, body]
+
+    @wp.func
+    def n_links(arms: Posed, arm: int, first: int):
+        """Return the number of links with a length from this one on."""
+        n = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
+        for k in range(first, arms.radius.shape[1]):
+            if arms.radius[arm, k] > zero:
+                n += 1
+        return n
 
     @wp.func
     def from_link(
@@ -58,16 +84,20 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
 
     @kernel
     def self_clearance(arms: Posed, motors: Motors, clearance: wp.array2d(dtype=real)):
-        """Lower (N, T) clearances to the distance of a body from other bodies and from links that it does not join."""
+        """Lower (N, T) clearances to the distance of a body from other bodies and from links that it does not join.
+
+        Tool and payload are parts of the last link: they count from what is not next to it, and not from each other.
+        """
         arm, target = wp.tid()
+        dof = arms.motion.shape[1]
         nearest = clearance[arm, target]
         for i in range(motors.shape.shape[1]):
-            kind = motors.shape[arm, i]
+            kind = kind_of(motors, arm, target, i, dof)
             if kind >= 0:
                 size, place, frame = motors.half[arm, i], motors.middle[arm, target, i], motors.into[arm, target, i]
                 for j in range(i + 1, motors.shape.shape[1]):
-                    other = motors.shape[arm, j]
-                    if other >= 0:
+                    other = kind_of(motors, arm, target, j, dof)
+                    if other >= 0 and (j < dof or n_links(arms, arm, i) > 1):
                         d = motors.middle[arm, target, j] - place
                         other_size = motors.half[arm, j]
                         if wp.length(d) - wp.length(size) - wp.length(other_size) < nearest:
@@ -75,7 +105,7 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                             found = separation(frame * d, kind, size, between, other, other_size, nearest)
                             nearest = wp.min(nearest, found)
                 links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-                for k in range(i, motors.shape.shape[1]):
+                for k in range(i, dof):
                     r = arms.radius[arm, k]
                     if r > zero:
                         if links_between > 0:
@@ -84,13 +114,16 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                         links_between += 1
                 links_before = int(0)  # noqa: RUF046, UP018
                 n_joints = int(0)  # noqa: RUF046, UP018
-                for back in range(i):
-                    k = i - 1 - back
+                reach = real(0.0)  # [m] along the arm, from the end of link k to tool and payload
+                for back in range(wp.min(i, dof)):
+                    k = wp.min(i, dof) - 1 - back
                     r = arms.radius[arm, k]
                     if r > zero:
-                        if links_before > 0 and n_joints > 0:
-                            first, last = arms.starts[arm, target, k], arms.ends[arm, target, k]
+                        first, last = arms.starts[arm, target, k], arms.ends[arm, target, k]
+                        # A link whose round end reaches up to the tool always touches it.
+                        if links_before > 0 and n_joints > 0 and (i < dof or reach > r):
                             nearest = from_link(nearest, kind, size, place, frame, first, last, r)
+                        reach += wp.length(last - first)
                         links_before += 1
                     if arms.motion[arm, k] < wp.static(FIXED):
                         n_joints += 1
@@ -100,13 +133,17 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
     def obstacle_clearance(arms: Posed, motors: Motors, solids: Solids, clearance: wp.array2d(dtype=real)):
         """Lower (N, T) clearances to the distance of a body from an obstacle."""
         arm, target = wp.tid()
+        dof = arms.motion.shape[1]
         nearest = clearance[arm, target]
         is_at_rest = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
         for j in range(motors.shape.shape[1]):
-            kind = motors.shape[arm, j]
+            kind = kind_of(motors, arm, target, j, dof)
             if kind >= 0:
                 place, box = motors.middle[arm, target, j], motors.half[arm, j]
                 for o in range(solids.shape.shape[0]):
+                    allowed = real(-1.0)
+                    if j >= dof:
+                        allowed = motors.allowed[target, o]
                     d = solids.centre[o] - place
                     bound = signed_distance(solids.shape[o], -(solids.into[o] * d), solids.half[o]) - wp.length(box)
                     if bound < nearest:
@@ -120,10 +157,12 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                             solids.into[o],
                             nearest,
                         )
-                        # A body at rest is always close to what the arm is mounted on: only overlaps count.
-                        if is_at_rest == 0 or found < zero:
+                        found += wp.max(allowed, zero)
+                        # A body at rest is always close to what the arm is mounted on, tool and payload to what they
+                        # may touch: only overlaps count, and only what is deeper than allowed.
+                        if (is_at_rest == 0 and allowed < zero) or found < zero:
                             nearest = wp.min(nearest, found)
-            if arms.motion[arm, j] < wp.static(FIXED):
+            if j < dof and arms.motion[arm, j] < wp.static(FIXED):
                 is_at_rest = 0
         clearance[arm, target] = nearest
 
@@ -139,7 +178,7 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
             nearest = clearance[arm, target]
             is_at_rest = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
             for j in range(motors.shape.shape[1]):
-                kind = motors.shape[arm, j]
+                kind = kind_of(motors, arm, target, j, arms.motion.shape[1])
                 if kind >= 0 and is_at_rest == 0:
                     d = motors.middle[arm, target, j] - centre
                     box = motors.half[arm, j]
@@ -148,7 +187,7 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                             d, wp.static(CYLINDER), size, motors.into[arm, target, j], kind, box, nearest
                         )
                         nearest = wp.min(nearest, found)
-                if arms.motion[arm, j] < wp.static(FIXED):
+                if j < arms.motion.shape[1] and arms.motion[arm, j] < wp.static(FIXED):
                     is_at_rest = 0
             clearance[arm, target] = nearest
 

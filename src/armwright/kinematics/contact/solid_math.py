@@ -40,12 +40,14 @@ def solid_math(precision: Precision) -> SimpleNamespace:
 
     @wp.struct
     class Motors:
-        """The bodies of their actuators."""
+        """The bodies of their actuators and behind these, if they count, tool and payload: K = D or D + 2 bodies."""
 
-        shape: wp.array2d(dtype=int)  # (N, D)
-        half: wp.array2d(dtype=Vector3)  # (N, D) [m]
-        middle: wp.array3d(dtype=Vector3)  # (N, T, D) [m]
-        into: wp.array3d(dtype=Matrix3)  # (N, T, D) rotation into the body's frame
+        shape: wp.array2d(dtype=int)  # (N, K)
+        half: wp.array2d(dtype=Vector3)  # (N, K) [m]
+        middle: wp.array3d(dtype=Vector3)  # (N, T, K) [m]
+        into: wp.array3d(dtype=Matrix3)  # (N, T, K) rotation into the body's frame
+        carries: wp.array(dtype=int)  # (T,) whether the payload is there
+        allowed: wp.array2d(dtype=real)  # (T, O) depth of tool and payload that does not count [m], as of `TipRules`
 
     @wp.struct
     class Solids:

@@ -24,6 +24,7 @@ from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device
 from armwright.tasks.motions import CyclePlan, stack_poses
 from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.tip_rules import joined_rules
 
 MAX_REFINEMENT = 64  # of the samples
 SHARP = 4.0  # times the mean step of a line that makes its largest one a peak
@@ -204,7 +205,8 @@ def _measure(
             jumps[group.index, -1] |= gap > CLOSED
         errors = _line_errors(group, plan, device, between)
         q = np.concatenate([path.q for path in group.paths], axis=1)
-        clearance = np.stack(clearances(group.arms, q, obstacles, device))  # (2, n, R)
+        rules = joined_rules([plan.rules(path.motion, path.q.shape[1]) for path in group.paths])
+        clearance = np.stack(clearances(group.arms, q, obstacles, device, rules))  # (2, n, R)
         margin = group.arms.limit_distance(q)
         at = 0
         for i, path in enumerate(group.paths):
