@@ -154,6 +154,7 @@ def show_task(
         ("payload", _describe_payload(task)),
         ("evaluated by the worst case, also", task.cases_description),
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
+        ("targets rest", task.surfaces_description),
         ("cycle", task.cycle_description),
         ("durations", task.cycle.describe_times() if task.cycle else ""),
         (

@@ -109,6 +109,8 @@ class _Driver:
         self._full = float(self._model.body_mass[self._payload]), self._model.body_inertia[self._payload].copy()
         self._tip = self._model.site("tip").id
         self._contacts: dict[tuple[str, str], Contact] = {}
+        names = [str(self._model.geom(i).name) for i in range(self._model.ngeom)]
+        self._obstacles = {name: o for o, name in enumerate(name for name in names if name.startswith("obstacle_"))}
 
     def run(self) -> Drive:
         """Drive the whole cycle."""
@@ -138,7 +140,7 @@ class _Driver:
                 tau[at] = data.qfrc_actuator
                 at += 1
                 if data.ncon:
-                    self._note_contacts()
+                    self._note_contacts(row)
         stable = not any(warning.number for warning in data.warning) and bool(np.isfinite(q).all())
         return Drive(q, qd, tau, speed, tip, tuple(arrivals), tuple(self._contacts.values()), stable)
 
@@ -174,9 +176,19 @@ class _Driver:
         distance = float(np.linalg.norm(data.site_xpos[self._tip] - data.site_xpos[site.id]))
         return Arrival(int(self._trajectory.step[row]), name, distance, angle_between(tip, goal, int(site.user[2])))
 
-    def _note_contacts(self) -> None:
+    def _note_contacts(self, row: int) -> None:
+        """Note what touches, except for what tool and payload may touch at a row of the trajectory."""
         for contact in self._data.contact:
             first, second = sorted(self._model.geom(int(geom)).name for geom in contact.geom)
+            tips = {first, second} & {"tool", "payload"}
+            if (
+                tips
+                and first in self._obstacles
+                and -contact.dist <= self._trajectory.allowed[row, self._obstacles[first]]
+            ):
+                continue
+            if "payload" in tips and self._trajectory.payload[row] == 0.0:
+                continue
             known = self._contacts.get((first, second))
             time = float(self._data.time) if known is None else known.time
             depth = max(-float(contact.dist), 0.0 if known is None else known.depth)

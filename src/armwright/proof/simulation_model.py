@@ -14,7 +14,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.problem.scene import Scene
 from armwright.robot.arm import GRAVITY, Arm, Joint
-from armwright.robot.collision_pairs import joined_by_column, joined_by_motors
+from armwright.robot.collision_pairs import joined_by_column, joined_by_motors, joined_by_tip
 from armwright.robot.link_geometry import (
     Segment,
     moving_joints,
@@ -49,6 +49,9 @@ OBSTACLE, LINK = 1, 2
 TOUCHES_ALL = {"contype": str(LINK), "conaffinity": str(LINK | OBSTACLE)}
 TOUCHES_LINKS = {"contype": str(LINK), "conaffinity": str(LINK)}
 TOUCHES_NOTHING = {"contype": "0", "conaffinity": "0"}
+# Contacts of tool and payload are measured, without force: what they may touch, they may touch.
+NO_FORCE = {"priority": "1", "condim": "1", "solref": "-1e-6 -1e-6", "solimp": "0.0001 0.0001 0.001"}
+TIP = {"contype": "0", "conaffinity": str(LINK | OBSTACLE), **NO_FORCE}
 COLOURS = {"obstacle": "0.55 0.55 0.58 0.5", "target": "0.84 0.16 0.16 0.6", "payload": "0.95 0.77 0.06 0.7"}
 
 
@@ -59,9 +62,10 @@ def to_simulation_mjcf(
 
     Moving joints are joint_1, joint_2, …, each with the actuators servo_1, … (position) and ff_1, … (torque), whose sum
     is limited to the actuator's peak torque. Link k is the capsule link_k, its actuator the sphere or body motor_k. The
-    column below the base is the cylinder `column`, which touches no obstacle. A site target_NAME is at each target; its
-    user data are the tolerance of the position [m], of the angle [rad], and how many angles count (2: the z axis, 3:
-    all). The keyframe NAME is the posture there.
+    column below the base is the cylinder `column`, which touches no obstacle. Solid tools and payloads are the geoms
+    `tool` and `payload`, whose contacts exert no force. A site target_NAME is at each target; its user data are the
+    tolerance of the position [m], of the angle [rad], and how many angles count (2: the z axis, 3: all). The keyframe
+    NAME is the posture there.
 
     postures: (T, D) values of the moving joints at the targets [rad] or [m].
     peak_torques: (D,) largest torques of the moving joints, for the gains of joints without actuators.
@@ -91,7 +95,7 @@ def to_simulation_mjcf(
         if segment.link.length > 0.0:
             _add_link(body, segment)
     add_tip(body, arm)
-    add_tool(body, arm)
+    add_tool(body, arm, {"name": "tool", **TIP})
     _add_payload(body, arm, scene)
     _add_exclusions(root, arm, motor_names)
     _add_actuators(root, arm, peak_torques)
@@ -110,6 +114,10 @@ def _add_exclusions(root: Element, arm: Arm, motor_names: Mapping[int, str]) -> 
         motors, links = joined_by_column(arm)
         pairs += [("column", motor_names[joint + 1]) for joint in motors]
         pairs += [("column", f"link_{link + 1}") for link in links]
+    motors, links = joined_by_tip(arm)
+    for tip in ("payload", *(("tool",) if any(arm.tool.size) or arm.tool.radius else ())):
+        pairs += [(tip, motor_names[joint + 1]) for joint in motors]
+        pairs += [(tip, f"link_{link + 1}") for link in links]
     for first, second in pairs:
         SubElement(contact, "exclude", body1=first, body2=second)
 
@@ -212,6 +220,9 @@ def _add_payload(body: Element, arm: Arm, scene: Scene) -> None:
     moments = [mass * value for value in shape.gyration] if mass > 0.0 else [NOTHING] * 3
     inertial = {"pos": numbers(shape.center), "mass": number(mass or NOTHING), "diaginertia": numbers(moments)}
     SubElement(payload, "inertial", inertial)
+    if any(shape.size):
+        solid = {"type": "box", "size": numbers([side / 2 for side in shape.size]), "pos": numbers(shape.middle)}
+        SubElement(payload, "geom", {"name": "payload", **solid, "rgba": COLOURS["payload"], **TIP})
 
 
 def _add_actuators(root: Element, arm: Arm, peak_torques: Array) -> None:

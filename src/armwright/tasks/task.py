@@ -211,6 +211,17 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return resting_surfaces(self.targets, self.target_arrays, self.obstacles, reach)
 
     @property
+    def surfaces_description(self) -> str:
+        """What tool and payload may touch at the targets, on one line; empty if they are no bodies."""
+        groups: dict[str, list[str]] = {}
+        for name, record, surface in zip(self.target_names, self._records, self.surfaces, strict=True):
+            on, into = "" if surface is None else self.obstacles[surface].label, record.into if record else ""
+            assumed = "" if record and record.on else " (assumed)"
+            where = [f"on {on}{assumed}"] * (on not in ("", into)) + [f"into {into}"] * bool(into)
+            groups.setdefault(" and ".join(where) or "on nothing", []).append(name)
+        return "; ".join(f"{', '.join(names)} {where}" for where, names in groups.items()) * self.has_tip_bodies
+
+    @property
     def allowed_depths(self) -> Array:
         """(T, O) how deep tool and payload may be in each obstacle at each target [m], as `TipRules.allowed`."""
         return allowed_depths(self.targets, self.surfaces, self.obstacles, self.target_arrays.tolerance)

@@ -12,6 +12,7 @@ from armwright.problem.checks.magnitudes import check_magnitudes
 from armwright.problem.checks.reach import check_reach
 from armwright.problem.checks.requirements import check_requirements
 from armwright.problem.checks.strength import check_strength
+from armwright.problem.checks.tip_in_obstacles import check_tip_bodies
 from armwright.problem.problem import Problem
 
 
@@ -22,8 +23,8 @@ def check_instantly(problem: Problem) -> list[Finding]:
     """
     check_requirements(problem)
     checks = (
-        check_reach, check_obstacles, check_base_motor, check_constraints, check_strength, check_magnitudes,
-        check_idle_objectives,
+        check_reach, check_obstacles, check_tip_bodies, check_base_motor, check_constraints, check_strength,
+        check_magnitudes, check_idle_objectives,
     )  # fmt: skip
     findings = [finding for check in checks for finding in check(problem)]
     return sorted(findings, key=lambda finding: not finding.is_proven)
