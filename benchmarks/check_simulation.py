@@ -63,9 +63,9 @@ def check(folder: Path) -> list[str]:
                 first, second = sorted(names[g] for g in contact.geom)
                 if "payload" in (first, second) and float(row["payload"]) == 0.0:
                     continue
-                if first in obstacles and second in ("tool", "payload"):
-                    if -contact.dist <= float(row[f"allowed_{obstacles.index(first) + 1}"]):
-                        continue
+                may_touch = first in obstacles and second in ("tool", "payload")
+                if may_touch and -contact.dist <= float(row[f"allowed_{obstacles.index(first) + 1}"]):
+                    continue
                 touching = f"{first} touches {second}"
                 faults += [touching] if touching not in faults else []
     return faults + [f"joint {k + 1} is at its limit" for k in np.flatnonzero(saturated > SHARE * steps)]

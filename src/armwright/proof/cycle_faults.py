@@ -130,7 +130,8 @@ def via_point(
     start, end, along = q[0, 0], q[0, 2], VIA_SHARES[:, None]
     ways = np.concatenate([start + along * (via - start), via + along * (end - via)], axis=1)  # (P, 34, D)
     ways = ways.reshape(1, -1, arm.dof)
-    rules = plan.rules(replace(path.motion, by="line"), ways.shape[1])  # what is allowed at its ends, all the way
+    # What is allowed at the ends of the motion, is allowed all the way.
+    rules = plan.rules(replace(path.motion, by="line"), np.zeros(ways.shape[1]))
     clearance = np.minimum(*clearances(arm, ways, obstacles, rules=rules)).reshape(len(points), -1)
     reached = found.distance(points)[0] < REACHED
     least = np.where(reached, clearance.min(axis=1), -np.inf)

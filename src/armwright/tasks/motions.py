@@ -23,6 +23,7 @@ LINE_STEP = 0.02  # [m] largest distance of two samples of a line
 ANGLE_STEP = 0.1  # [rad] likewise of the tool's angle
 MIN_STEPS = 4  # of a line, for its spline
 MAX_SAMPLES = 20_000  # of all lines of a cycle
+NEAR_END = 1.0 / 16.0  # share of a joint motion at each end, where tool and payload leave what they rest on
 OPPOSITE = 1e-3  # [rad] from half a turn; the shortest rotation is not unique there
 
 
@@ -162,12 +163,15 @@ class CyclePlan:
             angle_tolerance=tolerance(allowed.largest_angle, poses.angle_tolerance),
         )
 
-    def rules(self, motion: Motion, n: int) -> TipRules:
-        """Return what holds at n samples along a motion: the rules of its targets, on the whole of a line."""
-        ends = self.allowed[[motion.start, motion.end]]
-        allowed = np.full((n, ends.shape[1]), ends.max(axis=0) if motion.by == "line" else APART)
-        allowed[[0, -1]] = np.maximum(allowed[[0, -1]], ends)
-        return TipRules(np.full(n, motion.carries), allowed)
+    def rules(self, motion: Motion, share: Array) -> TipRules:
+        """Return what holds at shares (S,) of a motion: the rules of its targets, on a joint motion near its ends."""
+        start, end = self.allowed[[motion.start, motion.end]]
+        is_line = motion.by == "line"
+        near_start, near_end = is_line | (share < NEAR_END), is_line | (share > 1.0 - NEAR_END)
+        at_start, at_end = (
+            np.where(near[:, None], allowed, APART) for near, allowed in ((near_start, start), (near_end, end))
+        )
+        return TipRules(np.full(len(share), motion.carries), np.maximum(at_start, at_end))
 
     def sampled_rules(self, samples: LineSamples) -> TipRules:
         """Return what holds at samples of lines; at those that motions share, what holds for any of them."""
@@ -179,7 +183,7 @@ class CyclePlan:
             else:
                 block = self.joint_motions.index(index)
                 at = np.array([first[block + 1] - 1, first[(block + 1) % len(self.blocks)]])
-            rules = self.rules(motion, len(at))
+            rules = self.rules(motion, np.linspace(0.0, 1.0, len(at)))
             found.carries[at] |= rules.carries
             found.allowed[at] = np.maximum(found.allowed[at], rules.allowed)
         return found

@@ -1,9 +1,10 @@
 """The task: points that the tip of the arm should reach, and which way it should point there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -21,10 +22,11 @@ from armwright.files import check_name
 from armwright.tasks.cycle import IN_ORDER, Cycle, target_indices
 from armwright.tasks.moments import Mass
 from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
-from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle
+from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, Solid
 from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload
 from armwright.tasks.targets import MAX_COORDINATE, Point, Target, TargetArrays, check_length, stack_targets
 from armwright.tasks.tip_rules import allowed_depths, check_names, resting_surfaces
+from armwright.tasks.tip_solids import placed, tip_solids
 from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.tasks.workspace import MAX_POINTS, MAX_POSES, MAX_REGIONS, Region
 
@@ -199,15 +201,32 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return self.payload.shape if isinstance(self.payload, Payload) else POINT_LOAD
 
     @property
-    def has_tip_bodies(self) -> bool:
-        """True if tool or payload are solid bodies."""
-        return any(self.load_shape.size) or self.tool.size is not None or self.tool.radius is not None
+    def tip_solids(self) -> Mapping[str, Solid]:
+        """`tool` and `payload` in the tip frame, those that are solid bodies."""
+        return tip_solids(self.tool, self.load_shape)
+
+    @property
+    def holds_payload(self) -> NDArray[np.bool_]:
+        """(T,) whether the payload is carried to or from each target."""
+        plan = None if self.cycle is None else self.plan(self.target_positions)
+        return (self.payloads > 0.0) & (True if plan is None else plan.holds_payload(len(self.targets)))
+
+    @property
+    def bodies_at_targets(self) -> list[Solid]:
+        """Tool and payload at the targets that state a direction; angles that do not count are arbitrary."""
+        arrays, held = self.target_arrays, self.holds_payload
+        return [
+            placed(solid, self.target_positions[i], arrays.rotation[i])
+            for i in np.flatnonzero(arrays.n_angular).tolist()
+            for name, solid in self.tip_solids.items()
+            if name == "tool" or held[i]
+        ]
 
     @property
     def surfaces(self) -> tuple[int | None, ...]:
         """Index of the obstacle that each target rests on: the one that it names, else the one beyond the tip."""
-        shape = self.load_shape
-        reach = max(0.0, shape.middle[2] + shape.size[2] / 2) if self.has_tip_bodies else None
+        solids, load = self.tip_solids, self.load_shape
+        reach = max(0.0, load.middle[2] + load.size[2] / 2) if solids else None
         return resting_surfaces(self.targets, self.target_arrays, self.obstacles, reach)
 
     @property
@@ -219,7 +238,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             assumed = "" if record and record.on else " (assumed)"
             where = [f"on {on}{assumed}"] * (on not in ("", into)) + [f"into {into}"] * bool(into)
             groups.setdefault(" and ".join(where) or "on nothing", []).append(name)
-        return "; ".join(f"{', '.join(names)} {where}" for where, names in groups.items()) * self.has_tip_bodies
+        return "; ".join(f"{', '.join(names)} {where}" for where, names in groups.items()) * bool(self.tip_solids)
 
     @property
     def allowed_depths(self) -> Array:
@@ -266,7 +285,7 @@ def _check_obstacles(plan: CyclePlan, obstacles: Sequence[Obstacle]) -> None:
         if motion.by == "joint":
             continue
         points = along_line(plan.poses, motion.start, motion.end, share).position
-        allowed = plan.rules(motion, len(share)).allowed
+        allowed = plan.rules(motion, share).allowed
         for number, obstacle in enumerate(obstacles, start=1):
             inside = obstacle.solid.signed_distance(points) < -np.maximum(allowed[:, number - 1], MAX_DEPTH)
             if inside.any():

@@ -117,7 +117,7 @@ def _avoid_collisions(
     index = np.arange(len(arms))
     share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
     n_blocks, n_edges, candidates = blocks.shape[1], edges.shape[1], blocks.shape[2]
-    joint_motions = [plan.rules(plan.motions[i], JOINT_STEPS + 1)[1:-1] for i in plan.joint_motions[:n_edges]]
+    joint_motions = [plan.rules(plan.motions[i], share) for i in plan.joint_motions[:n_edges]]
     rules = joined_rules([plan.sampled_rules(samples), *joint_motions])
     for _ in range(max(ROUNDS, candidates) if candidates > 1 else 0):
         part = arms[index]

@@ -22,7 +22,7 @@ from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
 from armwright.kinematics.cycle.line_following import IndexArray, follow_lines, tool_errors
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device
-from armwright.tasks.motions import CyclePlan, stack_poses
+from armwright.tasks.motions import NEAR_END, CyclePlan, stack_poses
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.tip_rules import joined_rules
 
@@ -30,6 +30,8 @@ MAX_REFINEMENT = 64  # of the samples
 SHARP = 4.0  # times the mean step of a line that makes its largest one a peak
 REDUCED = 0.75  # a step that twice the samples leave above this share of it is a jump
 INSTANTS = 33  # of a motion, equally spaced in time, at which its loads are evaluated
+NEAR = 0.03  # [m] clearance at samples of a joint motion, below which bodies may touch between them
+ZOOMS, BETWEEN = 3, np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # rounds of a search there; its places in quarter steps
 ROUGH, ROUGH_INSTANTS = 0.25, 5  # refinement and instants of a rough path
 
 
@@ -205,7 +207,7 @@ def _measure(
             jumps[group.index, -1] |= gap > CLOSED
         errors = _line_errors(group, plan, device, between)
         q = np.concatenate([path.q for path in group.paths], axis=1)
-        rules = joined_rules([plan.rules(path.motion, path.q.shape[1]) for path in group.paths])
+        rules = joined_rules([plan.rules(path.motion, path.share) for path in group.paths])
         clearance = np.stack(clearances(group.arms, q, obstacles, device, rules))  # (2, n, R)
         margin = group.arms.limit_distance(q)
         at = 0
@@ -221,8 +223,39 @@ def _measure(
             if path.motion.by == "line":  # where a joint meets its limit, the speeds of the others jump
                 jumps[group.index, i] |= (margin[:, at + 1 : end - 1] <= ON_LIMIT).any(axis=1)
             at = end
+        if between > 1:
+            _look_between(group, plan, values[2:4], worst[:, :, 2], obstacles, device)
     path_error, path_angle, own, clear, margin = values
     return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
+
+
+def _look_between(
+    group: CycleGroup, plan: CyclePlan, clearance: Array, worst: Array, obstacles: Sequence[Obstacle], device: Device
+) -> None:
+    """Lower clearances (2, N, M), and move the shares (N, M) where they are worst, to those between samples.
+
+    Corners pass each other between the samples of a joint motion, so it is searched around its worst sample, of arms
+    that do not touch anything there but come near.
+    """
+    motions = [i for i, path in enumerate(group.paths) if path.motion.by == "joint"]
+    least = clearance.min(axis=0)[group.index].min(axis=1)
+    rows = np.flatnonzero((least > 0.0) & (least < NEAR)) if motions else []
+    if not len(rows):
+        return
+    place = np.ix_(group.index[rows], motions)
+    start, end = (np.stack([group.paths[i].q[rows, end] for i in motions], axis=1)[:, :, None] for end in (0, -1))
+    step = np.array([1.0 / (group.paths[i].q.shape[1] - 1) for i in motions])[:, None]
+    middle = np.full(len(BETWEEN), 0.5)
+    rules = joined_rules([plan.rules(group.paths[i].motion, middle) for i in motions])
+    for _ in range(ZOOMS):
+        step = step / 4.0
+        share = np.clip(worst[place][:, :, None] + step * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (n, m, S)
+        q = start + share[..., None] * (end - start)
+        found = np.stack(clearances(group.arms[rows], q.reshape(len(rows), -1, q.shape[-1]), obstacles, device, rules))
+        found = found.reshape(2, *share.shape)
+        at, nearer = found.min(axis=0).argmin(axis=2)[..., None], found.min(axis=(0, 3)) < clearance.min(axis=0)[place]
+        worst[place] = np.where(nearer, np.take_along_axis(share, at, axis=2)[..., 0], worst[place])
+        clearance[:, place[0], place[1]] = np.minimum(clearance[:, place[0], place[1]], found.min(axis=3))
 
 
 def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> list[Any]:

@@ -50,9 +50,8 @@ def sample_trajectory(
     for index, path in enumerate(paths):
         rows = motion == index
         q[rows], qd[rows], qdd[rows] = _states(path, time[rows] - begin[index], durations[index])
-        share = (time[rows] - begin[index]) / durations[index]
-        place = np.searchsorted([SAME_TIME, 1.0 - SAME_TIME], share)  # at the start, on the way or at the end
-        allowed[rows] = plan.rules(path.motion, 3).allowed[place]
+        share = quintic(np.clip((time[rows] - begin[index]) / durations[index], 0.0, 1.0))[0]
+        allowed[rows] = plan.rules(path.motion, share).allowed
     step, target, carried = _events(plan, motion)
     tau = _drive_torques(arm, q, qd, qdd, carried, payload)
     moves = arm.motion[0] != FIXED

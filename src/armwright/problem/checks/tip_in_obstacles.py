@@ -9,12 +9,11 @@ from armwright.problem.checks.finding import PROVEN, SUSPECTED, Finding, describ
 from armwright.problem.checks.inside_obstacles import required_clearance
 from armwright.problem.checks.reach import allowed_errors
 from armwright.problem.problem import Problem
-from armwright.rotations import rotation_from_rpy
-from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.obstacles import Obstacle, Solid
 from armwright.tasks.targets import ORIENTATION
-from armwright.tasks.task import Task
 
 ROUNDING = 1e-6  # [m]
+UPRIGHT = 1.0 - 1e-9  # cosine of a body's angle from the tool's axis
 SHIFTS = 50  # at most, of a target until its body is free
 SHARES = np.linspace(-1.0, 1.0, 9)  # of half a body, at which its points are
 
@@ -26,9 +25,10 @@ def check_tip_bodies(problem: Problem) -> Iterator[Finding]:
     they are within the circle that the body fills at every angle.
     """
     task, strict = problem.task, required_clearance(problem) >= 0.0
-    arrays, allowed, carried = task.target_arrays, np.maximum(task.allowed_depths, 0.0), problem.scenes[0].payload > 0.0
+    arrays, allowed, carried = task.target_arrays, np.maximum(task.allowed_depths, 0.0), task.holds_payload
     for i in np.flatnonzero(arrays.n_angular).tolist():
-        for name, points in _bodies(task, arrays.n_angular[i] == ORIENTATION).items():
+        for name, solid in task.tip_solids.items():
+            points = _points(solid, bool(arrays.n_angular[i] == ORIENTATION))
             body = task.target_positions[i] + points @ arrays.rotation[i].T
             reach = np.linalg.norm(points, axis=1).max(initial=0.0)
             slack = allowed_errors(problem)[i] + arrays.angle_tolerance[i] * reach
@@ -52,20 +52,12 @@ def _depth(obstacle: Obstacle, points: Array) -> float:
     return -float(obstacle.solid.signed_distance(points).min(initial=np.inf))
 
 
-def _bodies(task: Task, is_turned: bool) -> dict[str, Array]:
-    """Return (P, 3) points of tool and payload in the tip frame [m]; only those of every angle unless it is stated."""
-    tool, load = task.tool, task.load_shape
-    found = {"payload": _points(np.array(load.size) / 2, np.array(load.middle), is_turned)} if any(load.size) else {}
-    if tool.size is not None:
-        middle = rotation_from_rpy(*tool.rpy).T @ np.subtract(tool.center, tool.tip)
-        found["tool"] = _points(np.array(tool.size) / 2, middle, is_turned)
-    return found
-
-
-def _points(half: Array, middle: Array, is_turned: bool) -> Array:
-    if is_turned:
+def _points(solid: Solid, is_turned: bool) -> Array:
+    """Return (P, 3) points of a body in the tip frame [m]: those of every angle about its z, unless one is stated."""
+    half, middle = np.array(solid.half), np.array(solid.centre)
+    if is_turned and solid.shape == "box":
         return middle + half * np.stack(np.meshgrid(SHARES, SHARES, SHARES), axis=-1).reshape(-1, 3)
     radius = (half - np.abs(middle))[:2].min()
     angle, height = np.meshgrid(np.pi * SHARES, middle[2] + half[2] * SHARES)
     circles = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1).reshape(-1, 3)
-    return circles if radius >= 0.0 else circles[:0]
+    return circles if radius >= 0.0 and abs(solid.rotation[2, 2]) > UPRIGHT else circles[:0]
