@@ -188,7 +188,8 @@ def test_contacts_are_the_overlaps_of_our_clearance() -> None:
     rng = np.random.default_rng(0)
     q = rng.uniform(model.jnt_range[:, 0], model.jnt_range[:, 1], (400, 5))
     arms = blocked.evaluation.arms
-    rules = TipRules(np.ones(len(q), dtype=np.bool_), np.full((len(q), 2), APART))
+    solids = blocked.problem.task.tip_solids
+    rules = TipRules(np.ones(len(q), dtype=np.bool_), np.full((len(q), 2), APART), solids)
     own, clear = (values[0] for values in clearances(arms, q[None], blocked.problem.task.obstacles, rules=rules))
     touching = np.zeros((2, len(q)), dtype=bool)
     for i, values in enumerate(q):

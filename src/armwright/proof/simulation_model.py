@@ -35,7 +35,7 @@ from armwright.robot.mjcf import (
     add_tool,
     joint_attributes,
 )
-from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.obstacles import Obstacle, Solid
 
 TIMESTEP = 0.001  # [s]
 NOTHING = 1e-9  # mass [kg] and moments of inertia [kg m²] of a payload that is not carried
@@ -74,7 +74,8 @@ def to_simulation_mjcf(
     SubElement(root, "compiler", COMPILER)
     gravity = numbers((0.0, 0.0, -GRAVITY))
     option = SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP), integrator="RK4")
-    if arm.has_motor_bodies:  # a motor touches the link before its carrier; what may not touch is excluded below
+    # A motor touches the link before its carrier, a tool that before the last; what may not touch is excluded below.
+    if arm.has_motor_bodies or (scene.tip_rules and scene.tip_rules.solids):
         SubElement(option, "flag", filterparent="disable")
     SubElement(SubElement(root, "default"), "geom", {**TOUCHES_NOTHING, "mass": "0"})
     world = add_scene(root, arm)
@@ -95,7 +96,7 @@ def to_simulation_mjcf(
         if segment.link.length > 0.0:
             _add_link(body, segment)
     add_tip(body, arm)
-    add_tool(body, arm, {"name": "tool", **TIP})
+    add_tool(body, arm)
     _add_payload(body, arm, scene)
     _add_exclusions(root, arm, motor_names)
     _add_actuators(root, arm, peak_torques)
@@ -115,9 +116,8 @@ def _add_exclusions(root: Element, arm: Arm, motor_names: Mapping[int, str]) -> 
         pairs += [("column", motor_names[joint + 1]) for joint in motors]
         pairs += [("column", f"link_{link + 1}") for link in links]
     motors, links = joined_by_tip(arm)
-    for tip in ("payload", *(("tool",) if any(arm.tool.size) or arm.tool.radius else ())):
-        pairs += [(tip, motor_names[joint + 1]) for joint in motors]
-        pairs += [(tip, f"link_{link + 1}") for link in links]
+    pairs += [("payload", motor_names[joint + 1]) for joint in motors]
+    pairs += [("payload", f"link_{link + 1}") for link in links]
     for first, second in pairs:
         SubElement(contact, "exclude", body1=first, body2=second)
 
@@ -147,16 +147,20 @@ def _add_obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
     for index, obstacle in enumerate(obstacles, start=1):
         solid = obstacle.solid
         label = obstacle.name if obstacle.name and names[obstacle.name] == 1 else f"{obstacle.name}{index}"
-        size = {
-            "box": solid.half,
-            "sphere": solid.half[:1],
-            "cylinder": (solid.half[0], solid.half[2]),
-            "ground": (0.0, 0.0, 0.1),  # of a plane without end, and the spacing of its grid
-        }[solid.shape]
-        geom = {"type": "plane" if solid.shape == "ground" else solid.shape, "size": numbers(size)}
-        place = {"pos": numbers(solid.centre), "xyaxes": numbers(solid.rotation[:, :2].T.ravel().tolist())}
         bits = {"contype": str(OBSTACLE), "conaffinity": "0"}
-        SubElement(world, "geom", {"name": f"obstacle_{label}", **geom, **place, **bits, "rgba": COLOURS["obstacle"]})
+        SubElement(world, "geom", {"name": f"obstacle_{label}", **_geom(solid), **bits, "rgba": COLOURS["obstacle"]})
+
+
+def _geom(solid: Solid) -> dict[str, str]:
+    """Return type, size and place of a solid."""
+    size = {
+        "box": solid.half,
+        "sphere": solid.half[:1],
+        "cylinder": (solid.half[0], solid.half[2]),
+        "ground": (0.0, 0.0, 0.1),  # of a plane without end, and the spacing of its grid
+    }[solid.shape]
+    place = {"pos": numbers(solid.centre), "xyaxes": numbers(solid.rotation[:, :2].T.ravel().tolist())}
+    return {"type": "plane" if solid.shape == "ground" else solid.shape, "size": numbers(size), **place}
 
 
 def _add_targets(world: Element, scene: Scene, target_names: Sequence[str], arm: Arm) -> None:
@@ -220,9 +224,8 @@ def _add_payload(body: Element, arm: Arm, scene: Scene) -> None:
     moments = [mass * value for value in shape.gyration] if mass > 0.0 else [NOTHING] * 3
     inertial = {"pos": numbers(shape.center), "mass": number(mass or NOTHING), "diaginertia": numbers(moments)}
     SubElement(payload, "inertial", inertial)
-    if any(shape.size):
-        solid = {"type": "box", "size": numbers([side / 2 for side in shape.size]), "pos": numbers(shape.middle)}
-        SubElement(payload, "geom", {"name": "payload", **solid, "rgba": COLOURS["payload"], **TIP})
+    for name, solid in (scene.tip_rules.solids if scene.tip_rules else {}).items():
+        SubElement(payload, "geom", {"name": name, **_geom(solid), "rgba": COLOURS["payload"], **TIP})
 
 
 def _add_actuators(root: Element, arm: Arm, peak_torques: Array) -> None:

@@ -189,8 +189,6 @@ class MountedTool:
     com: Vector = (0.0, 0.0, 0.0)  # centre of mass [m]
     # (3, 3) about the centre of mass [kg m²]
     inertia: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    size: Vector = (0.0, 0.0, 0.0)  # sides of its box about `com`, along the axes of the tip frame [m]; 0 for none
-    radius: float = 0.0  # of its cylinder from the end of the last link to the tip [m]; 0 for none
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(v) for v in (*self.tip, self.mass, *self.com, *sum(self.inertia, ()))):

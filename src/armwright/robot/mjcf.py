@@ -141,19 +141,10 @@ def add_tip(body: Element, arm: Arm) -> None:
     SubElement(body, "site", tip)
 
 
-def add_tool(body: Element, arm: Arm, attributes: Mapping[str, str] | None = None) -> None:
-    """Add the body of a tool with mass or a solid to the last link, with further attributes of its geometry."""
-    tool, solid = arm.tool, {}
-    if any(tool.size):
-        half = [side / 2 for side in tool.size]
-        solid = {"type": "box", "size": numbers(half), "pos": numbers(tool.com), "euler": numbers(tip_rpy(arm))}
-    elif tool.radius:
-        solid = {"type": "cylinder", "size": number(tool.radius), "fromto": numbers([0.0, 0.0, 0.0, *tool.tip])}
-    if tool.mass == 0.0 and not solid:
+def add_tool(body: Element, arm: Arm) -> None:
+    """Add the body of a tool with mass to the last link."""
+    if arm.tool.mass == 0.0:
         return
-    element = SubElement(body, "body", name="tool", pos=numbers(arm.links[-1].offset))
-    if tool.mass > 0.0:
-        inertial = {"pos": numbers(tool.com), "mass": number(tool.mass)}
-        SubElement(element, "inertial", inertial | {"fullinertia": " ".join(tool_moments(arm).values())})
-    if solid:
-        SubElement(element, "geom", {**solid, "material": "link", **(attributes or {})})
+    tool = SubElement(body, "body", name="tool", pos=numbers(arm.links[-1].offset))
+    inertial = {"pos": numbers(arm.tool.com), "mass": number(arm.tool.mass)}
+    SubElement(tool, "inertial", inertial | {"fullinertia": " ".join(tool_moments(arm).values())})

@@ -49,8 +49,6 @@ def _mounted(tool: Tool, frame: Array, start: Array) -> MountedTool:
         mass=tool.mass,
         com=_vector(start + frame @ tool.center),
         inertia=_tensor(frame @ np.diag(tool.inertia) @ frame.T),
-        size=tool.size or (0.0, 0.0, 0.0),
-        radius=tool.radius or 0.0,
     )
 
 

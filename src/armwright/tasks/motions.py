@@ -96,7 +96,7 @@ class CyclePlan:
     motions: tuple[Motion, ...]  # motions in their order, from rest at the target of the first step
     targets: tuple[int, ...]  # index of each step's target
     times: tuple[float | None, ...]  # duration of each step [s]; None for the fastest
-    allowed: Array  # (P, O) depth of tool and payload in each obstacle that does not count at a pose (`TipRules`) [m]
+    tip_rules: TipRules  # what holds at the poses
 
     def holds_payload(self, n_targets: int) -> NDArray[np.bool_]:
         """Return (T,) whether the payload is carried to or from each of T targets; True where the cycle never is."""
@@ -165,18 +165,20 @@ class CyclePlan:
 
     def rules(self, motion: Motion, share: Array) -> TipRules:
         """Return what holds at shares (S,) of a motion: the rules of its targets, on a joint motion near its ends."""
-        start, end = self.allowed[[motion.start, motion.end]]
+        start, end = self.tip_rules.allowed[[motion.start, motion.end]]
         is_line = motion.by == "line"
         near_start, near_end = is_line | (share < NEAR_END), is_line | (share > 1.0 - NEAR_END)
         at_start, at_end = (
             np.where(near[:, None], allowed, APART) for near, allowed in ((near_start, start), (near_end, end))
         )
-        return TipRules(np.full(len(share), motion.carries), np.maximum(at_start, at_end))
+        carries = np.full(len(share), motion.carries and self.tip_rules.carries.any())
+        return TipRules(carries, np.maximum(at_start, at_end), self.tip_rules.solids)
 
     def sampled_rules(self, samples: LineSamples) -> TipRules:
         """Return what holds at samples of lines; at those that motions share, what holds for any of them."""
         n, first = len(samples.poses), samples.first
-        found = TipRules(np.zeros(n, dtype=np.bool_), np.full((n, self.allowed.shape[1]), APART))
+        apart = np.full((n, self.tip_rules.allowed.shape[1]), APART)
+        found = TipRules(np.zeros(n, dtype=np.bool_), apart, self.tip_rules.solids)
         for index, motion in enumerate(self.motions):
             if motion.by == "line":
                 at = np.arange(samples.of_motion[index][0], samples.of_motion[index][1] + 1)
@@ -216,11 +218,11 @@ class CyclePlan:
 
 
 def plan_cycle(
-    cycle: Cycle, targets: Sequence[int], positions: Array, arrays: TargetArrays, depths: Array
+    cycle: Cycle, targets: Sequence[int], positions: Array, arrays: TargetArrays, tip_rules: TipRules
 ) -> CyclePlan:
     """Return the motions of a cycle.
 
-    targets: index of each step's target.  positions: (T, 3) of targets [m].  depths: (T, O) allowed there.
+    targets: index of each step's target.  positions: (T, 3) of targets [m].  tip_rules: at the T targets.
     """
     poses = Poses(positions, arrays.rotation, arrays.n_angular, arrays.tolerance, arrays.angle_tolerance)
     for number, (target, step) in enumerate(zip(targets, cycle.steps, strict=True), start=1):
@@ -239,8 +241,9 @@ def plan_cycle(
         )
         poses = stack_poses([poses, before])
     points = {target: len(positions) + i for i, target in enumerate(approached)}
-    depths = np.concatenate([depths, np.full((len(approached), depths.shape[1]), APART)])
-    plan = CyclePlan(cycle, poses, _motions(cycle, targets, points), tuple(targets), cycle.durations(), depths)
+    tip_rules = tip_rules[np.array([*range(len(positions)), *approached], dtype=np.intp)]
+    tip_rules.allowed[len(positions) :] = APART
+    plan = CyclePlan(cycle, poses, _motions(cycle, targets, points), tuple(targets), cycle.durations(), tip_rules)
     _check_lines(plan)
     return plan
 

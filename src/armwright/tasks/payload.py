@@ -13,12 +13,10 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class LoadShape:
-    """How the mass of a payload is distributed, whatever that mass, and its body, in the tip frame."""
+    """How the mass of a payload is distributed, whatever that mass, in the tip frame."""
 
     center: Vector = (0.0, 0.0, 0.0)  # centre of mass [m]
     gyration: Vector = (0.0, 0.0, 0.0)  # moments of inertia about the centre, around x, y and z, per mass [m²]
-    size: Vector = (0.0, 0.0, 0.0)  # sides of the box that the payload fills [m]; 0 for no body
-    middle: Vector = (0.0, 0.0, 0.0)  # of that box [m]
 
 
 POINT_LOAD = LoadShape()
@@ -43,7 +41,7 @@ class Payload(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         """Its centre and its moments of inertia per mass; those of a point without size and inertia."""
         if self.size is not None:
             x, y, z = (side**2 / 12.0 for side in self.size)
-            return LoadShape(self.center, (y + z, z + x, x + y), self.size, self.center)
+            return LoadShape(self.center, (y + z, z + x, x + y))
         x, y, z = self.inertia or (0.0, 0.0, 0.0)
         return LoadShape(self.center, (x / self.mass, y / self.mass, z / self.mass))
 

@@ -1,10 +1,9 @@
 """The task: points that the tip of the arm should reach, and which way it should point there."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any, Self, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -25,8 +24,7 @@ from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
 from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, Solid
 from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload
 from armwright.tasks.targets import MAX_COORDINATE, Point, Target, TargetArrays, check_length, stack_targets
-from armwright.tasks.tip_rules import allowed_depths, check_names, resting_surfaces
-from armwright.tasks.tip_solids import placed, tip_solids
+from armwright.tasks.tip_rules import APART, Solids, TipRules, check_names, placed, resting_surfaces, tip_solids
 from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.tasks.workspace import MAX_POINTS, MAX_POSES, MAX_REGIONS, Region
 
@@ -146,7 +144,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             if name in seen:
                 raise ValueError(f'targets: two are named "{name}"; give each its own name')
             seen.add(name)
-        check_names(self.targets, self.obstacles)
+        check_names(self._records, self.obstacles)
         if self.cycle is not None:
             _check_obstacles(self.plan(self.target_positions), self.obstacles)
         return self
@@ -201,33 +199,39 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return self.payload.shape if isinstance(self.payload, Payload) else POINT_LOAD
 
     @property
-    def tip_solids(self) -> Mapping[str, Solid]:
-        """`tool` and `payload` in the tip frame, those that are solid bodies."""
-        return tip_solids(self.tool, self.load_shape)
+    def tip_rules(self) -> TipRules:
+        """Tool and payload as bodies at the T targets, and what they may touch there."""
+        names, tolerance = [obstacle.name for obstacle in self.obstacles], self.target_arrays.tolerance
+        allowed = np.full((len(self.targets), len(names)), APART)
+        for i, (record, surface) in enumerate(zip(self._records, self.surfaces, strict=True)):
+            if surface is not None:
+                allowed[i, surface] = tolerance[i]
+            if record and record.into:
+                allowed[i, names.index(record.into)] = np.inf
+        return TipRules(self.payloads > 0.0, allowed, self.tip_solids)
 
     @property
-    def holds_payload(self) -> NDArray[np.bool_]:
-        """(T,) whether the payload is carried to or from each target."""
-        plan = None if self.cycle is None else self.plan(self.target_positions)
-        return (self.payloads > 0.0) & (True if plan is None else plan.holds_payload(len(self.targets)))
+    def tip_solids(self) -> Solids:
+        """`tool` and `payload` in the tip frame, those that are bodies."""
+        return tip_solids(self.tool, self.payload if isinstance(self.payload, Payload) else None)
 
     @property
     def bodies_at_targets(self) -> list[Solid]:
         """Tool and payload at the targets that state a direction; angles that do not count are arbitrary."""
-        arrays, held = self.target_arrays, self.holds_payload
+        arrays, carried = self.target_arrays, self.payloads > 0.0
+        if self.cycle is not None:
+            carried &= self.plan(self.target_positions).holds_payload(len(carried))
         return [
             placed(solid, self.target_positions[i], arrays.rotation[i])
             for i in np.flatnonzero(arrays.n_angular).tolist()
             for name, solid in self.tip_solids.items()
-            if name == "tool" or held[i]
+            if name == "tool" or carried[i]
         ]
 
     @property
     def surfaces(self) -> tuple[int | None, ...]:
         """Index of the obstacle that each target rests on: the one that it names, else the one beyond the tip."""
-        solids, load = self.tip_solids, self.load_shape
-        reach = max(0.0, load.middle[2] + load.size[2] / 2) if solids else None
-        return resting_surfaces(self.targets, self.target_arrays, self.obstacles, reach)
+        return resting_surfaces(self._records, self.target_arrays, self.obstacles, self.tip_solids)
 
     @property
     def surfaces_description(self) -> str:
@@ -239,11 +243,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             where = [f"on {on}{assumed}"] * (on not in ("", into)) + [f"into {into}"] * bool(into)
             groups.setdefault(" and ".join(where) or "on nothing", []).append(name)
         return "; ".join(f"{', '.join(names)} {where}" for where, names in groups.items()) * bool(self.tip_solids)
-
-    @property
-    def allowed_depths(self) -> Array:
-        """(T, O) how deep tool and payload may be in each obstacle at each target [m], as `TipRules.allowed`."""
-        return allowed_depths(self.targets, self.surfaces, self.obstacles, self.target_arrays.tolerance)
 
     @property
     def target_names(self) -> tuple[str, ...]:
@@ -275,7 +274,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if self.cycle is None:
             raise ValueError(f"task {self.name} has no cycle; try cycle: {IN_ORDER}")
         targets = target_indices(self.cycle.steps, self._numbers, len(positions))
-        return plan_cycle(self.cycle, targets, positions, self.target_arrays, self.allowed_depths)
+        return plan_cycle(self.cycle, targets, positions, self.target_arrays, self.tip_rules)
 
 
 def _check_obstacles(plan: CyclePlan, obstacles: Sequence[Obstacle]) -> None:

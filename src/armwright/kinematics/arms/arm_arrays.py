@@ -13,7 +13,6 @@ from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.kinematics.arms.actuation import Actuation, actuation_of
 from armwright.kinematics.arms.motor_bodies import MotorBodies, stack_bodies
 from armwright.kinematics.arms.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
-from armwright.kinematics.arms.tip_bodies import TipBodies, stack_tip_bodies
 from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
 from armwright.tasks.payload import POINT_LOAD, LoadShape
 
@@ -61,7 +60,6 @@ class ArmArrays(PerArm):
     bodies: Bodies  # without tools; for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
     motor_bodies: MotorBodies | None = None  # None if the bodies of actuators do not count
-    tip_bodies: TipBodies | None = None  # None if neither tool nor payload is a body; of arms that carry something
     columns: Floats | None = None
     """(N, 3) radius, radius, half the length of the upright cylinder below each base [m], length 0 without one; None
     if no base stands on a column."""
@@ -228,10 +226,10 @@ def stack_columns(diameter: Array | float, length: Array, precision: Precision) 
 
 def carrying(arms: ArmArrays, shape: LoadShape) -> ArmArrays:
     """Return arms whose payloads have this shape in their tip frames."""
-    arms = replace(arms, tip_bodies=stack_tip_bodies(arms.tool, shape, arms.precision))
     if shape == POINT_LOAD:
         return arms
-    frame = arms.tool.frame
+    x, z = arms.tool.side, arms.tool.axis
+    frame = np.stack([x, np.cross(z, x), z], axis=-1)  # (N, 3, 3) of the tip
     center = (frame @ np.array(shape.center)).astype(arms.precision)
     gyration = frame @ np.diag(shape.gyration) @ frame.swapaxes(-1, -2)
     return replace(arms, payload_center=center, payload_gyration=gyration)

@@ -69,13 +69,6 @@ class Tools(PerArm):
     mass: Array  # (N,) [kg]
     com: Array  # (N, 3) centre of mass, from the end of the last link [m]
     inertia: Array  # (N, 3, 3) about the centre of mass [kg m²]
-    size: Array  # (N, 3) sides of its box about the centre of mass, along the tip frame [m]; 0 for none
-    radius: Array  # (N,) of its cylinder from the end of the last link to the tip [m]; 0 for none
-
-    @property
-    def frame(self) -> Array:
-        """(N, 3, 3) x, y and z axis of the tip frame as columns."""
-        return np.stack([self.side, np.cross(self.axis, self.side), self.axis], axis=-1)
 
 
 @dataclass(frozen=True)

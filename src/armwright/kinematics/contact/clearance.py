@@ -13,7 +13,7 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.arms.motor_bodies import bodies_in, without_bodies
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.devices import Device, load_kernels
-from armwright.tasks.obstacles import SHAPES, Obstacle
+from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
 from armwright.tasks.tip_rules import TipRules
 
 MAX_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
@@ -78,22 +78,24 @@ def _distances(
         links.launch("obstacle_clearance", dim, posed, solids, free)
     if arms.columns is not None:
         links.launch("column_clearance", dim, posed, arms.columns, own)
-    tip = None if rules is None else arms.tip_bodies
-    if arms.motor_bodies is not None or tip is not None:
+    at_tip = {} if rules is None else rules.solids
+    if arms.motor_bodies is not None or at_tip:
         motors = load_kernels("contact.motor_kernels", device, arms.precision)
         bodies = arms.motor_bodies or bodies_in(without_bodies(*q.shape[::2]), arms.precision)
-        body = {name: getattr(bodies, name) for name in ("shape", "half", "centre")}
-        if tip is not None:
-            body = {name: np.concatenate([values, getattr(tip, name)], axis=1) for name, values in body.items()}
-        centre, size = body.pop("centre"), (*dim, body["shape"].shape[1])
-        body |= {
+        tip, tool, size = _stacked(tuple(at_tip.values())), arms.tool, (*dim, arms.dof + len(at_tip))
+        body = {
+            "shape": np.hstack([bodies.shape, np.tile(tip["shape"], (len(arms), 1))]),
+            "half": np.hstack([bodies.half, np.tile(tip["half"], (len(arms), 1, 1))]),
             "middle": motors.empty(size, links.kernels.Vector3),
             "into": motors.empty(size, motors.kernels.Matrix3),
+            "payload": arms.dof + ("tool" in at_tip),
+            "carries": np.empty(0) if rules is None else rules.carries,
+            "allowed": np.empty((0, 0)) if rules is None else rules.allowed,
         }
-        carries, allowed = (np.empty(0), np.empty((0, 0))) if rules is None else (rules.carries, rules.allowed)
-        placed = motors.struct("Motors", body | {"carries": carries, "allowed": allowed})
-        tip_into = np.empty((len(arms), 0, 3, 3)) if tip is None else tip.into
-        motors.launch("motor_frames", dim, posed, bodies.axis, centre, tip_into, placed)
+        placed = motors.struct("Motors", body)
+        frame = np.stack([tool.side, np.cross(tool.axis, tool.side), tool.axis], axis=1)
+        at = motors.struct("Solids", tip)
+        motors.launch("motor_frames", dim, posed, bodies.axis, bodies.centre, tool.tip, frame, at, placed)
         motors.launch("self_clearance", dim, posed, placed, own)
         if solids is not None:
             motors.launch("obstacle_clearance", dim, posed, placed, solids, free)
@@ -105,13 +107,15 @@ def _distances(
 @cache
 def _solids(obstacles: tuple[Obstacle, ...], precision: Precision, device: Device) -> Any:
     """Return the obstacles as the kernels take them."""
-    solids = [obstacle.solid for obstacle in obstacles]
-    return load_kernels("contact.clearance_kernels", device, precision).struct(
-        "Solids",
-        {
-            "shape": np.array([SHAPES.index(solid.shape) for solid in solids]),
-            "centre": np.array([solid.centre for solid in solids]),
-            "into": np.array([solid.rotation.T for solid in solids]),
-            "half": np.array([solid.half for solid in solids]),
-        },
-    )
+    solids = _stacked([obstacle.solid for obstacle in obstacles])
+    return load_kernels("contact.clearance_kernels", device, precision).struct("Solids", solids)
+
+
+def _stacked(solids: Sequence[Solid]) -> dict[str, NDArray[Any]]:
+    """Return the fields of `Solids`."""
+    return {
+        "shape": np.array([SHAPES.index(solid.shape) for solid in solids], dtype=np.int32),
+        "centre": np.array([solid.centre for solid in solids]).reshape(-1, 3),
+        "into": np.array([solid.rotation.T for solid in solids]).reshape(-1, 3, 3),
+        "half": np.array([solid.half for solid in solids]).reshape(-1, 3),
+    }

@@ -33,12 +33,15 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
         arms: Posed,
         axis: wp.array2d(dtype=int),
         centre: wp.array2d(dtype=Vector3),
-        tip_into: wp.array2d(dtype=Matrix3),
+        tip: wp.array(dtype=Vector3),
+        tip_into: wp.array(dtype=Matrix3),
+        at_tip: Solids,
         motors: Motors,
     ):
         """Compute the middle of each body, and the rotation into its frame, by forward kinematics.
 
-        axis: (N, D), as of `MotorBodies`.  centre: (N, K) [m].  tip_into: (N, 2), as of `TipBodies`.
+        axis, centre [m]: (N, D), as of `MotorBodies`.  tip, tip_into: (N,) of the tip frame in that of the last link's end
+        [m].  at_tip: tool and payload.
         """
         arm, target = wp.tid()
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
@@ -54,15 +57,17 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                 else:
                     motors.into[arm, target, j] = wp.matrix_from_rows(x, y, z)
             _place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z)
-        for b in range(arms.motion.shape[1], motors.shape.shape[1]):
-            c = centre[arm, b]
-            motors.middle[arm, target, b] = p + c[0] * x + c[1] * y + c[2] * z
-            motors.into[arm, target, b] = tip_into[arm, b - arms.motion.shape[1]] * wp.matrix_from_rows(x, y, z)
+        t = tip[arm]
+        p += t[0] * x + t[1] * y + t[2] * z
+        into = tip_into[arm] * wp.matrix_from_rows(x, y, z)
+        for k in range(at_tip.shape.shape[0]):
+            motors.middle[arm, target, arms.motion.shape[1] + k] = p + wp.transpose(into) * at_tip.centre[k]
+            motors.into[arm, target, arms.motion.shape[1] + k] = at_tip.into[k] * into
 
     @wp.func
-    def kind_of(motors: Motors, arm: int, target: int, body: int, dof: int):
+    def kind_of(motors: Motors, arm: int, target: int, body: int):
         """Return the shape of a body, below 0 for none; of a payload where it is carried."""
-        if body > dof and motors.carries[target] == 0:
+        if body >= motors.payload and motors.carries[target] == 0:
             return -1
         return motors.shape[arm, body]
 
@@ -92,11 +97,11 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
         dof = arms.motion.shape[1]
         nearest = clearance[arm, target]
         for i in range(motors.shape.shape[1]):
-            kind = kind_of(motors, arm, target, i, dof)
+            kind = kind_of(motors, arm, target, i)
             if kind >= 0:
                 size, place, frame = motors.half[arm, i], motors.middle[arm, target, i], motors.into[arm, target, i]
                 for j in range(i + 1, motors.shape.shape[1]):
-                    other = kind_of(motors, arm, target, j, dof)
+                    other = kind_of(motors, arm, target, j)
                     if other >= 0 and (j < dof or n_links(arms, arm, i) > 1):
                         d = motors.middle[arm, target, j] - place
                         other_size = motors.half[arm, j]
@@ -137,7 +142,7 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
         nearest = clearance[arm, target]
         is_at_rest = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
         for j in range(motors.shape.shape[1]):
-            kind = kind_of(motors, arm, target, j, dof)
+            kind = kind_of(motors, arm, target, j)
             if kind >= 0:
                 place, box = motors.middle[arm, target, j], motors.half[arm, j]
                 for o in range(solids.shape.shape[0]):
@@ -178,7 +183,7 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
             nearest = clearance[arm, target]
             is_at_rest = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
             for j in range(motors.shape.shape[1]):
-                kind = kind_of(motors, arm, target, j, arms.motion.shape[1])
+                kind = kind_of(motors, arm, target, j)
                 if kind >= 0 and is_at_rest == 0:
                     d = motors.middle[arm, target, j] - centre
                     box = motors.half[arm, j]
@@ -192,7 +197,7 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
             clearance[arm, target] = nearest
 
     return SimpleNamespace(
-        Matrix3=Matrix3, Motors=Motors,
+        Matrix3=Matrix3, Motors=Motors, Solids=Solids,
         motor_frames=motor_frames, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance,
         column_clearance=column_clearance,
     )  # fmt: skip

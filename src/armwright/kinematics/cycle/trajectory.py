@@ -46,7 +46,7 @@ def sample_trajectory(
     # The row at which a motion begins is the last one of the dwell before it.
     motion = np.maximum(np.searchsorted(begin[:-1], time - SAME_TIME) - 1, 0)
     q, qd, qdd = np.empty((3, len(time), arm.dof))
-    allowed = np.empty((len(time), plan.allowed.shape[1]))
+    allowed = np.empty((len(time), plan.tip_rules.allowed.shape[1]))
     for index, path in enumerate(paths):
         rows = motion == index
         q[rows], qd[rows], qdd[rows] = _states(path, time[rows] - begin[index], durations[index])

@@ -26,7 +26,7 @@ def check_obstacles(problem: Problem) -> Iterator[Finding]:
     slack = ROUNDING * (1.0 + np.abs(task.target_positions).max())
     # A first link stands on what it is mounted on, and is measured from above its foot.
     has_other_links = problem.space.min_joints > 1
-    for obstacle, allowed in zip(task.obstacles, task.allowed_depths.T, strict=True):
+    for obstacle, allowed in zip(task.obstacles, task.tip_rules.allowed.T, strict=True):
         distance = obstacle.solid.signed_distance(task.target_positions)
         nearest = distance + error + task.tool.length - min(problem.space.tube_values("radius"))  # of the last link
         impossible = nearest + slack < clearance if has_other_links else np.zeros(len(distance), dtype=np.bool_)

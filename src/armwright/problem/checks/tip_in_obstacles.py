@@ -25,7 +25,7 @@ def check_tip_bodies(problem: Problem) -> Iterator[Finding]:
     they are within the circle that the body fills at every angle.
     """
     task, strict = problem.task, required_clearance(problem) >= 0.0
-    arrays, allowed, carried = task.target_arrays, np.maximum(task.allowed_depths, 0.0), task.holds_payload
+    arrays, allowed = task.target_arrays, np.maximum(task.tip_rules.allowed, 0.0)
     for i in np.flatnonzero(arrays.n_angular).tolist():
         for name, solid in task.tip_solids.items():
             points = _points(solid, bool(arrays.n_angular[i] == ORIENTATION))
@@ -34,7 +34,7 @@ def check_tip_bodies(problem: Problem) -> Iterator[Finding]:
             slack = allowed_errors(problem)[i] + arrays.angle_tolerance[i] * reach
             for obstacle, limit in zip(task.obstacles, allowed[i].tolist(), strict=True):
                 deep = _depth(obstacle, body)
-                if deep <= limit + ROUNDING or (name == "payload" and not carried[i]):
+                if deep <= limit + ROUNDING or (name == "payload" and not problem.scenes[0].payload[i]):
                     continue
                 back = np.zeros(3)  # along the tool's axis, until the body is free
                 for _ in range(SHIFTS):
