@@ -109,8 +109,8 @@ class _Driver:
         self._full = float(self._model.body_mass[self._payload]), self._model.body_inertia[self._payload].copy()
         self._tip = self._model.site("tip").id
         self._contacts: dict[tuple[str, str], Contact] = {}
-        names = [str(self._model.geom(i).name) for i in range(self._model.ngeom)]
-        self._obstacles = {name: o for o, name in enumerate(name for name in names if name.startswith("obstacle_"))}
+        names = (str(self._model.geom(i).name) for i in range(self._model.ngeom))
+        self._obstacles = {name: o for o, name in enumerate(filter(lambda name: name.startswith("obstacle_"), names))}
 
     def run(self) -> Drive:
         """Drive the whole cycle."""
@@ -178,16 +178,13 @@ class _Driver:
 
     def _note_contacts(self, row: int) -> None:
         """Note what touches, except for what tool and payload may touch at a row of the trajectory."""
+        carried, allowed = self._trajectory.payload[row] > 0.0, self._trajectory.allowed[row]
         for contact in self._data.contact:
             first, second = sorted(self._model.geom(int(geom)).name for geom in contact.geom)
-            tips = {first, second} & {"tool", "payload"}
-            if (
-                tips
-                and first in self._obstacles
-                and -contact.dist <= self._trajectory.allowed[row, self._obstacles[first]]
-            ):
-                continue
-            if "payload" in tips and self._trajectory.payload[row] == 0.0:
+            depth = (
+                allowed[self._obstacles[first]] if first in self._obstacles and second in ("payload", "tool") else -1.0
+            )
+            if -contact.dist <= depth or (second == "payload" and not carried):
                 continue
             known = self._contacts.get((first, second))
             time = float(self._data.time) if known is None else known.time

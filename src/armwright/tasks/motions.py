@@ -165,14 +165,11 @@ class CyclePlan:
 
     def rules(self, motion: Motion, share: Array) -> TipRules:
         """Return what holds at shares (S,) of a motion: the rules of its targets, on a joint motion near its ends."""
-        start, end = self.tip_rules.allowed[[motion.start, motion.end]]
-        is_line = motion.by == "line"
-        near_start, near_end = is_line | (share < NEAR_END), is_line | (share > 1.0 - NEAR_END)
-        at_start, at_end = (
-            np.where(near[:, None], allowed, APART) for near, allowed in ((near_start, start), (near_end, end))
-        )
+        is_line, ends = motion.by == "line", self.tip_rules.allowed[[motion.start, motion.end]]
+        near = is_line | np.stack([share < NEAR_END, share > 1.0 - NEAR_END])  # (2, S) its ends
+        allowed = np.where(near[..., None], ends[:, None], APART).max(axis=0)
         carries = np.full(len(share), motion.carries and self.tip_rules.carries.any())
-        return TipRules(carries, np.maximum(at_start, at_end), self.tip_rules.solids)
+        return TipRules(carries, allowed, self.tip_rules.solids)
 
     def sampled_rules(self, samples: LineSamples) -> TipRules:
         """Return what holds at samples of lines; at those that motions share, what holds for any of them."""

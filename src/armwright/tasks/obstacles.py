@@ -53,11 +53,6 @@ class Record(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     kind: Shape
     name: ObstacleName = ""  # for messages and drawings
 
-    @property
-    def label(self) -> str:
-        """Its name, else its kind."""
-        return self.name or self.kind
-
     def describe(self) -> str:
         """Return a description on one line."""
         return f"{self.name}: {self._describe()}" if self.name else self._describe()

@@ -24,7 +24,7 @@ from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
 from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, Solid
 from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload
 from armwright.tasks.targets import MAX_COORDINATE, Point, Target, TargetArrays, check_length, stack_targets
-from armwright.tasks.tip_rules import APART, Solids, TipRules, check_names, placed, resting_surfaces, tip_solids
+from armwright.tasks.tip_rules import Solids, TipRules, allowed_depths, placed, tip_solids
 from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.tasks.workspace import MAX_POINTS, MAX_POSES, MAX_REGIONS, Region
 
@@ -144,7 +144,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             if name in seen:
                 raise ValueError(f'targets: two are named "{name}"; give each its own name')
             seen.add(name)
-        check_names(self._records, self.obstacles)
+        allowed_depths(self._records, self.target_arrays, self.obstacles, {})  # raises for unknown names
         if self.cycle is not None:
             _check_obstacles(self.plan(self.target_positions), self.obstacles)
         return self
@@ -201,13 +201,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @property
     def tip_rules(self) -> TipRules:
         """Tool and payload as bodies at the T targets, and what they may touch there."""
-        names, tolerance = [obstacle.name for obstacle in self.obstacles], self.target_arrays.tolerance
-        allowed = np.full((len(self.targets), len(names)), APART)
-        for i, (record, surface) in enumerate(zip(self._records, self.surfaces, strict=True)):
-            if surface is not None:
-                allowed[i, surface] = tolerance[i]
-            if record and record.into:
-                allowed[i, names.index(record.into)] = np.inf
+        allowed = allowed_depths(self._records, self.target_arrays, self.obstacles, self.tip_solids)
         return TipRules(self.payloads > 0.0, allowed, self.tip_solids)
 
     @property
@@ -227,22 +221,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             for name, solid in self.tip_solids.items()
             if name == "tool" or carried[i]
         ]
-
-    @property
-    def surfaces(self) -> tuple[int | None, ...]:
-        """Index of the obstacle that each target rests on: the one that it names, else the one beyond the tip."""
-        return resting_surfaces(self._records, self.target_arrays, self.obstacles, self.tip_solids)
-
-    @property
-    def surfaces_description(self) -> str:
-        """What tool and payload may touch at the targets, on one line; empty if they are no bodies."""
-        groups: dict[str, list[str]] = {}
-        for name, record, surface in zip(self.target_names, self._records, self.surfaces, strict=True):
-            on, into = "" if surface is None else self.obstacles[surface].label, record.into if record else ""
-            assumed = "" if record and record.on else " (assumed)"
-            where = [f"on {on}{assumed}"] * (on not in ("", into)) + [f"into {into}"] * bool(into)
-            groups.setdefault(" and ".join(where) or "on nothing", []).append(name)
-        return "; ".join(f"{', '.join(names)} {where}" for where, names in groups.items()) * bool(self.tip_solids)
 
     @property
     def target_names(self) -> tuple[str, ...]:

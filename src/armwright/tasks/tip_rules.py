@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.exceptions import did_you_mean
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
-from armwright.tasks.obstacles import Obstacle, Shape, Solid
+from armwright.tasks.obstacles import Obstacle, Solid
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import Target, TargetArrays
 from armwright.tasks.tool import Tool
@@ -48,55 +48,55 @@ def tip_solids(tool: Tool, payload: Payload | None) -> Solids:
     found: dict[Literal["tool", "payload"], Solid] = {}
     turn = rotation_from_rpy(*tool.rpy).T  # from the tool's frame into the tip frame
     if tool.size is not None:
-        found["tool"] = _solid("box", turn @ np.subtract(tool.center, tool.tip), np.eye(3), np.array(tool.size) / 2)
+        x, y, z = tool.size
+        box = Solid("box", (0.0, 0.0, 0.0), turn.T, (x / 2, y / 2, z / 2))
+        found["tool"] = placed(box, turn @ np.subtract(tool.center, tool.tip), turn)
     if tool.radius is not None:
-        half = np.array([tool.radius, tool.radius, tool.length / 2])
-        found["tool"] = _solid("cylinder", turn @ np.array(tool.tip) / -2, turn @ rotation_to_axis(tool.tip), half)
+        half = tool.radius, tool.radius, tool.length / 2
+        cylinder = Solid("cylinder", (0.0, 0.0, 0.0), rotation_to_axis(tool.tip), half)
+        found["tool"] = placed(cylinder, turn @ np.array(tool.tip) / -2, turn)
     if payload is not None and payload.size is not None:
-        found["payload"] = _solid("box", np.array(payload.center), np.eye(3), np.array(payload.size) / 2)
+        x, y, z = payload.size
+        found["payload"] = Solid("box", payload.center, np.eye(3), (x / 2, y / 2, z / 2))
     return found
 
 
 def placed(solid: Solid, position: Array, rotation: Array) -> Solid:
-    """Return a solid of the tip frame in the world; position: (3,) of the tip [m].  rotation: (3, 3) of its frame."""
-    return _solid(solid.shape, position + rotation @ solid.centre, rotation @ solid.rotation, np.array(solid.half))
+    """Return a solid in the frame at `position` (3,) [m] with the axes `rotation` (3, 3) as columns."""
+    x, y, z = (position + rotation @ solid.centre).tolist()
+    return Solid(solid.shape, (x, y, z), rotation @ solid.rotation, solid.half)
 
 
-def _solid(shape: Shape, centre: Array, rotation: Array, half: Array) -> Solid:
-    (x, y, z), (a, b, c) = centre.tolist(), half.tolist()
-    return Solid(shape, (x, y, z), rotation, (a, b, c))
-
-
-def resting_surfaces(
+def allowed_depths(
     targets: Sequence[Target | None], arrays: TargetArrays, obstacles: Sequence[Obstacle], solids: Solids
-) -> tuple[int | None, ...]:
-    """Return the index of the obstacle that each of T targets rests on, None for none.
+) -> Array:
+    """Return (T, O) the depths that targets allow, as `TipRules.allowed` [m]; None for a target that is a mere point.
 
-    It is the one that the target names, else the first one met along the tool's z axis, up to 5 cm beyond tip and
-    payload. Without a direction, or a body, a target rests on nothing that it does not name.
+    A target rests on the obstacle that it names, else on the first one met along the tool's z axis, up to 5 cm beyond
+    tip and payload. Without a direction, or a body, a target rests on nothing that it does not name.
     """
-    names = [obstacle.name for obstacle in obstacles]
     reach = max([0.0, *(solid.centre[2] + solid.half[2] for name, solid in solids.items() if name == "payload")])
-    share = np.arange(0.0, reach + BEYOND, STEP)[:, None]
-    found: list[int | None] = []
-    for target, n_angular, rotation in zip(targets, arrays.n_angular, arrays.rotation, strict=True):
-        index = names.index(target.on) if target and target.on else None
-        if target and not target.on and n_angular and solids and obstacles:
-            ray = target.position + share * rotation[:, 2]
+    share, allowed = np.arange(0.0, reach + BEYOND, STEP)[:, None], np.full((len(targets), len(obstacles)), APART)
+    for i, target in enumerate(targets):
+        if target and target.on:
+            allowed[i, _named(target.on, "on", i, obstacles)] = arrays.tolerance[i]
+        elif target and arrays.n_angular[i] and solids and obstacles:
+            ray = target.position + share * arrays.rotation[i, :, 2]
             inside = np.array([obstacle.solid.contains(ray, -STEP) for obstacle in obstacles])  # (O, S)
-            index = int(inside[:, inside.any(axis=0).argmax()].argmax()) if inside.any() else None
-        found.append(index)
-    return tuple(found)
+            if inside.any():
+                allowed[i, inside[:, inside.any(axis=0).argmax()].argmax()] = arrays.tolerance[i]
+        if target and target.into:
+            allowed[i, _named(target.into, "into", i, obstacles)] = np.inf
+    return allowed
 
 
-def check_names(targets: Sequence[Target | None], obstacles: Sequence[Obstacle]) -> None:
-    """Raise ValueError if a target rests on or reaches into an obstacle that does not exist, or has no unique name."""
+def _named(name: str, key: str, target: int, obstacles: Sequence[Obstacle]) -> int:
+    """Return the index of the obstacle of this name; ValueError if there is none, or several."""
     names = [obstacle.name for obstacle in obstacles]
-    for number, target in enumerate(targets, start=1):
-        for word, name in (("on", target.on), ("into", target.into)) if target else ():
-            if name and names.count(name) != 1:
-                known = ", ".join(filter(None, names)) or "none has a name"
-                raise ValueError(
-                    f'target {target.name or number}: {word}: expected the name of one obstacle, got "{name}".'
-                    f"{did_you_mean(name, names)} Obstacles: {known}"
-                )
+    if names.count(name) != 1:
+        known = ", ".join(filter(None, names)) or "none has a name"
+        raise ValueError(
+            f'target {target + 1}: {key}: expected the name of one obstacle, got "{name}".'
+            f"{did_you_mean(name, names)} Obstacles: {known}"
+        )
+    return names.index(name)

@@ -40,7 +40,7 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
     ):
         """Compute the middle of each body, and the rotation into its frame, by forward kinematics.
 
-        axis, centre [m]: (N, D), as of `MotorBodies`.  tip, tip_into: (N,) of the tip frame in that of the last link's end
+        axis, centre [m]: (N, D), as of `MotorBodies`.  tip, tip_into: (N,) of the tip frame in that of the last link
         [m].  at_tip: tool and payload.
         """
         arm, target = wp.tid()
@@ -72,15 +72,6 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
         return motors.shape[arm, body]
 
     @wp.func
-    def n_links(arms: Posed, arm: int, first: int):
-        """Return the number of links with a length from this one on."""
-        n = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-        for k in range(first, arms.radius.shape[1]):
-            if arms.radius[arm, k] > zero:
-                n += 1
-        return n
-
-    @wp.func
     def from_link(
         nearest: real, shape: int, half: Vector3, middle: Vector3, into: Matrix3, a: Vector3, b: Vector3, radius: real
     ):
@@ -100,15 +91,6 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
             kind = kind_of(motors, arm, target, i)
             if kind >= 0:
                 size, place, frame = motors.half[arm, i], motors.middle[arm, target, i], motors.into[arm, target, i]
-                for j in range(i + 1, motors.shape.shape[1]):
-                    other = kind_of(motors, arm, target, j)
-                    if other >= 0 and (j < dof or n_links(arms, arm, i) > 1):
-                        d = motors.middle[arm, target, j] - place
-                        other_size = motors.half[arm, j]
-                        if wp.length(d) - wp.length(size) - wp.length(other_size) < nearest:
-                            between = motors.into[arm, target, j] * wp.transpose(frame)
-                            found = separation(frame * d, kind, size, between, other, other_size, nearest)
-                            nearest = wp.min(nearest, found)
                 links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
                 for k in range(i, dof):
                     r = arms.radius[arm, k]
@@ -117,6 +99,15 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                             start, end = arms.starts[arm, target, k], arms.ends[arm, target, k]
                             nearest = from_link(nearest, kind, size, place, frame, start, end, r)
                         links_between += 1
+                for j in range(i + 1, motors.shape.shape[1]):
+                    other = kind_of(motors, arm, target, j)
+                    if other >= 0 and (j < dof or links_between > 1):
+                        d = motors.middle[arm, target, j] - place
+                        other_size = motors.half[arm, j]
+                        if wp.length(d) - wp.length(size) - wp.length(other_size) < nearest:
+                            between = motors.into[arm, target, j] * wp.transpose(frame)
+                            found = separation(frame * d, kind, size, between, other, other_size, nearest)
+                            nearest = wp.min(nearest, found)
                 links_before = int(0)  # noqa: RUF046, UP018
                 n_joints = int(0)  # noqa: RUF046, UP018
                 reach = real(0.0)  # [m] along the arm, from the end of link k to tool and payload

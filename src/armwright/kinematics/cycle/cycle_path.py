@@ -238,24 +238,23 @@ def _look_between(
     that do not touch anything there but come near.
     """
     motions = [i for i, path in enumerate(group.paths) if path.motion.by == "joint"]
-    least = clearance.min(axis=0)[group.index].min(axis=1)
-    rows = np.flatnonzero((least > 0.0) & (least < NEAR)) if motions else []
-    if not len(rows):
+    least = clearance[:, group.index].min(axis=(0, 2))
+    rows = np.flatnonzero((least > 0.0) & (least < NEAR))
+    if not motions or not len(rows):
         return
-    place = np.ix_(group.index[rows], motions)
-    start, end = (np.stack([group.paths[i].q[rows, end] for i in motions], axis=1)[:, :, None] for end in (0, -1))
+    arms, place = group.arms[rows], np.ix_(group.index[rows], motions)
+    ends = np.stack([group.paths[i].q[rows][:, [0, -1]] for i in motions], axis=1)[:, :, None]  # (n, m, 1, 2, D)
     step = np.array([1.0 / (group.paths[i].q.shape[1] - 1) for i in motions])[:, None]
-    middle = np.full(len(BETWEEN), 0.5)
-    rules = joined_rules([plan.rules(group.paths[i].motion, middle) for i in motions])
+    rules = joined_rules([plan.rules(group.paths[i].motion, np.full(len(BETWEEN), 0.5)) for i in motions])
     for _ in range(ZOOMS):
         step = step / 4.0
-        share = np.clip(worst[place][:, :, None] + step * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (n, m, S)
-        q = start + share[..., None] * (end - start)
-        found = np.stack(clearances(group.arms[rows], q.reshape(len(rows), -1, q.shape[-1]), obstacles, device, rules))
+        share = np.clip(worst[place][..., None] + step * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (n, m, S)
+        q = ends[..., 0, :] + share[..., None] * (ends[..., 1, :] - ends[..., 0, :])
+        found = np.stack(clearances(arms, q.reshape(len(rows), -1, arms.dof), obstacles, device, rules))
         found = found.reshape(2, *share.shape)
-        at, nearer = found.min(axis=0).argmin(axis=2)[..., None], found.min(axis=(0, 3)) < clearance.min(axis=0)[place]
-        worst[place] = np.where(nearer, np.take_along_axis(share, at, axis=2)[..., 0], worst[place])
-        clearance[:, place[0], place[1]] = np.minimum(clearance[:, place[0], place[1]], found.min(axis=3))
+        best = np.take_along_axis(share, found.min(axis=0).argmin(axis=2)[..., None], axis=2)[..., 0]
+        worst[place] = np.where(found.min(axis=(0, 3)) < clearance[:, *place].min(axis=0), best, worst[place])
+        clearance[:, *place] = np.minimum(clearance[:, *place], found.min(axis=3))
 
 
 def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> list[Any]:

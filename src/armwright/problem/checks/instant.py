@@ -7,12 +7,11 @@ from armwright.problem.checks.base_motor import check_base_motor
 from armwright.problem.checks.bounds import check_constraints
 from armwright.problem.checks.finding import Finding
 from armwright.problem.checks.idle_objectives import check_idle_objectives
-from armwright.problem.checks.inside_obstacles import check_obstacles
+from armwright.problem.checks.inside_obstacles import check_obstacles, check_tip_bodies
 from armwright.problem.checks.magnitudes import check_magnitudes
 from armwright.problem.checks.reach import check_reach
 from armwright.problem.checks.requirements import check_requirements
 from armwright.problem.checks.strength import check_strength
-from armwright.problem.checks.tip_in_obstacles import check_tip_bodies
 from armwright.problem.problem import Problem
 
 
