@@ -245,3 +245,20 @@ def test_torques_between_the_instants_of_loads_are_not_higher() -> None:
             claimed = np.abs(loads.torques[row]).max(axis=(0, 1))
             peak = np.abs(trajectory_of(problem.arm(design), evaluation, row).tau).max(axis=0)
             assert (peak - claimed < 0.05 * np.maximum(claimed, 0.1 * actuation.peak[row])).all()
+
+
+def test_payload_may_touch_what_its_target_allows_and_nothing_else(desk: Desk) -> None:
+    """The payload reaches 30 mm below the tip; it is 1 mm in a table, and 15 mm in a plate."""
+    low = {"kind": "ground", "name": "table", "z": float(desk.problem.task.target_positions[:, 2].min()) - 0.029}
+    targets = [target.model_dump() | {"tolerance": 0.002} for target in desk.problem.task.targets]
+    payload = {"mass": 0.5, "size": [0.02, 0.02, 0.06]}
+    resting = Desk(targets=targets, payload=payload, obstacles=[low])
+    assert resting.trajectory.allowed.max() == pytest.approx(0.002)
+    assert (resting.trajectory.allowed == APART).any()
+    touching = [contact.geoms for contact in resting.simulate().contacts]
+    assert ("obstacle_table", "payload") not in touching
+    assert resting.evaluation.obstacle_clearance.min() > 0.0
+    deep = Desk(targets=targets, payload=payload, obstacles=[low | {"z": low["z"] + 0.014}])
+    touching = {contact.geoms: contact.depth for contact in deep.simulate().contacts}
+    assert touching["obstacle_table", "payload"] == pytest.approx(0.015, abs=1e-3)
+    assert deep.evaluation.obstacle_clearance.min() == pytest.approx(-0.013, abs=1e-4)
