@@ -32,11 +32,10 @@ def joined_by_tip(arm: Arm) -> tuple[list[int], list[int]]:
     """
     solid = [n for n, link in enumerate(arm.links) if link.length > 0.0]
     motors = [j for j, joint in enumerate(arm.joints) if joint.body is not None and sum(n >= j for n in solid) < 2]
-    links: list[int] = []
-    for n in solid:
-        rigid = all(one.kind == "fixed" for one in arm.joints[n + 1 :])
-        if rigid or n == solid[-1] or sum(link.length for link in arm.links[n + 1 :]) <= arm.links[n].radius:
-            links.append(n)
+    links = [
+        n for n in solid if n == solid[-1] or all(one.kind == "fixed" for one in arm.joints[n + 1 :])
+        or sum(link.length for link in arm.links[n + 1 :]) <= arm.links[n].radius
+    ]  # fmt: skip
     return motors, links
 
 

@@ -28,9 +28,7 @@ class TipRules:
     """Tool and payload as bodies at S samples, and what they may touch there."""
 
     carries: NDArray[np.bool_]  # (S,) whether the payload is carried
-    allowed: (
-        Array  # (S, O) depth of tool and payload in each obstacle that does not count [m]; APART, infinite in holes
-    )
+    allowed: Array  # (S, O) their depth in each obstacle that does not count [m]; APART, infinite in holes
     solids: Solids
 
     def __getitem__(self, part: NDArray[np.intp] | slice) -> "TipRules":

@@ -21,11 +21,7 @@ SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than th
 
 
 def clearances(
-    arms: ArmArrays,
-    q: Array,
-    obstacles: Sequence[Obstacle] = (),
-    device: Device = "cpu",
-    rules: TipRules | None = None,
+    arms: ArmArrays, q: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu", rules: TipRules | None = None
 ) -> tuple[Array, Array]:
     """Return the (N, T) self-clearance and obstacle clearance [m] of arms in postures q (N, T, D) [rad] or [m].
 

@@ -30,14 +30,9 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
 
     @kernel
     def motor_frames(
-        arms: Posed,
-        axis: wp.array2d(dtype=int),
-        centre: wp.array2d(dtype=Vector3),
-        tip: wp.array(dtype=Vector3),
-        tip_into: wp.array(dtype=Matrix3),
-        at_tip: Solids,
-        motors: Motors,
-    ):
+        arms: Posed, axis: wp.array2d(dtype=int), centre: wp.array2d(dtype=Vector3), tip: wp.array(dtype=Vector3),
+        tip_into: wp.array(dtype=Matrix3), at_tip: Solids, motors: Motors,
+    ):  # fmt: skip
         """Compute the middle of each body, and the rotation into its frame, by forward kinematics.
 
         axis, centre [m]: (N, D), as of `MotorBodies`.  tip, tip_into: (N,) of the tip frame in that of the last link
@@ -135,24 +130,15 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
         for j in range(motors.shape.shape[1]):
             kind = kind_of(motors, arm, target, j)
             if kind >= 0:
-                place, box = motors.middle[arm, target, j], motors.half[arm, j]
+                place, box, frame = motors.middle[arm, target, j], motors.half[arm, j], motors.into[arm, target, j]
                 for o in range(solids.shape.shape[0]):
                     allowed = real(-1.0)
                     if j >= dof:
                         allowed = motors.allowed[target, o]
-                    d = solids.centre[o] - place
-                    bound = signed_distance(solids.shape[o], -(solids.into[o] * d), solids.half[o]) - wp.length(box)
+                    d, turn = solids.centre[o] - place, solids.into[o]
+                    bound = signed_distance(solids.shape[o], -(turn * d), solids.half[o]) - wp.length(box)
                     if bound < nearest:
-                        found = from_obstacle(
-                            kind,
-                            box,
-                            motors.into[arm, target, j],
-                            d,
-                            solids.shape[o],
-                            solids.half[o],
-                            solids.into[o],
-                            nearest,
-                        )
+                        found = from_obstacle(kind, box, frame, d, solids.shape[o], solids.half[o], turn, nearest)
                         found += wp.max(allowed, zero)
                         # A body at rest is always close to what the arm is mounted on, tool and payload to what they
                         # may touch: only overlaps count, and only what is deeper than allowed.
