@@ -12,15 +12,18 @@ import pytest
 from numpy.typing import NDArray
 
 from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.contact.clearance import clearances
+from armwright.problem.evaluation import evaluate
 from armwright.problem.scene import Scene
 from armwright.proof.simulation_model import to_simulation_mjcf
-from armwright.robot.arm import Arm
+from armwright.robot.arm import Arm, Joint, Link
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.tool_mount import with_tool
 from armwright.tasks.obstacles import Box, Obstacle
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import position_targets
+from armwright.tasks.task import Task
 from armwright.tasks.tip_rules import APART, TipRules, tip_solids
 from armwright.tasks.tool import Tool
 from tests.kinematics.test_clearance import agree, apart, coal_shape, random_obstacle
@@ -123,3 +126,23 @@ def test_depths_up_to_what_is_allowed_do_not_count() -> None:
         rules = TipRules(np.full(5, held), allowed, solids)
         found = clearances(arrays, np.zeros((1, 5, arrays.dof)), [ceiling], rules=rules)[1][0]
         assert found == pytest.approx(wanted, abs=2e-5)
+
+
+def test_payload_that_passes_an_obstacle_between_samples_collides() -> None:
+    """A ball of 1 mm is in the middle of a payload of 10 mm, halfway between two samples, 20 mm apart."""
+    links = [Link((0.0, 0.0, length), 0.01, (0.0, 0.0, length / 2), 0.02) for length in (0.2, 0.4, 0.35)]
+    arm = Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", axis, -1.5, 1.5) for axis in "zyy"), tuple(links))
+    payload = {"mass": 0.1, "center": [0.0, 0.0, 0.05], "size": [0.01, 0.01, 0.01]}
+    cycle = {"closed": False, "time": 1.0, "steps": [{"to": 1, "do": "pick"}, {"to": 2}]}
+    content = {"targets": [[0.4, -0.3, 0.3], [0.4, 0.3, 0.3]], "payload": payload, "cycle": cycle}
+    bare, (path,) = evaluate(arm, Task.model_validate({"name": "bare", **content})).paths.of_arm(0)
+    steps = path.q.shape[1] - 1
+    share = np.array([(steps // 2 + 0.5) / steps])
+    frames = forward_kinematics(bare, path.at(share))
+    middle = frames.tip[0, 0] + frames.rotation[0, 0, -1] @ payload["center"]
+    ball = {"kind": "sphere", "center": middle.tolist(), "radius": 0.001}
+    found = evaluate(arm, Task.model_validate({"name": "ball", "obstacles": [ball], **content}))
+    assert found.paths.obstacle_clearance[0, 0] == pytest.approx(-0.006, abs=5e-4)
+    assert found.paths.worst[0, 0, 2] == pytest.approx(share[0], abs=1 / 64 / steps)
+    empty = {**content, "payload": 0.1}
+    assert evaluate(arm, Task.model_validate({"name": "empty", "obstacles": [ball], **empty})).clearance.min() > 0.0

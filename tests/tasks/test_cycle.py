@@ -234,7 +234,7 @@ TABLE, BIN = (
 @pytest.mark.parametrize(
     ("height", "payload", "more", "wanted"),
     [
-        (0.14, PART, {}, [APART, 0.003]),  # the box is 100 mm below the tip, 50 mm below the part
+        (0.138, PART, {}, [APART, 0.003]),  # the box is 98 mm below the tip, 48 mm below the part
         (0.135, PART, {"into": "bin"}, [APART, np.inf]),
         (0.135, PART, {"on": "table"}, [0.003, APART]),
         (0.145, PART, {}, [APART, APART]),
