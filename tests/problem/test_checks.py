@@ -135,7 +135,8 @@ def test_body_in_an_obstacle_is_refused_with_the_right_height(
     def checked(height: float, **more: Any) -> list[tuple[str, str]]:
         target = {"name": "part", "position": [0.4, 0.2, height], "tolerance": 0.004, **pose, **more}
         bounds = ["collision <= 0", "unreached_targets <= 0"]
-        return found(problem([target], obstacles=[TABLE], constraints=bounds, **bodies))
+        keys = {"obstacles": [TABLE], "constraints": bounds, "objectives": ["peak_torque", "mass"], **bodies}
+        return found(problem([target], **keys))
 
     assert checked(deep / 1000) == []
     assert checked(deep / 1000 - 0.0039) == []
