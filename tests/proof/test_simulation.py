@@ -248,17 +248,19 @@ def test_torques_between_the_instants_of_loads_are_not_higher() -> None:
 
 
 def test_payload_may_touch_what_its_target_allows_and_nothing_else(desk: Desk) -> None:
-    """The payload reaches 30 mm below the tip; it is 1 mm in a table, and 15 mm in a plate."""
-    low = {"kind": "ground", "name": "table", "z": float(desk.problem.task.target_positions[:, 2].min()) - 0.029}
+    """The payload reaches 30 mm below the tip in the bin: it is 1 mm, or 15 mm in a plate."""
     targets = [target.model_dump() | {"tolerance": 0.002} for target in desk.problem.task.targets]
     payload = {"mass": 0.5, "size": [0.02, 0.02, 0.06]}
-    resting = Desk(targets=targets, payload=payload, obstacles=[low])
-    assert resting.trajectory.allowed.max() == pytest.approx(0.002)
-    assert (resting.trajectory.allowed == APART).any()
-    touching = [contact.geoms for contact in resting.simulate().contacts]
-    assert ("obstacle_table", "payload") not in touching
-    assert resting.evaluation.obstacle_clearance.min() > 0.0
-    deep = Desk(targets=targets, payload=payload, obstacles=[low | {"z": low["z"] + 0.014}])
-    touching = {contact.geoms: contact.depth for contact in deep.simulate().contacts}
-    assert touching["obstacle_table", "payload"] == pytest.approx(0.015, abs=1e-3)
-    assert deep.evaluation.obstacle_clearance.min() == pytest.approx(-0.013, abs=1e-4)
+    for deep, excess in ((0.001, 0.0), (0.015, 0.013)):
+        plate = {"kind": "box", "name": "plate", "center": [0.25, 0.0, 0.02 + deep - 0.005], "size": [0.06, 0.06, 0.01]}
+        held = Desk(targets=targets, payload=payload, obstacles=[plate])
+        assert held.trajectory.allowed.min() == APART
+        assert held.trajectory.allowed.max() == pytest.approx(0.002)
+        clear = held.evaluation.obstacle_clearance.min()
+        touching = {contact.geoms: contact.depth for contact in held.simulate().contacts}
+        if excess:
+            assert clear == pytest.approx(-excess, abs=1e-4)
+            assert touching["obstacle_plate", "payload"] == pytest.approx(deep, abs=1e-3)
+        else:
+            assert clear > 0.0
+            assert not touching
