@@ -109,8 +109,8 @@ class _Driver:
         self._full = float(self._model.body_mass[self._payload]), self._model.body_inertia[self._payload].copy()
         self._tip = self._model.site("tip").id
         self._contacts: dict[tuple[str, str], Contact] = {}
-        names = (str(self._model.geom(i).name) for i in range(self._model.ngeom))
-        self._obstacles = {name: o for o, name in enumerate(filter(lambda name: name.startswith("obstacle_"), names))}
+        geoms = (str(self._model.geom(i).name) for i in range(self._model.ngeom))
+        self._obstacles = {name: o for o, name in enumerate(filter(lambda name: name.startswith("obstacle_"), geoms))}
 
     def run(self) -> Drive:
         """Drive the whole cycle."""

@@ -36,6 +36,7 @@ from armwright.robot.mjcf import (
     joint_attributes,
 )
 from armwright.tasks.obstacles import Obstacle, Solid
+from armwright.tasks.tip_rules import Solids
 
 TIMESTEP = 0.001  # [s]
 NOTHING = 1e-9  # mass [kg] and moments of inertia [kg m²] of a payload that is not carried
@@ -224,7 +225,8 @@ def _add_payload(body: Element, arm: Arm, scene: Scene) -> None:
     moments = [mass * value for value in shape.gyration] if mass > 0.0 else [NOTHING] * 3
     inertial = {"pos": numbers(shape.center), "mass": number(mass or NOTHING), "diaginertia": numbers(moments)}
     SubElement(payload, "inertial", inertial)
-    for name, solid in (scene.tip_rules.solids if scene.tip_rules else {}).items():
+    solids: Solids = scene.tip_rules.solids if scene.tip_rules else {}
+    for name, solid in solids.items():
         SubElement(payload, "geom", {"name": name, **_geom(solid), "rgba": COLOURS["payload"], **TIP})
 
 

@@ -14,7 +14,7 @@ from armwright.kinematics.arms.motor_bodies import bodies_in, without_bodies
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.devices import Device, load_kernels
 from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
-from armwright.tasks.tip_rules import TipRules
+from armwright.tasks.tip_rules import Solids, TipRules
 
 MAX_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
 SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than they save
@@ -74,7 +74,7 @@ def _distances(
         links.launch("obstacle_clearance", dim, posed, solids, free)
     if arms.columns is not None:
         links.launch("column_clearance", dim, posed, arms.columns, own)
-    at_tip = {} if rules is None else rules.solids
+    at_tip: Solids = {} if rules is None else rules.solids
     if arms.motor_bodies is not None or at_tip:
         motors = load_kernels("contact.motor_kernels", device, arms.precision)
         bodies = arms.motor_bodies or bodies_in(without_bodies(*q.shape[::2]), arms.precision)

@@ -242,7 +242,7 @@ def _look_between(
     rows = np.flatnonzero((least > 0.0) & (least < NEAR))
     if not motions or not len(rows):
         return
-    arms, place = group.arms[rows], np.ix_(group.index[rows], motions)
+    arms, place = group.arms[rows], np.ix_(group.index[rows], np.array(motions))
     ends = np.stack([group.paths[i].q[rows][:, [0, -1]] for i in motions], axis=1)[:, :, None]  # (n, m, 1, 2, D)
     step = np.array([1.0 / (group.paths[i].q.shape[1] - 1) for i in motions])[:, None]
     rules = joined_rules([plan.rules(group.paths[i].motion, np.full(len(BETWEEN), 0.5)) for i in motions])

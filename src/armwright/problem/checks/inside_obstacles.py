@@ -110,6 +110,6 @@ def _points(solid: Solid) -> Array:
     """Return (P, 3) points that a body has at every angle about the z axis of the tip frame [m]."""
     half, middle = np.array(solid.half), np.array(solid.centre)
     radius = (half - np.abs(middle))[:2].min()
-    angle, height = np.meshgrid(np.pi * SHARES, middle[2] + half[2] * SHARES)
-    circles = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1).reshape(-1, 3)
+    angle, height = np.tile(np.pi * SHARES, len(SHARES)), np.repeat(middle[2] + half[2] * SHARES, len(SHARES))
+    circles = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
     return circles if radius >= 0.0 and abs(solid.rotation[2, 2]) > UPRIGHT else circles[:0]
