@@ -122,6 +122,35 @@ def test_target_in_an_obstacle_is_suspected_unless_the_constraints_exclude_it() 
     assert only(problem(obstacles=[box], constraints=bounds, tool={"tip": [0, 0, 0.1]}))[0] == SUSPECTED
 
 
+@pytest.mark.parametrize("pose", [{"axis": DOWN}, {"orientation": [np.pi, 0.0, 0.3]}])
+@pytest.mark.parametrize(
+    ("bodies", "name", "deep"),
+    [
+        ({"payload": {"mass": 1.0, "center": [0, 0, 0.01], "size": [0.03, 0.03, 0.08]}}, "payload", 50),
+        ({"tool": {"tip": [0, 0, 0.1], "radius": 0.02}, "payload": 1.0}, "tool", 0),
+        ({"tool": {"tip": [0, 0, 0.1], "center": [0, 0, 0.1], "size": [0.02, 0.02, 0.04]}}, "tool", 20),
+    ],
+)
+def test_body_in_an_obstacle_is_refused_with_the_right_height(
+    pose: dict[str, Any], bodies: dict[str, Any], name: str, deep: int
+) -> None:
+    def checked(height: float, **more: Any) -> list[tuple[str, str]]:
+        target = {"name": "part", "position": [0.4, 0.2, height], "tolerance": 0.004, **pose, **more}
+        bounds = ["collision <= 0", "unreached_targets <= 0"]
+        keys = {"obstacles": [TABLE], "constraints": bounds, "objectives": ["peak_torque", "mass"], **bodies}
+        return found(problem([target], **keys))
+
+    assert checked(deep / 1000) == []
+    assert checked(deep / 1000 - 0.0039) == []
+    if deep:
+        ((evidence, message),) = checked(deep / 1000 - 0.02)
+        assert evidence == PROVEN
+        assert message.startswith(f"target part: the {name} is 20 mm inside an obstacle: table: ground")
+        assert f"at most 4 mm are allowed; move the target to (0.4, 0.2, {deep / 1000:g}) m" in message
+        assert [one[0] for one in checked(deep / 1000 - 0.006)] == [SUSPECTED]
+        assert checked(deep / 1000 - 0.02, into="table") == []
+
+
 @pytest.mark.parametrize(
     "target", [[0.4, 0.2, 0.0], [0.4, 0.2, -0.0009], {"position": [*HERE[:2], -0.01], "tolerance": 0.02}]
 )

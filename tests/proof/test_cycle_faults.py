@@ -102,7 +102,7 @@ def test_colliding_step_gets_a_via_point_that_avoids_the_obstacle() -> None:
     extreme = path_extremes(evaluation.paths, 0)["clearance"]
     assert extreme.value < 0.0
     arm, (path,) = evaluation.paths.of_arm(0)
-    point = via_point(arm, path, extreme.share, evaluation.obstacles)
+    point = via_point(arm, evaluation.paths.plan, path, extreme.share, evaluation.obstacles)
     assert point is not None
     found = solve_postures(arm, point[None], initial_q=path.at(np.array([extreme.share])))
     assert found.reached[0, 0] == pytest.approx(point, abs=1e-3)

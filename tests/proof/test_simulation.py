@@ -18,6 +18,7 @@ from armwright.proof.simulation import FAIL, PASS, SimulatedDesign, simulate_des
 from armwright.robot.arm import Arm
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
+from armwright.tasks.tip_rules import APART, TipRules
 from tests import ROOT
 from tests.support.arms import LIGHT
 
@@ -198,7 +199,9 @@ def test_contacts_are_the_overlaps_of_our_clearance() -> None:
     rng = np.random.default_rng(0)
     q = rng.uniform(model.jnt_range[:, 0], model.jnt_range[:, 1], (400, 5))
     arms = blocked.evaluation.arms
-    own, clear = (values[0] for values in clearances(arms, q[None], blocked.problem.task.obstacles))
+    solids = blocked.problem.task.tip_solids
+    rules = TipRules(np.ones(len(q), dtype=np.bool_), np.full((len(q), 2), APART), solids)
+    own, clear = (values[0] for values in clearances(arms, q[None], blocked.problem.task.obstacles, rules=rules))
     touching = np.zeros((2, len(q)), dtype=bool)
     for i, values in enumerate(q):
         data.qpos[:] = values
@@ -253,3 +256,22 @@ def test_torques_between_the_instants_of_loads_are_not_higher() -> None:
             claimed = np.abs(loads.torques[row]).max(axis=(0, 1))
             peak = np.abs(trajectory_of(problem.arm(design), evaluation, row).tau).max(axis=0)
             assert (peak - claimed < 0.05 * np.maximum(claimed, 0.1 * actuation.peak[row])).all()
+
+
+def test_payload_may_touch_what_its_target_allows_and_nothing_else(desk: Desk) -> None:
+    """The payload reaches 30 mm below the tip in the bin: it is 1 mm, or 15 mm in a plate."""
+    targets = [target.model_dump() | {"tolerance": 0.002} for target in desk.problem.task.targets]
+    payload = {"mass": 0.5, "size": [0.02, 0.02, 0.06]}
+    for deep, excess in ((0.001, 0.0), (0.015, 0.013)):
+        plate = {"kind": "box", "name": "plate", "center": [0.25, 0.0, 0.02 + deep - 0.005], "size": [0.06, 0.06, 0.01]}
+        held = Desk(targets=targets, payload=payload, obstacles=[plate])
+        assert held.trajectory.allowed.min() == APART
+        assert held.trajectory.allowed.max() == pytest.approx(0.002)
+        clear = held.evaluation.obstacle_clearance.min()
+        touching = {contact.geoms: contact.depth for contact in held.simulate().contacts}
+        if excess:
+            assert clear == pytest.approx(-excess, abs=1e-4)
+            assert touching["obstacle_plate", "payload"] == pytest.approx(deep, abs=1e-3)
+        else:
+            assert clear > 0.0
+            assert not touching

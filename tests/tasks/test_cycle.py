@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation, Slerp
 from armwright.exceptions import TaskError
 from armwright.rotations import rotation_from_rpy
 from armwright.tasks.motions import Block, CyclePlan, Motion, along_line
-from armwright.tasks.targets import AXIS, ORIENTATION
+from armwright.tasks.targets import AXIS, ORIENTATION, REACHED
 from armwright.tasks.task import Task
+from armwright.tasks.tip_rules import APART
 from armwright.yaml_documents import check_document, dump_document, parse_document
 
 DOWN = [0, 0, -1]
@@ -219,3 +220,66 @@ def test_consecutive_lines_share_a_sample_and_finer_samples_keep_the_coarse_ones
     assert np.arccos(np.clip((z[1:] * z[:-1]).sum(axis=1), -1.0, 1.0)).max() <= 0.1 + 1e-9
     assert fine.poses.position[::4] == pytest.approx(coarse.poses.position, abs=1e-12)
     assert fine.poses.rotation[::4, :, 2] == pytest.approx(z, abs=1e-12)
+
+
+# What tool and payload may touch
+
+PART = {"mass": 0.1, "center": [0, 0, 0.02], "size": [0.04, 0.04, 0.06]}  # reaches 50 mm beyond the tip
+TABLE, BIN = (
+    {"kind": "ground", "name": "table", "z": 0.0},
+    {"kind": "box", "name": "bin", "center": [0.3, 0.0, 0.02], "size": [0.1, 0.1, 0.04]},
+)
+
+
+@pytest.mark.parametrize(
+    ("height", "payload", "more", "wanted"),
+    [
+        (0.138, PART, {}, [APART, 0.003]),  # the box is 98 mm below the tip, 48 mm below the part
+        (0.135, PART, {"into": "bin"}, [APART, np.inf]),
+        (0.135, PART, {"on": "table"}, [0.003, APART]),
+        (0.145, PART, {}, [APART, APART]),
+        (0.095, 0.1, {}, [APART, APART]),  # neither tool nor payload is a body
+    ],
+)
+def test_target_rests_on_what_is_first_met_unless_it_names_it(
+    height: float, payload: Any, more: dict[str, Any], wanted: list[float]
+) -> None:
+    target = {"position": [0.3, 0.0, height], "axis": DOWN, "tolerance": 0.003, **more}
+    read = task(None, [target, {"position": [0.3, 0.3, 0.5]}], payload=payload, obstacles=[TABLE, BIN])
+    assert read.tip_rules.allowed.tolist() == [wanted, [APART, APART]]
+
+
+def test_depths_are_allowed_on_the_lines_of_a_target_and_near_it() -> None:
+    targets = [{**target, "position": [*target["position"][:2], 0.05], "axis": DOWN} for target in NAMED]
+    cycle = steps({"to": "bin", "do": "pick"}, {"to": 3}, {"to": "tray", "do": "place"}, approach=0.1)
+    found = plan(cycle, targets, payload=PART, obstacles=[TABLE, BIN])
+    share = np.array([0.0, 0.05, 0.5, 0.95, 1.0])
+    allowed = [found.rules(motion, share).allowed.max(axis=1).tolist() for motion in found.motions]
+    line, apart = [REACHED] * 5, [APART] * 5
+    # out of the bin, over to 3, over to the tray and into it, out of it, over to the bin and into it
+    assert allowed == [line, [*apart[:3], REACHED, REACHED], [REACHED, REACHED, *apart[2:]], line, line, apart, line]
+    assert [found.rules(motion, share).carries.all() for motion in found.motions] == [True] * 4 + [False] * 3
+    samples = found.sampled_rules(found.sample())
+    assert samples.allowed.shape == (len(found.sample().poses), 2)
+    assert (samples.allowed.max(axis=1) == REACHED).sum() == 1 + sum(
+        last - first + 1 for first, last in found.sample().of_motion if last > first
+    ) - 2
+
+
+def test_unknown_surface_is_named_with_those_that_exist() -> None:
+    with pytest.raises(TaskError, match=r'target 1: on: expected the name of one obstacle, got "tabel"\. Did you mean'):
+        task(None, [{**NAMED[0], "on": "tabel"}], obstacles=[TABLE])
+    with pytest.raises(TaskError, match=r"into: .* Obstacles: none has a name"):
+        task(None, [{**NAMED[0], "into": "hole"}], obstacles=[{"kind": "ground"}])
+
+
+@pytest.mark.parametrize(
+    ("tool", "message"),
+    [
+        ({"tip": [0, 0, 0.1], "radius": 0.02, "size": [0.1, 0.1, 0.1]}, "size or radius, got both"),
+        ({"radius": 0.02}, "radius needs a tip"),
+    ],
+)
+def test_tools_without_one_body_are_refused(tool: dict[str, Any], message: str) -> None:
+    with pytest.raises(TaskError, match=message):
+        task(None, tool=tool)

@@ -22,7 +22,7 @@ from armwright.proof.front_gap import best_known_hypervolume
 from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
 from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
-from armwright.tasks.targets import AXIS, TargetArrays, describe_targets
+from armwright.tasks.targets import AXIS, Target, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
 from armwright.text import percent, rounded
 
@@ -190,6 +190,7 @@ def show_target_table(console: Console, problem: Problem) -> None:
         column("tolerance [mm]", 1e3 * arrays.tolerance), column("payload [kg]", task.payloads, rank=1),
         column(f"nearest{NO_BREAK}base [m]", distances),
         Column("tool direction", lambda i: _tool_direction(arrays, i), rank=2, least=14),
+        Column("may touch", partial(_surfaces, task, task.tip_rules.allowed), rank=2, least=10),
     )  # fmt: skip
     console.print(f"{len(points)} targets:")
     print_table(console, columns, range(min(MAX_ROWS, len(points))), "--json prints all")
@@ -208,6 +209,15 @@ def _tool_direction(arrays: TargetArrays, index: int) -> str:
         parts.append(f"within {math.degrees(arrays.angle_tolerance[index]):.3g}°")
     parts += [f"weight {arrays.weight[index]:g}"] * bool(arrays.weight[index] != 1.0)
     return ", ".join(parts) or "any"
+
+
+def _surfaces(task: DesignTask, allowed: Array, index: int) -> str:
+    """Return what tool and payload may touch at a target, if they are bodies; allowed: as of `TipRules`."""
+    target = task.targets[index]
+    on = "on {}" if isinstance(target, Target) and target.on else "on {} (assumed)"
+    depths = zip(task.obstacles, allowed[index], strict=True)
+    words = (("into {}" if np.isinf(d) else on).format(one.name or one.kind) for one, d in depths if d >= 0.0)
+    return ", ".join(words) * bool(task.tip_solids) or "nothing"
 
 
 def _describe_payload(task: DesignTask) -> str:

@@ -12,7 +12,7 @@ from armwright.exceptions import TaskError
 from armwright.files import naming_write_errors
 from armwright.pictures.arm_figures import EDGE, MOVE, frame, scene_legend
 from armwright.pictures.drawing import legend_mark, save_figure
-from armwright.pictures.solids import draw_edges, draw_obstacles, extent_of
+from armwright.pictures.solids import draw_edges, draw_obstacles, draw_solid, extent_of
 from armwright.pictures.style import FRONT, RC, TARGET
 from armwright.problem.checks.reach import base_box
 from armwright.problem.problem import Problem
@@ -52,6 +52,8 @@ def draw_task(problem: Problem) -> Figure:
     poses = [] if plan is None else [plan.poses.position]
     extent = extent_of([task.target_positions, low, high, *corners, *poses], task.obstacles)
     draw_obstacles(axes, task.obstacles, extent)
+    for solid in task.bodies_at_targets:
+        draw_solid(axes, solid, extent, TARGET)
     for region in task.workspace:
         draw_edges(axes, region.low, region.high, EDGE)
     draw_edges(axes, low, high, BASES)
@@ -77,5 +79,6 @@ def _handles(problem: Problem) -> list[Line2D | Patch]:
     return [
         legend_mark("target, tool direction", "*", TARGET, markersize=9, markeredgecolor=FRONT),
         Line2D([], [], **BASES, marker="s", markersize=5, label="allowed bases, their centre"),
+        *([Patch(facecolor=TARGET, alpha=0.3, label="tool, payload")] if problem.task.bodies_at_targets else []),
         *scene_legend(problem, "joint motion between", PATH),
     ]

@@ -239,7 +239,7 @@ class Evaluation(Scene):
 
     @cached_property
     def _clearances(self) -> tuple[Array, Array]:
-        own, clear = clearances(self.arms, self.q, self.obstacles, self.device)
+        own, clear = clearances(self.arms, self.q, self.obstacles, self.device, self.tip_rules)
         if self.cycle_paths is not None:
             own = -self.largest_on_motions(-self.cycle_paths.self_clearance, -own)
             clear = -self.largest_on_motions(-self.cycle_paths.obstacle_clearance, -clear)

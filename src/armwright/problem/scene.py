@@ -1,7 +1,7 @@
 """Where arms are evaluated: the targets of a task in one case, and their surroundings."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armwright.arrays import Array
 from armwright.exceptions import UnknownQuantityError
@@ -10,6 +10,7 @@ from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.payload import POINT_LOAD, LoadShape
 from armwright.tasks.targets import TargetArrays
 from armwright.tasks.task import Task
+from armwright.tasks.tip_rules import TipRules
 from armwright.tasks.workspace import Region
 
 # What a task may lack, by the need of a quantity: an error, and the reason alone
@@ -41,6 +42,7 @@ class Scene:
     plan: CyclePlan | None = None  # the motions of the task's cycle; None if it has none
     workspace: tuple[Region, ...] = ()  # boxes to cover
     load_shape: LoadShape = POINT_LOAD  # how the mass of the payload is distributed
+    tip_rules: TipRules | None = None  # tool and payload as bodies at the targets; None if neither counts
 
     def require(self, need: str) -> None:
         """Raise UnknownQuantityError if the task lacks a cycle, a workspace, or one with directions."""
@@ -54,4 +56,5 @@ def task_scene(task: Task, targets: Array, payloads: Array) -> Scene:
     """Return the surroundings of a task with these targets (T, 3) [m] and payloads (T,) [kg]."""
     plan = task.plan(targets) if task.cycle else None
     held = payloads if plan is None else payloads * plan.holds_payload(len(targets))
-    return Scene(targets, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
+    rules = replace(task.tip_rules, carries=held > 0.0)
+    return Scene(targets, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape, rules)

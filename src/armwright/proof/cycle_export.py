@@ -20,6 +20,7 @@ from armwright.tasks.task import Task
 
 MODEL, TRAJECTORY = "arm.xml", "trajectory.csv"
 QUANTITIES = ("q", "qd", "qdd", "tau")  # of joints, in a trajectory
+ALLOWED = "allowed_"  # columns of depths
 DIGITS = 9
 
 
@@ -116,13 +117,15 @@ def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:
 def trajectory_csv(trajectory: Trajectory, target_names: Sequence[str]) -> str:
     """Return a trajectory as CSV, all joints' values after each other: q_1, …, qd_1, …, qdd_1, …, tau_1, ….
 
-    target is the name of a target where the arm has reached it and rested there, else empty.
+    target is the name of a target where the arm has reached it and rested there, else empty. allowed_1, … is how deep
+    tool and payload may be in each obstacle [m]: -1 where they may not touch it, inf in a hole.
     """
     n = trajectory.q.shape[1]
     out = io.StringIO()
-    columns = [f"{quantity}_{k}" for quantity in QUANTITIES for k in range(1, n + 1)]
+    columns = [f"{ALLOWED}{o}" for o in range(1, trajectory.allowed.shape[1] + 1)]
+    columns += [f"{quantity}_{k}" for quantity in QUANTITIES for k in range(1, n + 1)]
     out.write(",".join(["time", "step", "target", "payload", *columns]) + "\n")
-    values = np.hstack([getattr(trajectory, quantity) for quantity in QUANTITIES]) + 0.0  # no -0.0
+    values = np.hstack([getattr(trajectory, quantity) for quantity in ("allowed", *QUANTITIES)]) + 0.0  # no -0.0
     line = ",".join([f"%.{DIGITS}g"] * len(columns)) + "\n"
     heads = zip(trajectory.time, trajectory.step, trajectory.target, trajectory.payload, strict=True)
     for (time, step, target, payload), row in zip(heads, values.tolist(), strict=True):
@@ -135,14 +138,16 @@ def read_trajectory(text: str, target_names: Sequence[str]) -> Trajectory:
     """Return the trajectory of a CSV file."""
     head, *lines = text.splitlines()
     cells = [line.split(",") for line in lines]
-    n = (len(head.split(",")) - 4) // len(QUANTITIES)
+    o = head.count(f",{ALLOWED}")
+    n = (len(head.split(",")) - 4 - o) // len(QUANTITIES)
     number = {name: index for index, name in enumerate(target_names)} | {"": -1}
-    values = np.array([row[4:] for row in cells], dtype=np.float64).reshape(len(cells), len(QUANTITIES), n)
+    values = np.array([row[4 + o :] for row in cells], dtype=np.float64).reshape(len(cells), len(QUANTITIES), n)
     return Trajectory(
         time=np.array([row[0] for row in cells], dtype=np.float64),
         step=np.array([row[1] for row in cells], dtype=np.intp),
         target=np.array([number[row[2]] for row in cells], dtype=np.intp),
         payload=np.array([row[3] for row in cells], dtype=np.float64),
+        allowed=np.array([row[4 : 4 + o] for row in cells], dtype=np.float64).reshape(len(cells), o),
         q=values[:, 0],
         qd=values[:, 1],
         qdd=values[:, 2],

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -113,7 +113,9 @@ def describe_faults(evaluation: Evaluation, row: int) -> str:
     return "; ".join(faults)
 
 
-def via_point(arm: ArmArrays, path: MotionPath, share: float, obstacles: Sequence[Obstacle]) -> Array | None:
+def via_point(
+    arm: ArmArrays, plan: CyclePlan, path: MotionPath, share: float, obstacles: Sequence[Obstacle]
+) -> Array | None:
     """Return a point through which one arm avoids a collision at a share of a motion, None if none was found.
 
     Points to all sides of the tip are tried. The arm must reach the point, and be free along the joint motions from the
@@ -127,7 +129,10 @@ def via_point(arm: ArmArrays, path: MotionPath, share: float, obstacles: Sequenc
     via = found.q.astype(np.float64)[0, :, None]  # (P, 1, D)
     start, end, along = q[0, 0], q[0, 2], VIA_SHARES[:, None]
     ways = np.concatenate([start + along * (via - start), via + along * (end - via)], axis=1)  # (P, 34, D)
-    clearance = np.minimum(*clearances(arm, ways.reshape(1, -1, arm.dof), obstacles)).reshape(len(points), -1)
+    ways = ways.reshape(1, -1, arm.dof)
+    # What is allowed at the ends of the motion, is allowed all the way.
+    rules = plan.rules(replace(path.motion, by="line"), np.zeros(ways.shape[1]))
+    clearance = np.minimum(*clearances(arm, ways, obstacles, rules=rules)).reshape(len(points), -1)
     reached = found.distance(points)[0] < REACHED
     least = np.where(reached, clearance.min(axis=1), -np.inf)
     return points[least.argmax()] if least.max() > 0.0 else None
@@ -138,7 +143,7 @@ def _avoid(paths: CyclePaths, row: int, obstacles: Sequence[Obstacle]) -> str:
     clearance = np.minimum(paths.self_clearance[row], paths.obstacle_clearance[row])
     worst = int(clearance.argmin())
     arm, of_motions = paths.of_arm(row)
-    point = via_point(arm, of_motions[worst], float(paths.worst[row, worst, 2]), obstacles)
+    point = via_point(arm, paths.plan, of_motions[worst], float(paths.worst[row, worst, 2]), obstacles)
     if point is None:
         return "try a via point, a target on a way around it"
     return f"try a via point, a target at {[round(float(c), 3) for c in point]} m, through which this arm moves freely"

@@ -112,6 +112,8 @@ class _Driver:
         self._contacts: dict[tuple[str, str], Contact] = {}
         self._coulomb, user = self._model.dof_frictionloss.copy(), self._model.jnt_user
         self._gear = user[:, 0] if user.shape[1] else np.zeros(self._n)  # share of friction
+        geoms = (str(self._model.geom(i).name) for i in range(self._model.ngeom))
+        self._obstacles = {name: o for o, name in enumerate(filter(lambda name: name.startswith("obstacle_"), geoms))}
 
     def run(self) -> Drive:
         """Drive the whole cycle."""
@@ -142,7 +144,7 @@ class _Driver:
                 tau[at] = data.qfrc_actuator
                 at += 1
                 if data.ncon:
-                    self._note_contacts()
+                    self._note_contacts(row)
         stable = not any(warning.number for warning in data.warning) and bool(np.isfinite(q).all())
         return Drive(q, qd, tau, speed, tip, tuple(arrivals), tuple(self._contacts.values()), stable)
 
@@ -185,9 +187,16 @@ class _Driver:
         distance = float(np.linalg.norm(data.site_xpos[self._tip] - data.site_xpos[site.id]))
         return Arrival(int(self._trajectory.step[row]), name, distance, angle_between(tip, goal, int(site.user[2])))
 
-    def _note_contacts(self) -> None:
+    def _note_contacts(self, row: int) -> None:
+        """Note what touches, except for what tool and payload may touch at a row of the trajectory."""
+        carried, allowed = self._trajectory.payload[row] > 0.0, self._trajectory.allowed[row]
         for contact in self._data.contact:
             first, second = sorted(self._model.geom(int(geom)).name for geom in contact.geom)
+            depth = (
+                allowed[self._obstacles[first]] if first in self._obstacles and second in ("payload", "tool") else -1.0
+            )
+            if -contact.dist <= depth or (second == "payload" and not carried):
+                continue
             known = self._contacts.get((first, second))
             time = float(self._data.time) if known is None else known.time
             depth = max(-float(contact.dist), 0.0 if known is None else known.depth)

@@ -14,7 +14,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.problem.scene import Scene
 from armwright.robot.arm import GRAVITY, Arm, Joint
-from armwright.robot.collision_pairs import joined_by_column, joined_by_motors
+from armwright.robot.collision_pairs import joined_by_column, joined_by_motors, joined_by_tip
 from armwright.robot.link_geometry import (
     Segment,
     moving_joints,
@@ -35,7 +35,8 @@ from armwright.robot.mjcf import (
     add_tool,
     joint_attributes,
 )
-from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.obstacles import Obstacle, Solid
+from armwright.tasks.tip_rules import Solids
 
 TIMESTEP = 0.001  # [s]
 NOTHING = 1e-9  # mass [kg] and moments of inertia [kg m²] of a payload that is not carried
@@ -49,6 +50,9 @@ OBSTACLE, LINK = 1, 2
 TOUCHES_ALL = {"contype": str(LINK), "conaffinity": str(LINK | OBSTACLE)}
 TOUCHES_LINKS = {"contype": str(LINK), "conaffinity": str(LINK)}
 TOUCHES_NOTHING = {"contype": "0", "conaffinity": "0"}
+# Contacts of tool and payload are measured, without force: what they may touch, they may touch.
+NO_FORCE = {"priority": "1", "condim": "1", "solref": "-1e-6 -1e-6", "solimp": "0.0001 0.0001 0.001"}
+TIP = {"contype": "0", "conaffinity": str(LINK | OBSTACLE), **NO_FORCE}
 COLOURS = {"obstacle": "0.55 0.55 0.58 0.5", "target": "0.84 0.16 0.16 0.6", "payload": "0.95 0.77 0.06 0.7"}
 
 
@@ -60,9 +64,10 @@ def to_simulation_mjcf(
     Moving joints are joint_1, joint_2, …, each with the actuators servo_1, … (position) and ff_1, … (torque), whose sum
     is limited to the actuator's peak torque, before the friction of its gear; `user` is this friction relative to the
     torque that the gear passes on. Link k is the capsule link_k, its actuator the sphere or body motor_k. The
-    column below the base is the cylinder `column`, which touches no obstacle. A site target_NAME is at each target; its
-    user data are the tolerance of the position [m], of the angle [rad], and how many angles count (2: the z axis, 3:
-    all). The keyframe NAME is the posture there.
+    column below the base is the cylinder `column`, which touches no obstacle. Solid tools and payloads are the geoms
+    `tool` and `payload`, whose contacts exert no force. A site target_NAME is at each target; its user data are the
+    tolerance of the position [m], of the angle [rad], and how many angles count (2: the z axis, 3: all). The keyframe
+    NAME is the posture there.
 
     postures: (T, D) values of the moving joints at the targets [rad] or [m].
     peak_torques: (D,) largest torques of the moving joints, for the gains of joints without actuators.
@@ -71,7 +76,8 @@ def to_simulation_mjcf(
     SubElement(root, "compiler", COMPILER)
     gravity = numbers((0.0, 0.0, -GRAVITY))
     option = SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP), integrator="RK4")
-    if arm.has_motor_bodies:  # a motor touches the link before its carrier; what may not touch is excluded below
+    # A motor touches the link before its carrier, a tool that before the last; what may not touch is excluded below.
+    if arm.has_motor_bodies or (scene.tip_rules and scene.tip_rules.solids):
         SubElement(option, "flag", filterparent="disable")
     SubElement(SubElement(root, "default"), "geom", {**TOUCHES_NOTHING, "mass": "0"})
     world = add_scene(root, arm)
@@ -111,6 +117,9 @@ def _add_exclusions(root: Element, arm: Arm, motor_names: Mapping[int, str]) -> 
         motors, links = joined_by_column(arm)
         pairs += [("column", motor_names[joint + 1]) for joint in motors]
         pairs += [("column", f"link_{link + 1}") for link in links]
+    motors, links = joined_by_tip(arm)
+    pairs += [("payload", motor_names[joint + 1]) for joint in motors]
+    pairs += [("payload", f"link_{link + 1}") for link in links]
     for first, second in pairs:
         SubElement(contact, "exclude", body1=first, body2=second)
 
@@ -140,16 +149,20 @@ def _add_obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
     for index, obstacle in enumerate(obstacles, start=1):
         solid = obstacle.solid
         label = obstacle.name if obstacle.name and names[obstacle.name] == 1 else f"{obstacle.name}{index}"
-        size = {
-            "box": solid.half,
-            "sphere": solid.half[:1],
-            "cylinder": (solid.half[0], solid.half[2]),
-            "ground": (0.0, 0.0, 0.1),  # of a plane without end, and the spacing of its grid
-        }[solid.shape]
-        geom = {"type": "plane" if solid.shape == "ground" else solid.shape, "size": numbers(size)}
-        place = {"pos": numbers(solid.centre), "xyaxes": numbers(solid.rotation[:, :2].T.ravel().tolist())}
         bits = {"contype": str(OBSTACLE), "conaffinity": "0"}
-        SubElement(world, "geom", {"name": f"obstacle_{label}", **geom, **place, **bits, "rgba": COLOURS["obstacle"]})
+        SubElement(world, "geom", {"name": f"obstacle_{label}", **_geom(solid), **bits, "rgba": COLOURS["obstacle"]})
+
+
+def _geom(solid: Solid) -> dict[str, str]:
+    """Return type, size and place of a solid."""
+    size = {
+        "box": solid.half,
+        "sphere": solid.half[:1],
+        "cylinder": (solid.half[0], solid.half[2]),
+        "ground": (0.0, 0.0, 0.1),  # of a plane without end, and the spacing of its grid
+    }[solid.shape]
+    place = {"pos": numbers(solid.centre), "xyaxes": numbers(solid.rotation[:, :2].T.ravel().tolist())}
+    return {"type": "plane" if solid.shape == "ground" else solid.shape, "size": numbers(size), **place}
 
 
 def _add_targets(world: Element, scene: Scene, target_names: Sequence[str], arm: Arm) -> None:
@@ -214,6 +227,9 @@ def _add_payload(body: Element, arm: Arm, scene: Scene) -> None:
     moments = [mass * value for value in shape.gyration] if mass > 0.0 else [NOTHING] * 3
     inertial = {"pos": numbers(shape.center), "mass": number(mass or NOTHING), "diaginertia": numbers(moments)}
     SubElement(payload, "inertial", inertial)
+    solids: Solids = scene.tip_rules.solids if scene.tip_rules else {}
+    for name, solid in solids.items():
+        SubElement(payload, "geom", {"name": name, **_geom(solid), "rgba": COLOURS["payload"], **TIP})
 
 
 def _add_actuators(root: Element, arm: Arm, peak_torques: Array) -> None:

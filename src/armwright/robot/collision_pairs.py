@@ -24,6 +24,21 @@ def joined_by_motors(arm: Arm) -> Iterator[tuple[int, int]]:
             yield j, after[0]
 
 
+def joined_by_tip(arm: Arm) -> tuple[list[int], list[int]]:
+    """Return the motors, by joint, and the solid links that need no collision check with tool and payload.
+
+    Tool and payload are parts of the last link. Its neighbours do not count, nor what is rigidly connected to it, nor a
+    link whose round end reaches up to the tool.
+    """
+    solid = [n for n, link in enumerate(arm.links) if link.length > 0.0]
+    motors = [j for j, joint in enumerate(arm.joints) if joint.body is not None and sum(n >= j for n in solid) < 2]
+    links = [
+        n for n in solid if n == solid[-1] or all(one.kind == "fixed" for one in arm.joints[n + 1 :])
+        or sum(link.length for link in arm.links[n + 1 :]) <= arm.links[n].radius
+    ]  # fmt: skip
+    return motors, links
+
+
 def joined_by_column(arm: Arm) -> tuple[list[int], list[int]]:
     """Return the motors, by joint, and the solid links that need no collision check with the column, counted from 0.
 

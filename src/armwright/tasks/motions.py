@@ -17,11 +17,13 @@ from armwright.arrays import Array
 from armwright.rotations import rotation_about
 from armwright.tasks.cycle import By, Cycle
 from armwright.tasks.targets import ORIENTATION, TargetArrays
+from armwright.tasks.tip_rules import APART, TipRules
 
 LINE_STEP = 0.02  # [m] largest distance of two samples of a line
 ANGLE_STEP = 0.1  # [rad] likewise of the tool's angle
 MIN_STEPS = 4  # of a line, for its spline
 MAX_SAMPLES = 20_000  # of all lines of a cycle
+NEAR_END = 1.0 / 16.0  # share of a joint motion at each end, where tool and payload leave what they rest on
 OPPOSITE = 1e-3  # [rad] from half a turn; the shortest rotation is not unique there
 
 
@@ -94,6 +96,7 @@ class CyclePlan:
     motions: tuple[Motion, ...]  # motions in their order, from rest at the target of the first step
     targets: tuple[int, ...]  # index of each step's target
     times: tuple[float | None, ...]  # duration of each step [s]; None for the fastest
+    tip_rules: TipRules  # what holds at the poses
 
     def holds_payload(self, n_targets: int) -> NDArray[np.bool_]:
         """Return (T,) whether the payload is carried to or from each of T targets; True where the cycle never is."""
@@ -160,6 +163,30 @@ class CyclePlan:
             angle_tolerance=tolerance(allowed.largest_angle, poses.angle_tolerance),
         )
 
+    def rules(self, motion: Motion, share: Array) -> TipRules:
+        """Return what holds at shares (S,) of a motion: the rules of its targets, on a joint motion near its ends."""
+        is_line, ends = motion.by == "line", self.tip_rules.allowed[[motion.start, motion.end]]
+        near = is_line | np.stack([share < NEAR_END, share > 1.0 - NEAR_END])  # (2, S) its ends
+        allowed = np.where(near[..., None], ends[:, None], APART).max(axis=0)
+        carries = np.full(len(share), motion.carries and self.tip_rules.carries.any())
+        return TipRules(carries, allowed, self.tip_rules.solids)
+
+    def sampled_rules(self, samples: LineSamples) -> TipRules:
+        """Return what holds at samples of lines; at those that motions share, what holds for any of them."""
+        n, first = len(samples.poses), samples.first
+        apart = np.full((n, self.tip_rules.allowed.shape[1]), APART)
+        found = TipRules(np.zeros(n, dtype=np.bool_), apart, self.tip_rules.solids)
+        for index, motion in enumerate(self.motions):
+            if motion.by == "line":
+                at = np.arange(samples.of_motion[index][0], samples.of_motion[index][1] + 1)
+            else:
+                block = self.joint_motions.index(index)
+                at = np.array([first[block + 1] - 1, first[(block + 1) % len(self.blocks)]])
+            rules = self.rules(motion, np.linspace(0.0, 1.0, len(at)))
+            found.carries[at] |= rules.carries
+            found.allowed[at] = np.maximum(found.allowed[at], rules.allowed)
+        return found
+
     def sample(self, refinement: float = 1) -> LineSamples:
         """Return samples of all lines, `refinement` times as many as a path needs at least."""
         if refinement not in self._samples:
@@ -187,8 +214,13 @@ class CyclePlan:
         return LineSamples(stack_poses(parts), np.array(first), tuple(spans))
 
 
-def plan_cycle(cycle: Cycle, targets: Sequence[int], positions: Array, arrays: TargetArrays) -> CyclePlan:
-    """Return the motions of a cycle, given the index of each step's target and the positions of targets (T, 3) [m]."""
+def plan_cycle(
+    cycle: Cycle, targets: Sequence[int], positions: Array, arrays: TargetArrays, tip_rules: TipRules
+) -> CyclePlan:
+    """Return the motions of a cycle.
+
+    targets: index of each step's target.  positions: (T, 3) of targets [m].  tip_rules: at the T targets.
+    """
     poses = Poses(positions, arrays.rotation, arrays.n_angular, arrays.tolerance, arrays.angle_tolerance)
     for number, (target, step) in enumerate(zip(targets, cycle.steps, strict=True), start=1):
         if step.do and cycle.approach and arrays.n_angular[target] == 0:
@@ -206,7 +238,9 @@ def plan_cycle(cycle: Cycle, targets: Sequence[int], positions: Array, arrays: T
         )
         poses = stack_poses([poses, before])
     points = {target: len(positions) + i for i, target in enumerate(approached)}
-    plan = CyclePlan(cycle, poses, _motions(cycle, targets, points), tuple(targets), cycle.durations())
+    tip_rules = tip_rules[np.array([*range(len(positions)), *approached], dtype=np.intp)]
+    tip_rules.allowed[len(positions) :] = APART
+    plan = CyclePlan(cycle, poses, _motions(cycle, targets, points), tuple(targets), cycle.durations(), tip_rules)
     _check_lines(plan)
     return plan
 

@@ -9,14 +9,12 @@ from pydantic import BaseModel, Field, model_validator
 
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
 from armwright.tasks.moments import describe_vector
-from armwright.tasks.targets import Angle, Coordinate, Direction, Point, Position, Size
+from armwright.tasks.targets import Angle, Coordinate, Direction, ObstacleName, Point, Position, Size
 
 Shape = Literal["box", "sphere", "cylinder", "ground"]
 
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 MAX_OBSTACLES = 100
-
-Name = Annotated[str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9 ._-]{0,39})?$")]
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ class Record(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """The fields that obstacles of all kinds have."""
 
     kind: Shape
-    name: Name = ""  # for messages and drawings
+    name: ObstacleName = ""  # for messages and drawings
 
     def describe(self) -> str:
         """Return a description on one line."""

@@ -39,6 +39,7 @@ def _check_direction(vector: Point) -> Point:
 
 Direction = Annotated[Position, AfterValidator(_check_direction)]  # of any length
 
+ObstacleName = Annotated[str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9 ._-]{0,39})?$")]
 TARGET_NAME = r"^([A-Za-z][A-Za-z0-9 ._-]{0,39})?$"  # empty for none
 REACHED = 1e-3  # [m]; a target nearer than this counts as reached
 ALIGNED = math.radians(1.0)  # [rad]; likewise for a target's axis or orientation
@@ -86,6 +87,8 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     # Angle likewise, for a target with an axis or an orientation [rad]; None for ALIGNED
     angle_tolerance: float | None = Field(default=None, ge=MIN_TOLERANCE, le=math.pi)
     weight: float = Field(default=1.0, gt=0.0, le=MAX_WEIGHT)  # factor of its share of a sum of errors
+    on: ObstacleName = ""  # obstacle that tool and payload may touch there; empty for the one beyond the tip
+    into: ObstacleName = ""  # obstacle with a hole or a chuck, which tool and payload may enter there
 
     @field_validator("position", mode="before")
     @classmethod
@@ -135,6 +138,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         parts += [] if self.tolerance is None else [f"tolerance {1e3 * self.tolerance:g} mm"]
         parts += [] if self.angle_tolerance is None else [f"angle tolerance {math.degrees(self.angle_tolerance):.4g}°"]
         parts += [f"weight {self.weight:g}"] * (self.weight != 1.0)
+        parts += [f"{word} {name}" for word, name in (("on", self.on), ("into", self.into)) if name]
         return ", ".join(parts)
 
 

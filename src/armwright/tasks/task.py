@@ -21,9 +21,10 @@ from armwright.files import check_name
 from armwright.tasks.cycle import IN_ORDER, Cycle, target_indices
 from armwright.tasks.moments import Mass
 from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
-from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle
+from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, Solid
 from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload
 from armwright.tasks.targets import MAX_COORDINATE, Point, Target, TargetArrays, check_length, stack_targets
+from armwright.tasks.tip_rules import Solids, TipRules, allowed_depths, placed, tip_solids
 from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.tasks.workspace import MAX_POINTS, MAX_POSES, MAX_REGIONS, Region
 
@@ -143,6 +144,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             if name in seen:
                 raise ValueError(f'targets: two are named "{name}"; give each its own name')
             seen.add(name)
+        allowed_depths(self._records, self.target_arrays, self.obstacles, {})  # raises for unknown names
         if self.cycle is not None:
             _check_obstacles(self.plan(self.target_positions), self.obstacles)
         return self
@@ -197,6 +199,30 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return self.payload.shape if isinstance(self.payload, Payload) else POINT_LOAD
 
     @property
+    def tip_rules(self) -> TipRules:
+        """Tool and payload as bodies at the T targets, and what they may touch there."""
+        allowed = allowed_depths(self._records, self.target_arrays, self.obstacles, self.tip_solids)
+        return TipRules(self.payloads > 0.0, allowed, self.tip_solids)
+
+    @property
+    def tip_solids(self) -> Solids:
+        """`tool` and `payload` in the tip frame, those that are bodies."""
+        return tip_solids(self.tool, self.payload if isinstance(self.payload, Payload) else None)
+
+    @property
+    def bodies_at_targets(self) -> list[Solid]:
+        """Tool and payload at the targets that state a direction; angles that do not count are arbitrary."""
+        arrays, carried = self.target_arrays, self.payloads > 0.0
+        if self.cycle is not None:
+            carried &= self.plan(self.target_positions).holds_payload(len(carried))
+        return [
+            placed(solid, self.target_positions[i], arrays.rotation[i])
+            for i in np.flatnonzero(arrays.n_angular).tolist()
+            for name, solid in self.tip_solids.items()
+            if name == "tool" or carried[i]
+        ]
+
+    @property
     def target_names(self) -> tuple[str, ...]:
         """Name of each target; its number, counted from 1, if it has none."""
         return tuple(name or str(number) for number, name in enumerate(self._names, start=1))
@@ -226,7 +252,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if self.cycle is None:
             raise ValueError(f"task {self.name} has no cycle; try cycle: {IN_ORDER}")
         targets = target_indices(self.cycle.steps, self._numbers, len(positions))
-        return plan_cycle(self.cycle, targets, positions, self.target_arrays)
+        return plan_cycle(self.cycle, targets, positions, self.target_arrays, self.tip_rules)
 
 
 def _check_obstacles(plan: CyclePlan, obstacles: Sequence[Obstacle]) -> None:
@@ -236,8 +262,9 @@ def _check_obstacles(plan: CyclePlan, obstacles: Sequence[Obstacle]) -> None:
         if motion.by == "joint":
             continue
         points = along_line(plan.poses, motion.start, motion.end, share).position
+        allowed = plan.rules(motion, share).allowed
         for number, obstacle in enumerate(obstacles, start=1):
-            inside = obstacle.solid.contains(points, MAX_DEPTH)
+            inside = obstacle.solid.signed_distance(points) < -np.maximum(allowed[:, number - 1], MAX_DEPTH)
             if inside.any():
                 name = f'"{obstacle.name}"' if obstacle.name else str(number)
                 raise ValueError(

@@ -73,6 +73,8 @@ export function drawScene() {
   groups.floor.add(...floorParts(frame).parts);
   const faint = new THREE.MeshLambertMaterial({ color: OBSTACLE, transparent: true, opacity: 0.3, depthWrite: false });
   for (const one of drawn.obstacles) groups.obstacles.add(...solidParts(one, frame, { face: faint, edge: thin(OBSTACLE) }));
+  const pale = new THREE.MeshLambertMaterial({ color: TARGET, transparent: true, opacity: 0.2, depthWrite: false });
+  for (const body of drawn.bodies) groups.obstacles.add(...solidParts(body, frame, { face: pale, edge: thin(TARGET) }));
   if (drawn.bases) {
     groups.bases.add(segments(boxEdges(...drawn.bases), thin(BASE)));
     groups.bases.add(letters("base", drawn.bases[1], LETTER * radius, "left"));

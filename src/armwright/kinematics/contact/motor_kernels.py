@@ -1,4 +1,4 @@
-"""Warp kernels of clearance for the bodies of actuators: from each other, links, obstacles and the column.
+"""Warp kernels of clearance for the bodies of actuators, tool and payload: from each other and everything else.
 
 A thread takes one arm at one target, and branches: bounds exclude distant pairs. docs/method.md §13 defines the
 distances and which pairs count.
@@ -29,10 +29,14 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
     zero, one = real(0.0), real(1.0)
 
     @kernel
-    def motor_frames(arms: Posed, axis: wp.array2d(dtype=int), centre: wp.array2d(dtype=Vector3), motors: Motors):
+    def motor_frames(
+        arms: Posed, axis: wp.array2d(dtype=int), centre: wp.array2d(dtype=Vector3), tip: wp.array(dtype=Vector3),
+        tip_into: wp.array(dtype=Matrix3), at_tip: Solids, motors: Motors,
+    ):  # fmt: skip
         """Compute the middle of each body, and the rotation into its frame, by forward kinematics.
 
-        axis, centre [m]: (N, D), as of `MotorBodies`.
+        axis, centre [m]: (N, D), as of `MotorBodies`.  tip, tip_into: (N,) of the tip frame in that of the last link
+        [m].  at_tip: tool and payload.
         """
         arm, target = wp.tid()
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
@@ -48,6 +52,19 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                 else:
                     motors.into[arm, target, j] = wp.matrix_from_rows(x, y, z)
             _place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z)
+        t = tip[arm]
+        p += t[0] * x + t[1] * y + t[2] * z
+        into = tip_into[arm] * wp.matrix_from_rows(x, y, z)
+        for k in range(at_tip.shape.shape[0]):
+            motors.middle[arm, target, arms.motion.shape[1] + k] = p + wp.transpose(into) * at_tip.centre[k]
+            motors.into[arm, target, arms.motion.shape[1] + k] = at_tip.into[k] * into
+
+    @wp.func
+    def kind_of(motors: Motors, arm: int, target: int, body: int):
+        """Return the shape of a body, below 0 for none; of a payload where it is carried."""
+        if body >= motors.payload and motors.carries[target] == 0:
+            return -1
+        return motors.shape[arm, body]
 
     @wp.func
     def from_link(
@@ -58,39 +75,46 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
 
     @kernel
     def self_clearance(arms: Posed, motors: Motors, clearance: wp.array2d(dtype=real)):
-        """Lower (N, T) clearances to the distance of a body from other bodies and from links that it does not join."""
+        """Lower (N, T) clearances to the distance of a body from other bodies and from links that it does not join.
+
+        Tool and payload are parts of the last link: they count from what is not next to it, and not from each other.
+        """
         arm, target = wp.tid()
+        dof = arms.motion.shape[1]
         nearest = clearance[arm, target]
         for i in range(motors.shape.shape[1]):
-            kind = motors.shape[arm, i]
+            kind = kind_of(motors, arm, target, i)
             if kind >= 0:
                 size, place, frame = motors.half[arm, i], motors.middle[arm, target, i], motors.into[arm, target, i]
-                for j in range(i + 1, motors.shape.shape[1]):
-                    other = motors.shape[arm, j]
-                    if other >= 0:
-                        d = motors.middle[arm, target, j] - place
-                        other_size = motors.half[arm, j]
-                        if wp.length(d) - wp.length(size) - wp.length(other_size) < nearest:
-                            between = motors.into[arm, target, j] * wp.transpose(frame)
-                            found = separation(frame * d, kind, size, between, other, other_size, nearest)
-                            nearest = wp.min(nearest, found)
                 links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-                for k in range(i, motors.shape.shape[1]):
+                for k in range(i, dof):
                     r = arms.radius[arm, k]
                     if r > zero:
                         if links_between > 0:
                             start, end = arms.starts[arm, target, k], arms.ends[arm, target, k]
                             nearest = from_link(nearest, kind, size, place, frame, start, end, r)
                         links_between += 1
+                for j in range(i + 1, motors.shape.shape[1]):
+                    other = kind_of(motors, arm, target, j)
+                    if other >= 0 and (j < dof or links_between > 1):
+                        d = motors.middle[arm, target, j] - place
+                        other_size = motors.half[arm, j]
+                        if wp.length(d) - wp.length(size) - wp.length(other_size) < nearest:
+                            between = motors.into[arm, target, j] * wp.transpose(frame)
+                            found = separation(frame * d, kind, size, between, other, other_size, nearest)
+                            nearest = wp.min(nearest, found)
                 links_before = int(0)  # noqa: RUF046, UP018
                 n_joints = int(0)  # noqa: RUF046, UP018
-                for back in range(i):
-                    k = i - 1 - back
+                reach = real(0.0)  # [m] along the arm, from the end of link k to tool and payload
+                for back in range(wp.min(i, dof)):
+                    k = wp.min(i, dof) - 1 - back
                     r = arms.radius[arm, k]
                     if r > zero:
-                        if links_before > 0 and n_joints > 0:
-                            first, last = arms.starts[arm, target, k], arms.ends[arm, target, k]
+                        first, last = arms.starts[arm, target, k], arms.ends[arm, target, k]
+                        # A link whose round end reaches up to the tool always touches it.
+                        if links_before > 0 and n_joints > 0 and (i < dof or reach > r):
                             nearest = from_link(nearest, kind, size, place, frame, first, last, r)
+                        reach += wp.length(last - first)
                         links_before += 1
                     if arms.motion[arm, k] < wp.static(FIXED):
                         n_joints += 1
@@ -100,30 +124,27 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
     def obstacle_clearance(arms: Posed, motors: Motors, solids: Solids, clearance: wp.array2d(dtype=real)):
         """Lower (N, T) clearances to the distance of a body from an obstacle."""
         arm, target = wp.tid()
+        dof = arms.motion.shape[1]
         nearest = clearance[arm, target]
         is_at_rest = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
         for j in range(motors.shape.shape[1]):
-            kind = motors.shape[arm, j]
+            kind = kind_of(motors, arm, target, j)
             if kind >= 0:
-                place, box = motors.middle[arm, target, j], motors.half[arm, j]
+                place, box, frame = motors.middle[arm, target, j], motors.half[arm, j], motors.into[arm, target, j]
                 for o in range(solids.shape.shape[0]):
-                    d = solids.centre[o] - place
-                    bound = signed_distance(solids.shape[o], -(solids.into[o] * d), solids.half[o]) - wp.length(box)
+                    allowed = real(-1.0)
+                    if j >= dof:
+                        allowed = motors.allowed[target, o]
+                    d, turn = solids.centre[o] - place, solids.into[o]
+                    bound = signed_distance(solids.shape[o], -(turn * d), solids.half[o]) - wp.length(box)
                     if bound < nearest:
-                        found = from_obstacle(
-                            kind,
-                            box,
-                            motors.into[arm, target, j],
-                            d,
-                            solids.shape[o],
-                            solids.half[o],
-                            solids.into[o],
-                            nearest,
-                        )
-                        # A body at rest is always close to what the arm is mounted on: only overlaps count.
-                        if is_at_rest == 0 or found < zero:
+                        found = from_obstacle(kind, box, frame, d, solids.shape[o], solids.half[o], turn, nearest)
+                        found += wp.max(allowed, zero)
+                        # A body at rest is always close to what the arm is mounted on, tool and payload to what they
+                        # may touch: only overlaps count, and only what is deeper than allowed.
+                        if (is_at_rest == 0 and allowed < zero) or found < zero:
                             nearest = wp.min(nearest, found)
-            if arms.motion[arm, j] < wp.static(FIXED):
+            if j < dof and arms.motion[arm, j] < wp.static(FIXED):
                 is_at_rest = 0
         clearance[arm, target] = nearest
 
@@ -139,7 +160,7 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
             nearest = clearance[arm, target]
             is_at_rest = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
             for j in range(motors.shape.shape[1]):
-                kind = motors.shape[arm, j]
+                kind = kind_of(motors, arm, target, j)
                 if kind >= 0 and is_at_rest == 0:
                     d = motors.middle[arm, target, j] - centre
                     box = motors.half[arm, j]
@@ -148,12 +169,12 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                             d, wp.static(CYLINDER), size, motors.into[arm, target, j], kind, box, nearest
                         )
                         nearest = wp.min(nearest, found)
-                if arms.motion[arm, j] < wp.static(FIXED):
+                if j < arms.motion.shape[1] and arms.motion[arm, j] < wp.static(FIXED):
                     is_at_rest = 0
             clearance[arm, target] = nearest
 
     return SimpleNamespace(
-        Matrix3=Matrix3, Motors=Motors,
+        Matrix3=Matrix3, Motors=Motors, Solids=Solids,
         motor_frames=motor_frames, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance,
         column_clearance=column_clearance,
     )  # fmt: skip

@@ -40,20 +40,23 @@ def solid_math(precision: Precision) -> SimpleNamespace:
 
     @wp.struct
     class Motors:
-        """The bodies of their actuators."""
+        """K bodies: those of their D actuators, and behind these tool and payload if they count."""
 
-        shape: wp.array2d(dtype=int)  # (N, D)
-        half: wp.array2d(dtype=Vector3)  # (N, D) [m]
-        middle: wp.array3d(dtype=Vector3)  # (N, T, D) [m]
-        into: wp.array3d(dtype=Matrix3)  # (N, T, D) rotation into the body's frame
+        shape: wp.array2d(dtype=int)  # (N, K)
+        half: wp.array2d(dtype=Vector3)  # (N, K) [m]
+        middle: wp.array3d(dtype=Vector3)  # (N, T, K) [m]
+        into: wp.array3d(dtype=Matrix3)  # (N, T, K) rotation into the body's frame
+        payload: int  # index of the payload
+        carries: wp.array(dtype=int)  # (T,) whether it is there
+        allowed: wp.array2d(dtype=real)  # (T, O) depth of tool and payload that does not count [m], as of `TipRules`
 
     @wp.struct
     class Solids:
-        """O obstacles."""
+        """O obstacles in the world, or tool and payload in the tip frame."""
 
         shape: wp.array(dtype=int)  # (O,)
         centre: wp.array(dtype=Vector3)  # (O,) [m]
-        into: wp.array(dtype=Matrix3)  # (O,) rotation into the obstacle's frame
+        into: wp.array(dtype=Matrix3)  # (O,) rotation into the solid's frame
         half: wp.array(dtype=Vector3)  # (O,) half sides or radii [m]
 
     @wp.func

@@ -13,6 +13,7 @@ from armwright.kinematics.cycle.line_following import BlockPaths, IndexArray, fo
 from armwright.kinematics.devices import Device
 from armwright.tasks.motions import CyclePlan, LineSamples
 from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.tip_rules import joined_rules
 
 MAX_STEP = 0.05  # [rad] between neighbouring samples
 MAX_SLIDE = 0.005  # [m] likewise of sliding joints
@@ -116,6 +117,8 @@ def _avoid_collisions(
     index = np.arange(len(arms))
     share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
     n_blocks, n_edges, candidates = blocks.shape[1], edges.shape[1], blocks.shape[2]
+    joint_motions = [plan.rules(plan.motions[i], share) for i in plan.joint_motions[:n_edges]]
+    rules = joined_rules([plan.sampled_rules(samples), *joint_motions])
     for _ in range(max(ROUNDS, candidates) if candidates > 1 else 0):
         part = arms[index]
         chosen = lines.choose(samples, choice, index)  # (n, S, D)
@@ -123,7 +126,7 @@ def _avoid_collisions(
         change = chosen[:, [samples.first[(b + 1) % n_blocks] for b in range(n_edges)]] - start
         between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)
         q = np.concatenate([chosen, between.reshape(len(index), -1, arms.dof)], axis=1)
-        depth = np.maximum(0.0, -np.minimum(*clearances(part, q, obstacles, device)))
+        depth = np.maximum(0.0, -np.minimum(*clearances(part, q, obstacles, device, rules)))
         in_blocks = np.maximum.reduceat(depth[:, : chosen.shape[1]], samples.first[:-1], axis=1)
         in_edges = depth[:, chosen.shape[1] :].reshape(len(index), n_edges, len(share)).max(axis=2, initial=0.0)
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)

@@ -22,13 +22,16 @@ from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
 from armwright.kinematics.cycle.line_following import IndexArray, follow_lines, tool_errors
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device
-from armwright.tasks.motions import CyclePlan, stack_poses
+from armwright.tasks.motions import NEAR_END, CyclePlan, stack_poses
 from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.tip_rules import joined_rules
 
 MAX_REFINEMENT = 64  # of the samples
 SHARP = 4.0  # times the mean step of a line that makes its largest one a peak
 REDUCED = 0.75  # a step that twice the samples leave above this share of it is a jump
 INSTANTS = 33  # of a motion, equally spaced in time, at which its loads are evaluated
+NEAR = 0.03  # [m] clearance at samples of a joint motion, below which bodies may touch between them
+ZOOMS, BETWEEN = 3, np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # rounds of a search there; its places in quarter steps
 ROUGH, ROUGH_INSTANTS = 0.25, 5  # refinement and instants of a rough path
 
 
@@ -204,7 +207,8 @@ def _measure(
             jumps[group.index, -1] |= gap > CLOSED
         errors = _line_errors(group, plan, device, between)
         q = np.concatenate([path.q for path in group.paths], axis=1)
-        clearance = np.stack(clearances(group.arms, q, obstacles, device))  # (2, n, R)
+        rules = joined_rules([plan.rules(path.motion, path.share) for path in group.paths])
+        clearance = np.stack(clearances(group.arms, q, obstacles, device, rules))  # (2, n, R)
         margin = group.arms.limit_distance(q)
         at = 0
         for i, path in enumerate(group.paths):
@@ -219,8 +223,38 @@ def _measure(
             if path.motion.by == "line":  # where a joint meets its limit, the speeds of the others jump
                 jumps[group.index, i] |= (margin[:, at + 1 : end - 1] <= ON_LIMIT).any(axis=1)
             at = end
+        if between > 1:
+            _look_between(group, plan, values[2:4], worst[:, :, 2], obstacles, device)
     path_error, path_angle, own, clear, margin = values
     return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
+
+
+def _look_between(
+    group: CycleGroup, plan: CyclePlan, clearance: Array, worst: Array, obstacles: Sequence[Obstacle], device: Device
+) -> None:
+    """Lower clearances (2, N, M), and move the shares (N, M) where they are worst, to those between samples.
+
+    Corners pass each other between the samples of a joint motion, so it is searched around its worst sample, of arms
+    that do not touch anything there but come near.
+    """
+    motions = [i for i, path in enumerate(group.paths) if path.motion.by == "joint"]
+    least = clearance[:, group.index].min(axis=(0, 2))
+    rows = np.flatnonzero((least > 0.0) & (least < NEAR))
+    if not motions or not len(rows):
+        return
+    arms, place = group.arms[rows], np.ix_(group.index[rows], np.array(motions))
+    ends = np.stack([group.paths[i].q[rows][:, [0, -1]] for i in motions], axis=1)[:, :, None]  # (n, m, 1, 2, D)
+    step = np.array([1.0 / (group.paths[i].q.shape[1] - 1) for i in motions])[:, None]
+    rules = joined_rules([plan.rules(group.paths[i].motion, np.full(len(BETWEEN), 0.5)) for i in motions])
+    for _ in range(ZOOMS):
+        step = step / 4.0
+        share = np.clip(worst[place][..., None] + step * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (n, m, S)
+        q = ends[..., 0, :] + share[..., None] * (ends[..., 1, :] - ends[..., 0, :])
+        found = np.stack(clearances(arms, q.reshape(len(rows), -1, arms.dof), obstacles, device, rules))
+        found = found.reshape(2, *share.shape)
+        best = np.take_along_axis(share, found.min(axis=0).argmin(axis=2)[..., None], axis=2)[..., 0]
+        worst[place] = np.where(found.min(axis=(0, 3)) < clearance[:, *place].min(axis=0), best, worst[place])
+        clearance[:, *place] = np.minimum(clearance[:, *place], found.min(axis=3))
 
 
 def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> list[Any]:

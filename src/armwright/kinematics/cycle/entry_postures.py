@@ -36,7 +36,9 @@ def entry_postures(
     start = arms.random_postures(starts).swapaxes(0, 1)  # (N, S, D)
     start[:, 0] = 0.0
     q, off = _solve(arms, poses[np.repeat(np.arange(b), starts)], np.tile(start, (1, b, 1)), device)
-    depth = np.maximum(0.0, -np.minimum(*clearances(arms, q, obstacles, device)))
+    samples = plan.sample()
+    rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], starts)]
+    depth = np.maximum(0.0, -np.minimum(*clearances(arms, q, obstacles, device, rules)))
     room = np.minimum(q - lower[:, None], upper[:, None] - q) / (upper - lower)[:, None]
     room = np.where(arms.motion[:, None] == FIXED, 1.0, room).min(axis=-1)
     cost = (cost_of(off - 1.0) + cost_of(depth / DEPTH) - room).reshape(n, b, starts)

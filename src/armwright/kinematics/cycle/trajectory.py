@@ -27,6 +27,7 @@ class Trajectory:
     step: IndexArray  # (R,) number of the step, counted from 1
     target: IndexArray  # (R,) index of the target on the last row of each dwell or arrival, else -1
     payload: Array  # (R,) mass carried from the row on [kg]
+    allowed: Array  # (R, O) depth of tool and payload in each obstacle that does not count [m], as of `TipRules`
     q: Array  # (R, D) joint values [rad] or [m]
     qd: Array  # (R, D) speeds [rad/s] or [m/s]
     qdd: Array  # (R, D) accelerations [rad/s²] or [m/s²]
@@ -45,13 +46,17 @@ def sample_trajectory(
     # The row at which a motion begins is the last one of the dwell before it.
     motion = np.maximum(np.searchsorted(begin[:-1], time - SAME_TIME) - 1, 0)
     q, qd, qdd = np.empty((3, len(time), arm.dof))
+    allowed = np.empty((len(time), plan.tip_rules.allowed.shape[1]))
     for index, path in enumerate(paths):
         rows = motion == index
         q[rows], qd[rows], qdd[rows] = _states(path, time[rows] - begin[index], durations[index])
+        share = quintic(np.clip((time[rows] - begin[index]) / durations[index], 0.0, 1.0))[0]
+        allowed[rows] = plan.rules(path.motion, share).allowed
     step, target, carried = _events(plan, motion)
     tau = _drive_torques(arm, q, qd, qdd, carried, payload)
     moves = arm.motion[0] != FIXED
-    return Trajectory(time, step, target, payload * carried, q[:, moves], qd[:, moves], qdd[:, moves], tau[:, moves])
+    states = (values[:, moves] for values in (q, qd, qdd, tau))
+    return Trajectory(time, step, target, payload * carried, allowed, *states)
 
 
 def _states(path: MotionPath, time: Array, duration: float) -> tuple[Array, Array, Array]:

@@ -131,6 +131,7 @@ function legend() {
   const parts = [...["x", "y", "z"].map((axis) => [joint[axis], labels[axis]]),
     [NOW, "current target"], [HIT, "reached"], [content.head.colours.target, "missed; compared design"]];
   if (content.obstacles.length) parts.push([content.head.colours.obstacle, "obstacle"]);
+  if (content.head.bodies.length) parts.push([content.head.colours.target, "tool, payload at targets"]);
   if (content.head.lines.length) parts.push([content.head.colours.target, "line of the cycle"]);
   if (content.head.workspace.length) parts.push([colour("soft"), "workspace (edges)"]);
   $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
@@ -181,9 +182,10 @@ function drawObstacles() {
   for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, stage.frame, materials.obstacle));
 }
 
-// Draws the lines of the cycle.
+// Draws the lines of the cycle, and tool and payload at the targets.
 function drawLines() {
   empty(groups.lines);
+  for (const body of content.head.bodies) groups.lines.add(...solidParts(body, stage.frame, materials.comparedMotor));
   const points = content.head.lines.flat(2);
   if (points.length) groups.lines.add(segments(points, new THREE.LineBasicMaterial({ color: content.head.colours.target })));
 }

@@ -7,7 +7,7 @@ from armwright.problem.checks.base_motor import check_base_motor
 from armwright.problem.checks.bounds import check_constraints
 from armwright.problem.checks.finding import Finding
 from armwright.problem.checks.idle_objectives import check_idle_objectives
-from armwright.problem.checks.inside_obstacles import check_obstacles
+from armwright.problem.checks.inside_obstacles import check_obstacles, check_tip_bodies
 from armwright.problem.checks.magnitudes import check_magnitudes
 from armwright.problem.checks.reach import check_reach
 from armwright.problem.checks.requirements import check_requirements
@@ -22,8 +22,8 @@ def check_instantly(problem: Problem) -> list[Finding]:
     """
     check_requirements(problem)
     checks = (
-        check_reach, check_obstacles, check_base_motor, check_constraints, check_strength, check_magnitudes,
-        check_idle_objectives,
+        check_reach, check_obstacles, check_tip_bodies, check_base_motor, check_constraints, check_strength,
+        check_magnitudes, check_idle_objectives,
     )  # fmt: skip
     findings = [finding for check in checks for finding in check(problem)]
     return sorted(findings, key=lambda finding: not finding.is_proven)
