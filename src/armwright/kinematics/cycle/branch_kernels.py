@@ -85,7 +85,7 @@ def branch_kernels() -> SimpleNamespace:
         while (
             wrist < chain.dof
             and chain.motion[arm, wrist] != motion
-            and wp.length(links_across(chain, arm, chain.motion[arm, wrist], wrist, wrist + 1)) < narrow * real(1e-6)
+            and wp.length(links_across(chain, arm, chain.motion[arm, wrist], wrist, wrist + 1)) < real(1e-9)
         ):
             wrist += 1
         if end == chain.dof:
