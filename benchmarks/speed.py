@@ -10,7 +10,7 @@ real-arms     axis targets, clearance and motors beside the paper's objectives
 cycles        candidates, path, clearance, durations and torques along seven lines; and designs with `--robust`, whose
               copies keep the postures of the design, beside copies that choose theirs
 motor-bodies  the same cycles with and without motor bodies and a column
-branches      of the branches of the inverse kinematics that 1,000 random starts reach without a collision where blocks of a
+branches      of the branches that 1,000 random starts reach without a collision where blocks of a
               cycle begin, the share that its candidates are from; and how many random designs are feasible
 reach-map     about 2,000 points with 50 directions each, and of 1,000 poses the share that is missed of those that 60
               random restarts of `aw.solve` find

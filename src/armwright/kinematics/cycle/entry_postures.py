@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_choice import cost_of
@@ -20,10 +20,9 @@ from armwright.tasks.obstacles import Obstacle
 
 STARTS, START_UPDATES = 32, 30  # of the inverse kinematics at each block's first pose
 KNOWN = 16  # of the postures found there that are mirrored, those that miss the pose included
-IMAGES, IMAGE_UPDATES = 48, 10  # postures with their images
+IMAGES, IMAGE_UPDATES = 48, 20  # postures with their images
 CANDIDATES = 24  # that lines are followed from
 DISTINCT, APART = 0.3, 0.7  # [rad] or [m] between postures that are mirrored, and between candidates
-ROOM = 0.1  # cost of less distance to a joint limit, relative to less distance from another candidate
 NEARLY = 1.5  # times the tolerance that a candidate may be off: lines begin with a refinement
 
 
@@ -47,7 +46,10 @@ def entry_postures(
     images = _branches(arms, q, cost_of(off - 1.0), KNOWN, IMAGES, DISTINCT, device)
     q, off = _solve(arms, poses, images, IMAGE_UPDATES, device)
     others = (off > NEARLY) & (off > off.min(axis=2, keepdims=True))
-    cost = np.where(others, np.inf, cost_of(off - 1.0) - ROOM * arms.limit_distance(q))
+    lower, upper = (limit.astype(np.float64)[:, None, None] for limit in (arms.lower, arms.upper))
+    room = np.minimum(q - lower, upper - q) / (upper - lower)
+    room = np.where((arms.motion == FIXED)[:, None, None], 1.0, room).min(axis=-1)
+    cost = np.where(others, np.inf, cost_of(off - 1.0) - room)
     q = _branches(arms, q, cost, candidates, candidates, APART, device)
     clearance = np.minimum(*clearances(arms, np.nan_to_num(q).reshape(len(arms), -1, arms.dof), obstacles, device))
     clearance = np.where(np.isnan(q[..., 0]), -np.inf, clearance.reshape(q.shape[:3]))
