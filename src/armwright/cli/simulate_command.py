@@ -36,7 +36,6 @@ def simulate(
 
     from pydantic_core import to_jsonable_python
 
-    from armwright.cli.notes import can_draw
     from armwright.proof.recommendation import recommend
     from armwright.proof.results import SUMMARY, read_summary
     from armwright.proof.simulated_run import Simulator
@@ -69,10 +68,6 @@ def simulate(
         if choice and summary is not None:
             summary["recommended"] = choice
             folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
-        for member in members if not all_ and can_draw(open_console(json_ or csv_)) else ():
-            from armwright.pictures.simulation_figure import write_simulation_figure
-
-            write_simulation_figure(run, history.member(member.result.design).arm, member)
     results = [member.result for member in members]
     if not print_records(json_, csv_, record, map(_row, results)):
         _show(open_console(), run, results, choice)
@@ -110,7 +105,7 @@ def _show(
     columns = (
         number("#", "design", str), text("verdict", "verdict"), number("cycle [s]", "cycle_time", "{:.2f}".format),
         number("energy [J]", "energy", "{:.1f}".format), number("tip error [mm]", "tip_error", _in_millimetres),
-        number("without feed-forward", "droop", _in_millimetres),
+        number("without feed-forward [mm]", "droop", _in_millimetres),
         number("peak torque / claimed", "torque_over_claimed", "{:.3f}".format),
     )  # fmt: skip
     print_table(console, columns, map(_row, results))
