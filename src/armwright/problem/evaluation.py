@@ -331,7 +331,8 @@ def evaluate_arrays(
         paths, postures = None, solve(initial_q, restarts=restarts)
     else:
         if roughly_near is None:
-            paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=near)
+            heaviest = float(scene.payload.max())
+            paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=near, payload=heaviest)
         else:
             paths = rough_paths(arrays, scene.plan, roughly_near, scene.obstacles, device)
         q = paths.postures(len(targets))

@@ -11,6 +11,7 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.line_following import BlockPaths, IndexArray, follow_lines
 from armwright.kinematics.devices import Device
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.tasks.motions import CyclePlan, LineSamples
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.tip_rules import joined_rules
@@ -19,14 +20,17 @@ MAX_STEP = 0.05  # [rad] between neighbouring samples
 MAX_SLIDE = 0.005  # [m] likewise of sliding joints
 JOINT_STEPS = 16  # of a joint motion
 HOPELESS = 10.0  # times the tolerance that a path is off, beyond which it is not refined
-ROUNDS = 4  # at least, of choosing candidates again where the chosen ones collide
+ROUNDS = 4  # of choosing candidates again where the chosen ones collide
 LOOPS = 3  # of a closed cycle without joint motions, until it ends where it began
-DISTINCT = 1e-3  # [rad] or [m] between candidates; nearer ones are the same
 CLOSED = 1e-3  # [rad] or [m] between the ends of a closed cycle
 ON_LIMIT = 1e-6  # [rad] or [m] from the limit of a joint
 LARGE_STEP = 0.5  # [rad] or [m] between coarse samples, where a jump is possible
 SUSPECT = 100.0  # cost of such a step: above any detour, below what is certain to be infeasible
 DEPTH = 1e-3  # [m] of a collision that costs as much as a path that is off by its tolerance
+LOAD = 1.0  # cost in seconds of a block in which a motor at rest gives its continuous torque
+OVERLOAD = 3.0  # times the continuous torque; more costs no more, so that collisions count first
+PEAK_SPEED = 1.875  # of a motion, relative to its mean speed
+SPENT = 1e12  # cost of what there is not
 BLOCKED = 1e3  # cost in seconds or radians of a chain that is off by its tolerance, far above any detour
 
 
@@ -38,12 +42,21 @@ class ChosenPostures:
     step_ratios: Array
     """(N, 2) the largest step of coarse samples relative to the allowed one, along lines and along joint motions."""
     hopeless: NDArray[np.bool_]  # (N,) True if the path is so far off that more samples cannot mend it
+    branches: IndexArray  # (N, B) number of candidates that follow the lines of their block
 
 
 def choose_postures(
-    arms: ArmArrays, plan: CyclePlan, entry: Array, obstacles: Sequence[Obstacle], device: Device
+    arms: ArmArrays,
+    plan: CyclePlan,
+    entry: Array,
+    obstacles: Sequence[Obstacle],
+    device: Device,
+    payload: float = 0.0,
 ) -> ChosenPostures:
-    """Choose among the candidates (N, B, K, D) at the first pose of each block."""
+    """Choose among the candidates (N, B, K, D) at the first pose of each block; NaN where there are fewer.
+
+    payload: its mass when carried [kg].
+    """
     samples = plan.sample()
     lines = follow_lines(arms, samples, entry, device)
     starts, ends = lines.ends(samples)
@@ -51,15 +64,18 @@ def choose_postures(
         lines = follow_lines(arms, samples, ends, device)
         starts, ends = lines.ends(samples)
     speed = _speeds(arms)
-    blocks = _block_costs(arms, lines, samples, speed)
-    same = np.abs(starts[:, :, :, None] - starts[:, :, None]).max(axis=-1) < DISTINCT  # (N, B, K, K)
-    blocks[np.tril(same, -1).any(axis=-1)] = np.inf  # equal to an earlier candidate
+    blocks = np.nan_to_num(_block_costs(arms, lines, samples, speed), nan=SPENT, posinf=SPENT)
     if plan.is_loop:
         blocks += cost_of(np.abs(ends - starts).max(axis=-1) / CLOSED - 1.0)
     following = starts[:, [(b + 1) % len(plan.blocks) for b in range(len(plan.joint_motions))]]
     change = np.abs(following[:, :, None] - ends[:, : len(plan.joint_motions), :, None])  # (N, E, K, K, D)
-    edges = (change / speed[:, None, None, None]).max(axis=-1)
-    choice = _avoid_collisions(arms, plan, samples, lines, blocks.copy(), edges.copy(), obstacles, device)
+    edges = np.nan_to_num((change / speed[:, None, None, None]).max(axis=-1), nan=SPENT, posinf=SPENT)
+    branches = (blocks < BLOCKED).sum(axis=2)
+    loads = LOAD * _static_loads(arms, plan, np.stack([starts, ends]), payload, device)
+    if arms.actuation is not None:
+        times = [plan.times[plan.motions[index].step] or np.inf for index in plan.joint_motions]
+        edges += cost_of(PEAK_SPEED * edges / np.array(times)[:, None, None] - 1.0)
+    choice = _avoid_collisions(arms, plan, samples, lines, blocks + loads, edges.copy(), obstacles, device)
     index, block = np.arange(len(arms), dtype=np.intp), np.arange(len(plan.blocks))
     chosen, arm = lines.choose(samples, choice, index), index[:, None]
     steps = np.abs(np.diff(chosen, axis=1))
@@ -69,7 +85,32 @@ def choose_postures(
     allowed = np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
     ratios = [(part / allowed).max(axis=(1, 2), initial=0.0) for part in (steps, turn / JOINT_STEPS)]
     hopeless = blocks[arm, block, choice].max(axis=1) > HOPELESS * BLOCKED
-    return ChosenPostures(starts[arm, block, choice], np.stack(ratios, axis=1), hopeless)
+    return ChosenPostures(starts[arm, block, choice], np.stack(ratios, axis=1), hopeless, branches)
+
+
+def _static_loads(arms: ArmArrays, plan: CyclePlan, q: Array, payload: float, device: Device) -> Array:
+    """Return (N, B, K) fourth powers of the largest share of a continuous torque at rest, the mean of a block's ends.
+
+    q: (2, N, B, K, D) first and last postures.
+    """
+    _, n, b, k, dof = q.shape
+    if arms.actuation is None:
+        return np.zeros((n, b, k))
+    motions = [(*block.lines, *plan.joint_motions[max(at - 1, 0) : at + 1]) for at, block in enumerate(plan.blocks)]
+    carries = [float(any(plan.motions[index].carries for index in each)) for each in motions]
+    torque = solve_postures(
+        arms,
+        np.zeros((2 * b * k, 3)),
+        0,
+        initial_q=np.nan_to_num(q.swapaxes(0, 1).reshape(n, -1, dof)),
+        payload=payload * np.tile(np.repeat(carries, k), 2),
+        precision=arms.precision,
+        device=device,
+    ).torque.reshape(n, 2, b, k, dof)
+    drives = arms.actuation
+    limit = np.nan_to_num(np.fmin(drives.continuous, drives.peak), nan=np.inf) / drives.safety_factor[:, None]
+    share = (np.abs(torque) / limit[:, None, None, None]).max(axis=-1)
+    return (np.minimum(share, OVERLOAD) ** 4).mean(axis=1)
 
 
 def _speeds(arms: ArmArrays) -> Array:
@@ -119,7 +160,9 @@ def _avoid_collisions(
     n_blocks, n_edges, candidates = blocks.shape[1], edges.shape[1], blocks.shape[2]
     joint_motions = [plan.rules(plan.motions[i], share) for i in plan.joint_motions[:n_edges]]
     rules = joined_rules([plan.sampled_rules(samples), *joint_motions])
-    for _ in range(max(ROUNDS, candidates) if candidates > 1 else 0):
+    for _ in range(ROUNDS if candidates > 1 else 0):
+        if not len(index):
+            break
         part = arms[index]
         chosen = lines.choose(samples, choice, index)  # (n, S, D)
         start = chosen[:, samples.first[1:] - 1][:, :n_edges]
@@ -130,14 +173,13 @@ def _avoid_collisions(
         in_blocks = np.maximum.reduceat(depth[:, : chosen.shape[1]], samples.first[:-1], axis=1)
         in_edges = depth[:, chosen.shape[1] :].reshape(len(index), n_edges, len(share)).max(axis=2, initial=0.0)
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)
-        if not colliding.any():
-            break
         edge = np.arange(n_edges, dtype=np.intp)
         blocks[index[:, None], np.arange(n_blocks), choice[index]] += cost_of(in_blocks / DEPTH)
         following = choice[index][:, (edge + 1) % n_blocks]
         edges[index[:, None], edge, choice[index][:, :n_edges], following] += cost_of(in_edges / DEPTH)
         index = index[colliding]
-        choice[index] = choose_candidates(blocks[index], edges[index], closed)
+        before, choice[index] = choice[index], choose_candidates(blocks[index], edges[index], closed)
+        index = index[(before != choice[index]).any(axis=1)]  # else nothing is better
     return choice
 
 
@@ -160,7 +202,7 @@ def choose_candidates(blocks: Array, edges: Array, closed: bool) -> IndexArray:
         total = through.min(axis=2) + blocks[:, block, None]
     if closed:
         total = total + edges[:, b - 1].swapaxes(1, 2)  # from candidate j of the last block to s
-    start, end = np.divmod(total.reshape(n, -1).argmin(axis=1), k)
+    start, end = np.divmod(total.reshape(n, k * k).argmin(axis=1), k)
     arm = np.arange(n, dtype=np.intp)
     choice = np.empty((n, b), dtype=np.intp)
     choice[:, -1] = end

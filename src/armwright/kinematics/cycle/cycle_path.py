@@ -61,6 +61,7 @@ class CyclePaths:
     """(N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that speeds are
     not."""
     worst: Array  # (N, M, 3) share of the motion at which path error, angle and clearance are worst
+    branches: IndexArray | None = None  # (N, B) as in `ChosenPostures`; None for rough paths
     instants: int = INSTANTS
     """F, the number of instants of a motion, equally spaced in time, at which its loads are evaluated."""
 
@@ -93,17 +94,19 @@ def find_paths(
     candidates: int = CANDIDATES,
     device: Device = "cpu",
     near: Array | None = None,
+    payload: float = 0.0,
 ) -> CyclePaths:
     """Find the joint paths of N arms through a cycle. A path that is off is a result, never an exception.
 
     candidates: K, the number of postures at the first pose of each block to choose from.  near: (N, B, D) postures
-    there that the arms are to keep, as far as they can, instead of choosing from candidates.
+    there that the arms are to keep, as far as they can, instead of choosing from candidates.  payload: its mass when
+    carried [kg].
     """
     if near is None:
         postures = entry_postures(arms, plan, obstacles, candidates, device)
     else:
         postures = postures_near(arms, plan, near, device)
-    chosen = choose_postures(arms, plan, postures, obstacles, device)
+    chosen = choose_postures(arms, plan, postures, obstacles, device, payload)
     n, entry, ratios = len(arms), chosen.entry, chosen.step_ratios
     is_line = np.array([motion.by == "line" for motion in plan.motions])
     refinement, before = _refined(np.ones(n, dtype=np.intp), ratios.max(axis=1)), ratios[:, 0]
@@ -127,7 +130,8 @@ def find_paths(
                 groups.append(CycleGroup(index[rows], part[rows], found, kind))
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
-    return _measure(plan, entry, groups, jumps, obstacles, device)
+    found = _measure(plan, entry, groups, jumps, obstacles, device)
+    return replace(found, branches=chosen.branches)
 
 
 def rough_paths(

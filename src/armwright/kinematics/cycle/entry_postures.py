@@ -1,4 +1,8 @@
-"""Postures of arms at the first pose of each block of a cycle."""
+"""Postures of arms at the first pose of each block of a cycle: of every branch of the inverse kinematics.
+
+Postures from several starts are carried over to their mirror images (branch_kernels.py), which a few more updates
+refine.
+"""
 
 from collections.abc import Sequence
 
@@ -6,16 +10,20 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.contact.clearance import clearances
-from armwright.kinematics.cycle.cycle_choice import DEPTH, DISTINCT, cost_of
-from armwright.kinematics.devices import Device
-from armwright.kinematics.ik.ik import solve_postures
+from armwright.kinematics.cycle.cycle_choice import cost_of
+from armwright.kinematics.devices import Device, load_kernels
+from armwright.kinematics.ik.ik import UPDATES, solve_postures
 from armwright.tasks.motions import CyclePlan, Poses
 from armwright.tasks.obstacles import Obstacle
 
-STARTS = 16  # of the inverse kinematics at each block's first pose
-CANDIDATES = 4  # of the postures found there that lines are followed from
-SPENT = 1e12  # cost of a posture that is a candidate already
+STARTS, START_UPDATES = 32, 30  # of the inverse kinematics at each block's first pose
+KNOWN = 16  # of the postures found there that are mirrored, those that miss the pose included
+IMAGES, IMAGE_UPDATES = 48, 20  # postures with their images
+CANDIDATES = 24  # that lines are followed from
+DISTINCT, APART = 0.3, 0.7  # [rad] or [m] between postures that are mirrored, and between candidates
+NEARLY = 1.5  # times the tolerance that a candidate may be off: lines begin with a refinement
 
 
 def entry_postures(
@@ -25,58 +33,73 @@ def entry_postures(
     candidates: int = CANDIDATES,
     device: Device = "cpu",
 ) -> Array:
-    """Return (N, B, K, D) postures at the first pose of each block: the best of several starts that differ.
+    """Return (N, B, K, D) postures at the first pose of each block that differ, NaN where there are fewer than K.
 
-    The first start is the straight arm, the others are spread over the joints' ranges. Postures are ranked by what they
-    are off by and how deep they collide, then by their distance to the joint limits.
+    The first start is the straight arm, the others are spread over the joints' ranges. The first posture has the most
+    room to the joint limits, each other one is the farthest from those before. If none reaches the pose, the nearest is
+    the only one; if all collide, the one that does so least.
     """
     poses = plan.poses[[block.entry for block in plan.blocks]]
-    n, b, starts = len(arms), len(poses), max(STARTS, candidates)
-    lower, upper = arms.lower.astype(np.float64), arms.upper.astype(np.float64)
-    start = arms.random_postures(starts).swapaxes(0, 1)  # (N, S, D)
-    start[:, 0] = 0.0
-    q, off = _solve(arms, poses[np.repeat(np.arange(b), starts)], np.tile(start, (1, b, 1)), device)
+    start = arms.random_postures(STARTS).swapaxes(0, 1)[:, None]  # (N, 1, S, D)
+    start[:, :, 0] = 0.0
+    q, off = _solve(arms, poses, np.repeat(start, len(poses), axis=1), START_UPDATES, device)
+    images = _branches(arms, q, cost_of(off - 1.0), KNOWN, IMAGES, DISTINCT, device)
+    q, off = _solve(arms, poses, images, IMAGE_UPDATES, device)
+    others = (off > NEARLY) & (off > off.min(axis=2, keepdims=True))
+    lower, upper = (limit.astype(np.float64)[:, None, None] for limit in (arms.lower, arms.upper))
+    room = np.minimum(q - lower, upper - q) / (upper - lower)
+    room = np.where((arms.motion == FIXED)[:, None, None], 1.0, room).min(axis=-1)
+    cost = np.where(others, np.inf, cost_of(off - 1.0) - room)
+    q = _branches(arms, q, cost, candidates, candidates, APART, device)
     samples = plan.sample()
-    rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], starts)]
-    depth = np.maximum(0.0, -np.minimum(*clearances(arms, q, obstacles, device, rules)))
-    room = np.minimum(q - lower[:, None], upper[:, None] - q) / (upper - lower)[:, None]
-    room = np.where(arms.motion[:, None] == FIXED, 1.0, room).min(axis=-1)
-    cost = (cost_of(off - 1.0) + cost_of(depth / DEPTH) - room).reshape(n, b, starts)
-    return _spread(q.reshape(n, b, starts, arms.dof), cost, candidates)
-
-
-def _spread(q: Array, cost: Array, count: int) -> Array:
-    """Return (N, B, K, D) of the postures (N, B, S, D): the cheapest, then the ones farthest from those chosen before.
-
-    cost: (N, B, S), far above any distance for postures that are off or collide.
-    """
-    chosen: list[Array] = []
-    nearness = cost
-    distance = np.full(cost.shape, np.inf)
-    for _ in range(count):
-        best = nearness.argmin(axis=-1)[..., None]
-        posture = np.take_along_axis(q, best[..., None], axis=2)
-        chosen.append(posture)
-        distance = np.minimum(distance, np.abs(q - posture).max(axis=-1))
-        nearness = np.where(distance < DISTINCT, SPENT, cost - distance)
-    return np.concatenate(chosen, axis=2)
+    rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], q.shape[2])]
+    flat = np.nan_to_num(q).reshape(len(arms), -1, arms.dof)
+    clearance = np.minimum(*clearances(arms, flat, obstacles, device, rules))
+    clearance = np.where(np.isnan(q[..., 0]), -np.inf, clearance.reshape(q.shape[:3]))
+    dropped = clearance < np.minimum(0.0, clearance.max(axis=2, keepdims=True))
+    order = np.argsort(dropped, axis=2, kind="stable")[..., : (~dropped).sum(axis=2).max()]
+    return np.take_along_axis(np.where(dropped[..., None], np.nan, q), order[..., None], axis=2)
 
 
 def postures_near(arms: ArmArrays, plan: CyclePlan, near: Array, device: Device = "cpu") -> Array:
     """Return (N, B, 1, D) postures at the first pose of each block, solved from postures of similar arms (N, B, D)."""
     poses = plan.poses[[block.entry for block in plan.blocks]]
-    return _solve(arms, poses, near, device)[0][:, :, None]
+    return _solve(arms, poses, near[:, :, None], UPDATES, device)[0]
 
 
-def _solve(arms: ArmArrays, poses: Poses, start: Array, device: Device) -> tuple[Array, Array]:
-    """Return (N, P, D) postures at P poses, and (N, P) what they are off by relative to the tolerance."""
+def _solve(arms: ArmArrays, poses: Poses, start: Array, updates: int, device: Device) -> tuple[Array, Array]:
+    """Return (N, B, S, D) postures at B poses, and (N, B, S) what they are off by relative to the tolerance.
+
+    Those that start from NaN are infinitely far off.
+    """
+    n, b, s, dof = start.shape
+    each = poses[np.repeat(np.arange(b), s)]
     solved = solve_postures(
         arms,
-        poses.position,
-        initial_q=start,
-        target_arrays=poses.arrays,
+        each.position,
+        updates,
+        initial_q=np.nan_to_num(start).reshape(n, b * s, dof),
+        target_arrays=each.arrays,
         precision=arms.precision,
         device=device,
     )
-    off = np.maximum(solved.distance(poses.position) / poses.tolerance, solved.angle / poses.angle_tolerance)
-    return solved.q.astype(np.float64), off
+    off = np.maximum(solved.distance(each.position) / each.tolerance, solved.angle / each.angle_tolerance)
+    off = np.where(np.isnan(start).any(axis=-1), np.inf, off.reshape(n, b, s))
+    return solved.q.astype(np.float64).reshape(start.shape), off
+
+
+def _branches(arms: ArmArrays, q: Array, cost: Array, known: int, count: int, distinct: float, device: Device) -> Array:
+    """Return (N, B, count, D) of postures (N, B, S, D) that differ: the best `known` by cost, then their images."""
+    loaded = load_kernels("cycle.branch_kernels", device)
+    n, b, s, dof = q.shape
+    found = np.full((n, b, count, dof), np.nan)
+
+    def find(chunk: slice) -> None:
+        values = {name: getattr(arms[chunk], name) for name in ("dof", "motion", "offset", "lower", "upper")}
+        chain, part, nearness = loaded.struct("Chain", values), found[chunk], np.full((*cost[chunk].shape,), np.inf)
+        loaded.launch(
+            "find_branches", part.shape[:2], chain, q[chunk], cost[chunk], known, distinct, nearness, outputs=[part]
+        )
+
+    in_chunks(find, n, max(1, SAMPLES[device] // (b * s)), device)
+    return found

@@ -62,6 +62,8 @@ def path_kernels() -> SimpleNamespace:
         for j in range(path.dof):
             q[j] = entry[arm, thread, j]
         updates = int(UPDATES)
+        if wp.isnan(q[0]):  # no candidate
+            updates = int(0)  # noqa: RUF046, UP018
         for sample in range(path.first[block], path.first[block + 1]):
             kind = path.n_angular[sample]
             for j in range(path.dof):

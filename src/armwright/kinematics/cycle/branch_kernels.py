@@ -1,0 +1,171 @@
+"""Warp kernels that tell the branches of the inverse kinematics apart, and find more of them by mirroring known ones.
+
+A turn by π about an axis a reverses rotations about axes b perpendicular to it: R_a(π) R_b(φ) = R_b(-φ) R_a(π). So if a
+joint about a turns by π, those about other axes up to the next joint about a are negated, and that one turns back, all
+links stay where they are, if they lie on a line along a when straight. This is how shoulders and wrists flip. After the
+last joint about a, the tool turns about itself.
+
+An elbow: of a joint i and the next one m about the same axis, u leads from i to m and v from m to a joint k, in the
+plane perpendicular to the axis. Mirrored at w = u + v, k stays where it is. Joint i turns by 2 ∠(u, w), joint m by
+2 ∠(v, w) - 2 ∠(u, w), and joint k, if it is about the same axis, by -2 ∠(v, w), so that what follows stays as well. If
+k is not, or links are off the line, an image is only near another branch, and the inverse kinematics has to refine it.
+"""
+
+# Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from armwright.kinematics.arms.arm_arrays import MAX_JOINTS, PRISMATIC
+from armwright.kinematics.arms.frame_math import frame_math
+from armwright.kinematics.arms.ik_math import kernel
+
+OUTSIDE = 0.7
+NARROW = 0.15  # of an arm's length, by which links may lie off the line that they are turned about
+
+
+@cache
+def branch_kernels() -> SimpleNamespace:
+    """Return the kernels."""
+    base = frame_math("float64")
+    real, Vector3 = base.real, base.Vector3
+    Values = wp.types.vector(length=MAX_JOINTS, dtype=real)
+    Plane = wp.types.vector(length=2, dtype=real)
+    two, infinity = real(2.0), real(float("inf"))
+    pi, narrow = real(3.141592653589793), real(NARROW)
+
+    @wp.struct
+    class Chain:
+        """Arms, as far as images depend on them."""
+
+        dof: int
+        motion: wp.array2d(dtype=int)  # (N, D)
+        offset: wp.array2d(dtype=Vector3)  # (N, D)
+        lower: wp.array2d(dtype=real)  # (N, D)
+        upper: wp.array2d(dtype=real)  # (N, D)
+
+    @wp.func
+    def between(u: Plane, w: Plane):
+        """Return the angle from u to w about the axis [rad]."""
+        return wp.atan2(u[0] * w[1] - u[1] * w[0], wp.dot(u, w))
+
+    @wp.func
+    def links_across(chain: Chain, arm: int, motion: int, first: int, end: int):
+        """Return the links of joints from `first` to before `end`, perpendicular to an axis, with all joints at 0."""
+        links = Plane()
+        for j in range(first, end):
+            offset = chain.offset[arm, j]
+            links += Plane(offset[(motion + 1) % 3], offset[(motion + 2) % 3])
+        return links
+
+    @wp.func
+    def image_of(chain: Chain, arm: int, joint: int, is_elbow: bool, q: Values):
+        """Return the image by an elbow or a turn about the axis of a joint, and whether there is one."""
+        motion = chain.motion[arm, joint]
+        end, others = int(joint + 1), int(0)  # noqa: RUF046, UP018
+        length = real(0.0)
+        while end < chain.dof and chain.motion[arm, end] != motion:
+            others += wp.where(chain.motion[arm, end] < wp.static(PRISMATIC), 1, 0)
+            end += 1
+        for j in range(chain.dof):
+            length += wp.length(chain.offset[arm, j])
+        u = links_across(chain, arm, motion, joint, end)
+        if not is_elbow:
+            q[joint] = q[joint] + pi
+            for j in range(joint + 1, end):
+                if chain.motion[arm, j] < wp.static(PRISMATIC):
+                    q[j] = -q[j]
+            if end < chain.dof:
+                q[end] = q[end] - pi
+            return q, others > 0 and wp.length(u) < narrow * length
+        wrist = int(end + 1)
+        # A joint about the line of its link moves nothing up to the next one.
+        while (
+            wrist < chain.dof
+            and chain.motion[arm, wrist] != motion
+            and wp.length(links_across(chain, arm, chain.motion[arm, wrist], wrist, wrist + 1)) < real(1e-9)
+        ):
+            wrist += 1
+        if end == chain.dof:
+            return q, False
+        bent, s, c = links_across(chain, arm, motion, end, wrist), wp.sin(q[end]), wp.cos(q[end])
+        v = Plane(c * bent[0] - s * bent[1], s * bent[0] + c * bent[1])  # in the frame of u
+        first, second = between(u, u + v), between(v, u + v)
+        q[joint] = q[joint] + two * first
+        q[end] = q[end] + two * (second - first)
+        if wrist < chain.dof and chain.motion[arm, wrist] == motion:
+            q[wrist] = q[wrist] - two * second
+        return q, others == 0 and wp.length(u) > real(0.0) and wp.length(v) > real(0.0)
+
+    @wp.func
+    def distance(q: wp.array4d(dtype=real), arm: int, block: int, row: int, other: Values, dof: int):
+        """Return the largest difference of a joint between a posture and another one."""
+        largest = real(0.0)
+        for j in range(dof):
+            largest = wp.max(largest, wp.abs(q[arm, block, row, j] - other[j]))
+        return largest
+
+    @kernel
+    def find_branches(
+        chain: Chain,
+        q: wp.array4d(dtype=real),
+        cost: wp.array3d(dtype=real),
+        known: int,
+        distinct: real,
+        nearness: wp.array3d(dtype=real),
+        found: wp.array4d(dtype=real),
+    ):
+        """Choose postures that differ, then add their images, and images of images, until there is no more room.
+
+        The cheapest posture is chosen first, then each time the one with the least cost minus distance from those.
+
+        q: (N, B, S, D).  cost: (N, B, S), infinite for those not to choose.  known: the number chosen at most.
+        distinct: between postures, nearer ones count as the same [rad] or [m].
+        nearness: (N, B, S) of infinite values.  found: (N, B, K, D), NaN where nothing was found.
+        """
+        arm, block = wp.tid()
+        count = int(0)  # noqa: RUF046, UP018
+        image = Values()
+        for _ in range(known):
+            best, least = int(-1), real(infinity)  # noqa: RUF046, UP018
+            for row in range(q.shape[2]):
+                value = cost[arm, block, row] - nearness[arm, block, row]
+                if nearness[arm, block, row] >= distinct and value < least:
+                    best, least = row, value
+            if best >= 0:
+                for j in range(chain.dof):
+                    image[j] = q[arm, block, best, j]
+                    found[arm, block, count, j] = image[j]
+                for row in range(q.shape[2]):
+                    off = distance(q, arm, block, row, image, chain.dof)
+                    nearness[arm, block, row] = wp.min(nearness[arm, block, row], off)
+                count += 1
+        mirrored = int(0)  # noqa: RUF046, UP018
+        while mirrored < count and known < found.shape[2]:
+            for candidate in range(2 * chain.dof):
+                joint = candidate / 2
+                if chain.motion[arm, joint] < wp.static(PRISMATIC) and count < found.shape[2]:
+                    for j in range(chain.dof):
+                        image[j] = found[arm, block, mirrored, j]
+                    image, is_image = image_of(chain, arm, joint, candidate % 2 == 1, image)
+                    valid = bool(is_image)
+                    for j in range(chain.dof):
+                        if chain.motion[arm, j] < wp.static(PRISMATIC):
+                            middle = (chain.lower[arm, j] + chain.upper[arm, j]) / two
+                            image[j] = image[j] - two * pi * wp.round((image[j] - middle) / (two * pi))
+                            inside = wp.clamp(image[j], chain.lower[arm, j], chain.upper[arm, j])
+                            if wp.abs(inside - image[j]) > wp.static(real(OUTSIDE)):
+                                valid = False
+                            image[j] = inside
+                    for row in range(count):
+                        if valid and distance(found, arm, block, row, image, chain.dof) < distinct:
+                            valid = False
+                    if valid:
+                        for j in range(chain.dof):
+                            found[arm, block, count, j] = image[j]
+                        count += 1
+            mirrored += 1
+
+    return SimpleNamespace(Chain=Chain, find_branches=find_branches)

@@ -1,0 +1,76 @@
+"""Branches of the inverse kinematics at the first poses of blocks, and the choice among them."""
+
+import numpy as np
+import pytest
+from scipy.cluster.hierarchy import fcluster, linkage
+
+from armwright.arrays import Array
+from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
+from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.cycle.entry_postures import entry_postures
+from armwright.kinematics.ik.ik import solve_postures
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.spaces.design_space import load_space
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.motions import Poses
+from armwright.tasks.task import Task
+
+STARTS = 300
+APART = 1.0  # [rad] between postures of different branches
+
+
+def problem(name: str) -> Problem:
+    return Problem(load_task(name), load_space(name))
+
+
+def entries(given: Problem) -> Poses:
+    plan = given.scenes[0].plan
+    assert plan is not None
+    return plan.poses[[block.entry for block in plan.blocks]]
+
+
+def reached(arms: ArmArrays, poses: Poses, start: Array) -> tuple[Array, Array]:
+    """Solved postures (N, B, S, D) from S starts, and whether they reach their pose freely; start: (N, B, S, D)."""
+    n, b, s, dof = start.shape
+    each = poses[np.repeat(np.arange(b), s)]
+    found = solve_postures(arms, each.position, initial_q=start.reshape(n, -1, dof), target_arrays=each.arrays)
+    is_near = (found.distance(each.position) < each.tolerance) & (found.angle < each.angle_tolerance)
+    q = found.q.astype(np.float64)
+    return q.reshape(start.shape), (is_near & (clearances(arms, q)[0] >= 0.0)).reshape(n, b, s)
+
+
+@pytest.mark.parametrize("name", ["casting-inspection", "desk-sorting", "box-palletising"])
+def test_branches_of_many_random_starts_are_found(name: str) -> None:
+    given = problem(name)
+    arms, poses, plan = given.arms(given.space.matrix(given.space.sample(40, 1))), entries(given), given.scenes[0].plan
+    assert plan is not None
+    start = np.random.default_rng(1).uniform(size=(len(arms), len(poses), STARTS, arms.dof))
+    lower, upper = (limit.astype(np.float64)[:, None, None] for limit in (arms.lower, arms.upper))
+    q, is_near = reached(arms, poses, lower + start * (upper - lower))
+    known, is_known = reached(arms, poses, np.nan_to_num(entry_postures(arms, plan)))
+    branches = hit = 0
+    for row in np.ndindex(q.shape[:2]):
+        if is_near[row].sum() > 1:
+            own, candidates = q[row][is_near[row]], known[row][is_known[row]]
+            label = fcluster(linkage(own, "single", "chebyshev"), APART, "distance")
+            distance = np.abs(own[:, None] - candidates).max(axis=-1).min(axis=1, initial=np.inf)
+            branches += label.max()
+            hit += len(set(label[distance < APART]))
+    assert branches > 15
+    assert hit >= 0.8 * branches
+
+
+def test_shoulder_and_elbow_of_an_upright_arm_give_four_branches() -> None:
+    """q₁ or q₁ + π, each with the elbow on either side; the wrist follows."""
+    joints = (Joint("revolute", "z", -3.1, 3.1), *(Joint("revolute", "y", -3.1, 3.1),) * 3)
+    links = tuple(uniform_link((0.0, 0.0, length), 0.2, 0.01) for length in (0.1, 0.3, 0.25, 0.1))
+    target = {"position": [0.3, 0.1, 0.1], "axis": [0.0, 0.0, -1.0]}
+    content = {"cycle": {"closed": False, "steps": [{"to": 1}, {"to": 2}]}}
+    task = Task.model_validate({"name": "one", "targets": [target, {**target, "position": [0.1, 0.3, 0.1]}], **content})
+    arms = stack_arms([Arm((0.0, 0.0, 0.0), joints, links)], "float64")
+    plan = task.plan(task.target_positions)
+    q = entry_postures(arms, plan)[0, 0]
+    q = q[~np.isnan(q[:, 0])]
+    assert sorted(np.round(q[:, 0], 3)) == [-2.82, -2.82, 0.322, 0.322]
+    assert sorted(np.sign(np.sin(q[:, 2]))) == [-1.0, -1.0, 1.0, 1.0]
