@@ -119,31 +119,6 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             return record
         return record.model_copy(update={"corner_speed": min(record.corner_speed, record.speed)})
 
-    def at_voltage(self, share: float) -> "ActuatorRecord":
-        """Return the completed record at a share of its supply voltage.
-
-        The falling line of torque over speed shifts in parallel with the voltage, because the back-EMF takes what the
-        winding lacks (Siciliano et al. 2009, section 5.2). So the no-load speed falls with the voltage, and the stall
-        torque of a motor without a corner speed, too. Up to a corner speed, the controller limits the current: the peak
-        torque stays as long as the line allows it. Copper loss at a torque does not change, nor does the continuous
-        torque; the current from the supply grows accordingly. Without a known speed, the peak torque falls with the
-        voltage.
-        """
-        record = self.completed()
-        values: dict[str, float] = {}
-        torque = share
-        if record.speed is not None:
-            corner = record.corner_speed or 0.0
-            falling = record.speed - corner
-            torque = min(1.0, share * record.speed / falling) if falling > 0.0 else 1.0
-            values |= {
-                "speed": share * record.speed,
-                "corner_speed": max(0.0, corner - (1.0 - share) * record.speed),
-            }
-        factors = {"peak_torque": torque, "stall_torque": torque, "voltage": share, "current": torque**2 / share}
-        known = {name: value for name in factors if (value := value_of(record, name)) is not None}
-        return record.model_copy(update=values | {name: factors[name] * value for name, value in known.items()})
-
     def _defaults(self) -> dict[str, float]:
         """Return the defaults of the values that are not stated. The stall torque is a peak torque, if it is stated."""
         rated = self.rated_torque or 0.0

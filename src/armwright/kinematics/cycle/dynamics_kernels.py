@@ -77,7 +77,8 @@ def dynamics_kernels() -> SimpleNamespace:
         """Compute the terms of the torque along a motion.
 
         q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  carried: (S,) share of
-        the payload that is carried.  terms: (3, N, S, D) gravity, drag and push [N m] or [N].
+        the payload that is carried.  terms: (6, N, S, D) gravity, drag and push, and what the payload adds to each
+        [N m] or [N].
         """
         arm, sample = wp.tid()
         # Frames of all links: position of the joint, its axis, and the x and y axes of what it carries.
@@ -133,19 +134,22 @@ def dynamics_kernels() -> SimpleNamespace:
             frame = wp.matrix_from_cols(x, y, z)
             lever = tip - before + frame * bodies.payload_com[arm]
             mass, inertia = carried[sample] * bodies.payload_mass, carried[sample] * bodies.payload_inertia[arm]
-            total_force, total_moment = wrench(mass, inertia, frame, lever, acceleration, alpha, omega)
+            carried_force, carried_moment = wrench(mass, inertia, frame, lever, acceleration, alpha, omega)
+            total_force, total_moment = carried_force, carried_moment
             after = before
             for step in range(bodies.dof):
                 j = bodies.dof - 1 - step
                 here = row(place, j)
                 total_moment = total_moment + wp.cross(after - here, total_force) + row(moment, j)
+                carried_moment = carried_moment + wp.cross(after - here, carried_force)
                 total_force = total_force + row(force, j)
-                load = real(0.0)
+                load, added = real(0.0), real(0.0)
                 if bodies.motion[arm, j] < wp.static(PRISMATIC):
-                    load = wp.dot(row(axis, j), total_moment)
+                    load, added = wp.dot(row(axis, j), total_moment), wp.dot(row(axis, j), carried_moment)
                 elif bodies.motion[arm, j] < wp.static(FIXED):
-                    load = wp.dot(row(axis, j), total_force)
+                    load, added = wp.dot(row(axis, j), total_force), wp.dot(row(axis, j), carried_force)
                 terms[term, arm, sample, j] = load
+                terms[3 + term, arm, sample, j] = added
                 after = here
 
     return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms)

@@ -26,6 +26,7 @@ class TorqueTerms:
     push: Array  # (N, R, D)
     q_s: Array  # (N, R, D) derivative of the joint values by s [rad] or [m]
     q_ss: Array  # (N, R, D) second derivative
+    payload: Array  # (3, N, R, D) what the payload adds to gravity, drag and push, in proportion to its mass
 
 
 def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[TorqueTerms, ...]]:
@@ -35,11 +36,11 @@ def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> l
         q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
         counts = [path.q.shape[1] for path in group.paths]
         carried = np.repeat([float(path.motion.carries) for path in group.paths], counts)
-        terms = _terms(group.arms, q, q_s, q_ss, carried, payload, device)  # (3, n, S, D)
+        terms = _terms(group.arms, q, q_s, q_ss, carried, payload, device)  # (6, n, S, D)
         spans = np.cumsum([0, *counts])
         found.append(
             tuple(
-                TorqueTerms(terms[0, :, a:b], terms[1, :, a:b], terms[2, :, a:b], q_s[:, a:b], q_ss[:, a:b])
+                TorqueTerms(*(each[:, a:b] for each in (*terms[:3], q_s, q_ss)), payload=terms[3:, :, a:b])
                 for a, b in pairwise(spans)
             )
         )
@@ -54,8 +55,8 @@ def inverse_dynamics_torques(
     q, qd, qdd: (N, S, D) joint values [rad] or [m], speeds [rad/s] or [m/s] and accelerations [rad/s²] or [m/s²].
     carried: (S,) share of the payload that is carried.  payload: its mass [kg].
     """
-    gravity, drag, _ = _terms(arms, q, qd, qdd, carried, payload, device)  # M q_ss + C q_s, with the time as share
-    return gravity + drag
+    terms = _terms(arms, q, qd, qdd, carried, payload, device)
+    return terms[0] + terms[1]  # gravity, and M q_ss + C q_s with the time as share
 
 
 def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, device: Device = "cpu") -> Array:
@@ -76,16 +77,16 @@ def _values(path: MotionPath, order: int) -> Array:
 
 
 def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device) -> Array:
-    """Return (3, N, S, D) gravity, drag and push of N arms at S samples."""
+    """Return (6, N, S, D) gravity, drag and push of N arms at S samples, and what the payload adds to each."""
     loaded = load_kernels("cycle.dynamics_kernels", device)
-    terms = np.empty((3, *q.shape))
+    terms = np.empty((6, *q.shape))
 
     def solve(chunk: slice) -> None:
         part = arms[chunk]
         values: dict[str, Any] = {name: getattr(part, name) for name in ("dof", "base", "motion", "offset")}
         values |= vars(part.rigid_bodies) | {"payload_mass": loaded.warp.float64(payload)}
         values |= {"payload_com": part.payload_center, "payload_inertia": payload * part.payload_gyration}
-        bodies, found = loaded.struct("Bodies", values), np.empty((3, *q[chunk].shape))
+        bodies, found = loaded.struct("Bodies", values), np.empty((6, *q[chunk].shape))
         states = (q[chunk], q_s[chunk], q_ss[chunk])
         loaded.launch("torque_terms", found.shape[1:3], bodies, *states, carried, outputs=[found])
         terms[:, chunk] = found
