@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -77,23 +78,23 @@ def try_tests(sdist: Path, folder: Path) -> None:
     run(*pytest, "tests/test_public.py", "tests/tasks/test_task.py", folder=unpacked)
 
 
-def try_newest(wheel: Path, python: str, folder: Path) -> None:
-    """Try the base install, as a user installs it."""
-    own = environment(python, folder / "newest")
+def install_newest(wheel: Path, python: str, folder: Path) -> Path:
+    """Install the base, as a user does; return its Python."""
+    own = environment(python, folder)
     run(own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
-    smoke(own, folder)
+    return own
 
 
-def try_lowest(wheel: Path, python: str, folder: Path) -> None:
-    """Try the lowest versions that pyproject.toml allows, on what the base install left."""
-    own = environment(python, folder / "lowest")
+def install_lowest(wheel: Path, python: str, folder: Path) -> Path:
+    """Install extras in the lowest versions that pyproject.toml allows; return their Python."""
+    own = environment(python, folder)
     uv = (sys.executable, "-m", "uv", "pip", "install", "--quiet", "--system-certs", "--python", own)
     # The oldest versions have no wheels for the newest Pythons, whose lowest are then those that have.
     lowest = ("--resolution", "lowest-direct", "--only-binary", ":all:")
     extras = [option for extra in EXTRAS for option in ("--extra", extra)]
     run(*uv, *lowest, "--requirements", ROOT / "pyproject.toml", *extras)
     run(*uv, "--no-deps", wheel)
-    smoke(own, folder)
+    return own
 
 
 def environment(python: str, folder: Path) -> Path:
@@ -114,10 +115,13 @@ def main(python: str) -> None:
     sdist, wheel = build()
     check_sdist(sdist)
     check_wheel(wheel)
-    with tempfile.TemporaryDirectory() as folder:
-        try_tests(sdist, Path(folder))
-        try_newest(wheel, python, Path(folder))
-        try_lowest(wheel, python, Path(folder))
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
+        newest = pool.submit(install_newest, wheel, python, Path(folder) / "newest")
+        lowest = pool.submit(install_lowest, wheel, python, Path(folder) / "lowest")
+        tests = pool.submit(try_tests, sdist, Path(folder))
+        smoke(newest.result(), Path(folder))
+        smoke(lowest.result(), Path(folder))  # on what the base install left
+        tests.result()
     print(f"{sdist.name} and {wheel.name} are in {DIST}/")
 
 

@@ -218,7 +218,7 @@ def test_runs_with_different_reference_points_share_their_maximum(tmp_path: Path
 
 
 def test_front_search_is_compared_with_studies(runs: Path, tmp_path: Path) -> None:
-    find_front(Problem(load_task("target-1")), evaluations=2000, out=tmp_path / "front")
+    find_front(Problem(load_task("target-1")), evaluations=1000, out=tmp_path / "front")
     found = compare_summaries([read_run_summary(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
     row = next(row for row in found.rows if row.method == "front search")
     assert row.e_hv is None

@@ -267,7 +267,7 @@ words = (
 )
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(data=st.data(), space=spaces, n_targets=st.integers(1, 300))
 def test_prompt_of_any_problem_is_complete_and_bounded(data: st.DataObject, space: DesignSpace, n_targets: int) -> None:
     scale = data.draw(st.sampled_from([1e-3, 1, 500]))

@@ -58,6 +58,7 @@ def test_arms_along_a_cycle_are_drawn_within_the_axes(tmp_path: Path) -> None:
             assert (points <= high).all()
 
 
+@pytest.mark.slow
 def test_legend_of_arms_lists_what_is_drawn() -> None:
     missed = set[bool]()
     for by in ("line", "joint"):

@@ -93,6 +93,7 @@ def test_screen_goes_on_if_bounds_discard_all_designs(pool: Any) -> None:
     assert screen.counts["discarded_by_bounds"] == screen.counts["considered"]
 
 
+@pytest.mark.slow
 def test_restored_screen_equals_uninterrupted_one(pool: Any) -> None:
     screen, restored = learnt(pool), Screen(PROBLEM, lambda: POINT)
     restored.restore(screen.state())

@@ -107,6 +107,7 @@ def test_run_with_failures_resumes_to_the_bit(tmp_path: Path, sampler: str) -> N
     ]
 
 
+@pytest.mark.slow
 def test_sampler_learns_to_avoid_failures() -> None:
     """TPE proposes fewer failing designs than a random search."""
     problem = aw.Problem(TASK, SPACE, evaluator=sometimes)

@@ -54,7 +54,7 @@ def test_no_reported_design_is_worse_than_itself_without_an_idle_joint() -> None
 @pytest.mark.parametrize("resolution", [{"worst_error": 0.05, "price": 30.0}, {"price": 200.0}])
 def test_reported_designs_differ_by_the_resolution(resolution: dict[str, float], tmp_path: Path) -> None:
     run, fine = (
-        find_front(problem(resolution=stated), budget=2000, seed=0, out=tmp_path / name)
+        find_front(problem(resolution=stated), evaluations=1500, seed=0, out=tmp_path / name)
         for name, stated in (("coarse", resolution), ("fine", {"worst_error": 1e-9, "price": 1e-9}))
     )
     assert len(run.history) < len(fine.history)

@@ -176,7 +176,7 @@ def interrupted(make: Maker) -> Maker:
 RULES = plain("--proposer", "rules", "--no-figures")
 # Their share of all kills. Those that would get none in the short form are left to `make torture`, and so are THOROUGH
 # ones, which go the way of others; tests/cli/test_signals.py interrupts commands, too.
-THOROUGH = ("optimize, NSGA-II", "optimize, a model", "optimize, Ctrl-C, Ctrl-C twice, SIGTERM")
+THOROUGH = ("optimize, NSGA-II", "optimize, a model", "experiment", "optimize, Ctrl-C, Ctrl-C twice, SIGTERM")
 SCENARIOS: dict[str, tuple[float, Maker]] = {
     "optimize, rules": (0.2, plain("--proposer", "rules")),
     "optimize, NSGA-II": (0.15, plain("--proposer", "none", "--sampler", "nsga2", "--no-figures")),

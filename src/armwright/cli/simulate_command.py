@@ -115,7 +115,7 @@ def _show(
     columns = (
         number("#", "design", str), text("verdict", "verdict"), number("cycle [s]", "cycle_time", "{:.2f}".format),
         number("energy [J]", "energy", "{:.1f}".format), number("tip error [mm]", "tip_error", _in_millimetres),
-        number("without feed-forward", "droop", _in_millimetres),
+        number("without feed-forward [mm]", "droop", _in_millimetres),
         number("peak torque / claimed", "torque_over_claimed", "{:.3f}".format),
     )  # fmt: skip
     print_table(console, columns, map(_row, results))

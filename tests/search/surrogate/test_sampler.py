@@ -229,6 +229,7 @@ def test_late_successes_are_modelled() -> None:
     assert p.space.designs(row[None])
 
 
+@pytest.mark.slow
 def test_rare_success_is_sought_among_its_likes() -> None:
     """One design in fifteen succeeds; the sampler learns from failures before it can model an objective."""
 
