@@ -277,7 +277,9 @@ class DirectSearch:
         """Verify the front, and add a design that holds if recommended ones do not; return its survival by number."""
         verification = None if self.folder is None else verify_front(history)
         survival = front_survival(history, verification)
-        found = find_safe_design(history, survival, left, self.config.seed) if unsafe_roles(history, survival) else None
+        found, each = None, self.chunk_size.seconds / self.chunk_size.value
+        if unsafe_roles(history, survival):
+            found = find_safe_design(history, survival, left, each, self.config.seed)
         if found is None:
             return history, verification, survival
         trial, own = found

@@ -19,17 +19,17 @@ AT_ONCE = 10  # designs that are perturbed together
 
 
 def find_safe_design(
-    history: History, survival: Mapping[int, Survival], left: Callable[[], float], seed: int
+    history: History, survival: Mapping[int, Survival], left: Callable[[], float], each: float, seed: int
 ) -> tuple[FinishedTrial, Survival] | None:
     """Return a design that holds and is cheaper than those of the front that do, as its next trial; None without any.
 
-    survival: of the designs of the front.  left: returns the time that is left [s].
+    survival: of the designs of the front.  left: returns the time that is left [s].  each: time of an evaluation [s].
     """
     problem, rng = history.problem, np.random.default_rng(seed)
     encoding = DesignEncoding(problem.space.parameters)
     pool = problem.space.matrix([member.design for member in history.front])
     pool = pool[np.argsort(encoding.structures(pool), kind="stable")]
-    trials, longest = list(history), 0.0  # [s] of a step
+    trials, longest = list(history), CHILDREN * each  # [s] of a step
     for _ in range(ROUNDS):
         started = time.monotonic()
         if left() < longest:
