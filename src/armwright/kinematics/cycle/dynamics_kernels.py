@@ -135,7 +135,8 @@ def dynamics_kernels() -> SimpleNamespace:
             lever = tip - before + frame * bodies.payload_com[arm]
             mass, inertia = carried[sample] * bodies.payload_mass, carried[sample] * bodies.payload_inertia[arm]
             carried_force, carried_moment = wrench(mass, inertia, frame, lever, acceleration, alpha, omega)
-            total_force, total_moment = carried_force, carried_moment
+            # Products are copies; names alone would be the same variables, which the loop changes.
+            total_force, total_moment = one * carried_force, one * carried_moment
             after = before
             for step in range(bodies.dof):
                 j = bodies.dof - 1 - step
