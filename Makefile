@@ -46,7 +46,7 @@ bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes o
 package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare environments of PYTHON
 	$(BIN)/python tools/package.py $(PYTHON)
 
-fuzz: .venv/.test  ## over a million made-up inputs (docs/security.md)
+fuzz: .venv/.test  ## 700,000 made-up inputs (docs/security.md)
 	$(BIN)/python -m pytest tests/fuzz --fuzz 1
 
 # What cannot be looked up is an error (--strict), not a package without known faults.

@@ -7,12 +7,9 @@ python -m tools.pictures page.png   # one
 import base64
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
-import time
-import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 
@@ -222,33 +219,6 @@ def arms(folder: Path, page: Page, file: Path) -> None:
     shutil.copy(target_2(folder) / "figures/arms.png", file)
 
 
-def dashboard(folder: Path, page: Page, file: Path) -> None:
-    """Show an exported study in Optuna's dashboard."""
-    run = once(folder, "runs/target-1", "optimize", "target-1", "--seed", 0)
-    if not (run / "study.db").exists():
-        armwright(folder, "export", run, "--format", "optuna")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [Path(sys.executable).with_name("optuna-dashboard"), f"sqlite:///{run}/study.db"]
-    options = ["--port", str(port)]
-    with subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
-        address = f"http://127.0.0.1:{port}/dashboard"
-        for _ in range(100):
-            try:
-                urllib.request.urlopen(address)
-                break
-            except OSError:
-                time.sleep(0.1)
-        page.set_viewport_size({"width": 1300, "height": 900})
-        page.emulate_media(color_scheme="light")
-        page.goto(f"{address}/studies/1")
-        page.get_by_text("Pareto Front").first.wait_for()
-        page.wait_for_timeout(2500)
-        page.screenshot(path=file)
-        server.terminate()
-
-
 PICTURES: dict[str, Shot] = {
     "arms.png": arms,
     "page.png": report,
@@ -269,7 +239,6 @@ PICTURES: dict[str, Shot] = {
     ),
     "example-stiffness.png": stiffness,
     "compare-arms.png": existing_arms,
-    "dashboard.png": dashboard,
 }
 
 

@@ -7,7 +7,6 @@ import threading
 import traceback
 from collections.abc import Generator, Mapping
 from contextlib import chdir, contextmanager
-from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any
 
@@ -15,38 +14,25 @@ from armwright.text import one_line
 
 MAX_REASON_LENGTH = 300
 MAX_TRACEBACK_LENGTH = 8_000  # an exception may hold megabytes
-FORK_SECONDS = 1.0  # to wait for forked processes that still run, which is all that tells them from ours
-
-
-class ForkError(Exception):
-    """User code forked a process and returned in both."""
 
 
 @contextmanager
 def contained() -> Generator[None]:
-    """Restore what user code changes in this process; a process that it forks gets ForkError at the end of the block.
+    """Restore what user code changes in this process; a process that it forks ends with the block.
 
     The working folder, open standard streams, handlers of Ctrl-C and SIGTERM and the recursion limit are restored.
     """
     process, limit = os.getpid(), sys.getrecursionlimit()
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    arrivals, arrive = Pipe(duplex=False)  # inherited by forked processes
-    with arrivals:
-        try:
-            with chdir("."):  # solvers change the working folder, to which the run's folder may be relative
-                yield
-        finally:
-            sys.setrecursionlimit(limit)
-            if os.getpid() != process:
-                try:
-                    arrive.send_bytes(b"returned")
-                finally:
-                    os._exit(1)
-            arrive.close()
-            open_closed_streams()
-            _restore_handlers(handlers)
-        if arrivals.poll(FORK_SECONDS) and _has_message(arrivals.fileno()):
-            raise ForkError("returned in a forked process as well; end that process with os._exit")
+    try:
+        with chdir("."):  # solvers change the working folder, to which the run's folder may be relative
+            yield
+    finally:
+        if os.getpid() != process:
+            os._exit(1)  # a second process must not go on with the run
+        sys.setrecursionlimit(limit)
+        open_closed_streams()
+        _restore_handlers(handlers)
 
 
 def open_closed_streams() -> None:
@@ -83,11 +69,6 @@ def place_of(fault: BaseException, file: str = "") -> str:
     frames = traceback.extract_tb(fault.__traceback__)
     frame = next((frame for frame in reversed(frames) if frame.filename == file), frames[-1])
     return f"{Path(frame.filename).name}, line {frame.lineno}"
-
-
-def _has_message(number: int) -> bool:
-    """Return whether the pipe holds a message, not just its end."""
-    return bool(os.read(number, 1))
 
 
 def _restore_handlers(handlers: Mapping[signal.Signals, Any]) -> None:

@@ -65,11 +65,10 @@ def test_invalid_search_arguments_are_one_line(in_folder: Path, code: int, args:
     assert not list(in_folder.glob("runs/*"))
 
 
-def test_optimize_and_prompt_reject_a_design_run(in_folder: Path) -> None:
+def test_optimize_rejects_a_design_run(in_folder: Path) -> None:
     done = armwright("design", "target-1", "--evaluations", "300", "--no-figures", "--out", "run", "--json")
     assert json.loads(done.stdout)["search"]["ended_by"] == "budget"
     assert "holds a run with other settings" in refused(2, "optimize", "target-1", "--out", "run")
-    assert "not a study" in refused(1, "optimize", "run", "--print-prompt", "next")
     assert "to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:run", "--out", "other")
 
 

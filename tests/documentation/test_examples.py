@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +17,8 @@ from armwright.cli.app import app
 from armwright.kinematics.reach.compliance import Stiffness
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import QUANTITIES
-from armwright.problem.problem import Problem
 from armwright.proof.selection import pick_from
 from armwright.runs.history import FrontMember
-from armwright.study.optuna_export import export_study
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request
 from tests.support.documentation import PAGES, commands
 from tests.support.examples import EXAMPLES, example_tasks
@@ -130,20 +125,14 @@ def test_example_without_a_model_falls_back_to_rules() -> None:
 
 @pytest.mark.slow
 def test_python_code_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made = optimize(Problem(load_task("target-1")), proposer="rules", n_total=20, out="runs/target-1-seed0")
-    export_study(Path("runs/target-1-seed0"))
     page = (EXAMPLES.parent / "docs" / "optuna.md").read_text(encoding="utf-8")
     asking, *others = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     compile(asking, "optuna.md", "exec")  # needs a model
-    assert len(others) == 4
+    assert len(others) == 3
     (in_folder / "optunahub").symlink_to(EXAMPLES.parent / "optunahub")
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "PedAnova")  # what Optuna says of its importances
-        for code in others:
-            exec(code, {})
-    shown, counts = capsys.readouterr().out.splitlines()
-    assert shown == f"{len(made.front)} {made.hypervolume[-1]}"
-    assert counts == "3 Counter()"
+    for code in others:
+        exec(code, {})
+    assert capsys.readouterr().out == "3 Counter()\n"
 
 
 def test_mujoco_example_follows_the_ik_postures() -> None:

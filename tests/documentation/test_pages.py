@@ -44,7 +44,6 @@ NOT_RUN = {
     r"armwright edit .*": "serves until Ctrl-C; tests/editor follows its page",
     r"armwright compare-arms .* ur5e panda .*": "robot_descriptions fetches these arms from a network",
     r"armwright optimize .*--scheduler .*|dask .*": "needs a cluster on other machines; test_dask.py starts one",
-    r"optuna-dashboard .*": "serves until it is stopped",
     r"python -m (tests\.fuzz|pytest) .*": "minutes to hours; the suite has a short form of both",
     r"python benchmarks/.*": "half an hour of benchmark; docs/benchmarks.md has the figures",
 }

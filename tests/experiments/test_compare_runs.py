@@ -18,7 +18,7 @@ from armwright import Problem, Task, find_front, load_task, optimize, read_run
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.experiments.compare_runs import Comparison, compare_runs, compare_summaries
-from armwright.experiments.run_list import find_runs, list_runs
+from armwright.experiments.run_list import find_runs
 from armwright.experiments.run_record import RunSummary, read_run_summary, shares_by_source
 from armwright.experiments.statistics import interval, paired_test
 from armwright.experiments.tables import markdown, write_tables
@@ -272,19 +272,5 @@ def test_compare_command(runs: Path, tmp_path: Path) -> None:
     result = runner.invoke(app, ["compare", str(runs), "--out", str(tmp_path / "out"), "--no-figures"])
     assert result.exit_code == 0, result.output
     assert (tmp_path / "out" / "table.md").is_file()
-    listed = json.loads(runner.invoke(app, ["compare", "--list", str(runs), "--json"]).output)
-    assert [run["state"] for run in listed] == ["finished"] * 12
-    assert "random-4" in runner.invoke(app, ["compare", "--list", str(runs)]).output
-
-
-def test_unfinished_and_damaged_runs_are_listed(runs: Path, tmp_path: Path) -> None:
-    half = shutil.copytree(runs / "target-1-none-0", tmp_path / "a" / "half")
-    (half / "summary.json").unlink()
-    (half / "trials.jsonl").write_bytes(b"\n".join((half / "trials.jsonl").read_bytes().split(b"\n")[:7]) + b"\n")
-    damaged = tmp_path / "b"
-    damaged.mkdir()
-    (damaged / "config.yaml").write_text("a: [", encoding="utf-8")
-    states = [run["state"] for run in list_runs(find_runs([tmp_path]))]
-    assert states == ["unfinished, 7 of 16 trials", "damaged config.yaml"]
     with pytest.raises(RunFolderError, match="there is no"):
         find_runs([tmp_path / "nothing"])

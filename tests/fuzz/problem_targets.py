@@ -1,9 +1,7 @@
-"""Fuzz task, space, experiment and design files."""
+"""Fuzz task, space and experiment files."""
 
 import json
 from functools import cache
-
-import yaml
 
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
@@ -74,7 +72,9 @@ link_section: {tubes: [[0.02, 0.001], [0.03, 0.002]], material: {density: 2700, 
 actuators:
   - XM540-W270
   - XL430-W250
-  - {name: mine, maker: me, kind: servo, voltage: 12, mass: 0.3, stall_torque: 6.0, speed: 5.0, price: 120, source: me}
+  - {name: mine, maker: me, kind: servo, voltage: 12, mass: 0.3, stall_torque: 6.0, speed: 5.0, price: 120, source: me,
+     rated_torque: 2.0, peak_torque: 7.0, corner_speed: 1.0, gear_ratio: 200, rotor_inertia: 0.01, backlash: 0.004,
+     joint_stiffness: 200, current: 2.5, estimates: [rotor_inertia], width: 0.03, height: 0.05, depth: 0.04, note: so}
 motor_bodies: false
 safety_factor: 2.0
 restrict: {joint_1: [R, P], origin_y: 0.0, link_3: [0.1, 0.2]}
@@ -146,14 +146,6 @@ def run_experiment(data: bytes) -> None:
             raise DefectError(f"{cell.folder} is not in {out}")
 
 
-def run_start(data: bytes) -> None:
-    from armwright.spaces.design_file import read_design
-
-    space = a_problem().space
-    design = read_design(file_of(data, "design.json"), space)
-    space.arm(design)
-
-
 @cache
 def a_problem() -> Problem:
     return Problem(load_task("target-1"))
@@ -163,25 +155,3 @@ def a_problem() -> Problem:
 def rich_problem() -> Problem:
     (folder() / "rich-space.yaml").write_bytes(RICH_SPACE)
     return Problem(load_task("target-1"), load_space(folder() / "rich-space.yaml"))
-
-
-def start_seeds() -> list[bytes]:
-    space = a_problem().space
-    designs = [dict(design.params) for design in space.sample(3, 1)]
-    full = {"number": 3, "source": "black box", "objectives": {"torque": 2.0}, "params": designs[0]}
-    return [json.dumps({"params": design}).encode() for design in designs] + [json.dumps(full).encode()]
-
-
-def actuator_seeds() -> list[bytes]:
-    record = {"name": "mine", "maker": "me", "kind": "servo", "voltage": 12.0, "mass": 0.3, "stall_torque": 6.0,
-              "rated_torque": 2.0, "peak_torque": 7.0, "speed": 5.0, "width": 0.03, "height": 0.05, "depth": 0.04,
-              "price": 120.0, "source": "https://example.org", "note": "so",
-              "corner_speed": 1.0, "gear_ratio": 200.0, "rotor_inertia": 0.01, "coulomb_friction": 0.1,
-              "viscous_friction": 0.05, "backlash": 0.004, "joint_stiffness": 200.0, "position_gain": 20.0,
-              "damping_gain": 1.0, "current": 2.5,
-              "estimates": ["rotor_inertia"]}  # fmt: skip
-    plain = {"name": "plain", "mass": 0.1}
-    records = ([record], [record, plain | {"rated_torque": 3.0, "kind": "harmonic"}], [plain | {"peak_torque": 3.0}])
-    spaces = [{"name": "a", "actuators": listed, "safety_factor": 2.0, "motor_bodies": i == 0}
-              for i, listed in enumerate(records)]  # fmt: skip
-    return [yaml.safe_dump(space).encode() for space in spaces]

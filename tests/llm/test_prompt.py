@@ -280,9 +280,8 @@ def test_prompt_of_any_problem_is_complete_and_bounded(data: st.DataObject, spac
     prompt, answer = data.draw(st.sampled_from(PROMPTS)), data.draw(st.sampled_from(ANSWERS))
     options = PromptOptions(prompt=prompt, answer=answer)
     seed = data.draw(st.integers(0, 2**31))
-    hints = data.draw(st.lists(words, max_size=2))
-    text = design_prompt(history, seed, options, hints=hints)
-    assert text == design_prompt(history, seed, options, hints=hints)
+    text = design_prompt(history, seed, options)
+    assert text == design_prompt(history, seed, options)
     assert estimated_tokens(text) <= MAX_TOKENS
     for name in ("origin_x", "origin_y", "origin_z"):
         low, high = getattr(space, name)

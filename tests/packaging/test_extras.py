@@ -124,7 +124,6 @@ WITHOUT_EXTRAS: tuple[tuple[list[str], str], ...] = (  # what each command print
     (["report", "run"], "run/report.html"),
     (["reach-map", "run", "--spacing", "0.4", "--directions", "1"], NO_FIGURES),
     (["compare", "run"], "front search"),
-    (["compare", "--list", "."], "run"),
     (["doctor"], f"extra studies: {STUDIES.replace(' and ', ', ').replace(':', ' not installed:')}"),
 )
 WITH_EXTRAS: tuple[tuple[list[str], str], ...] = (  # their only line
@@ -134,7 +133,6 @@ WITH_EXTRAS: tuple[tuple[list[str], str], ...] = (  # their only line
     (["draft", "reach a shelf", "--model", "openai-chat:gpt-4o"], LLM),
     (["experiment", "paper"], f"experiment needs {STUDIES}"),
     (["optimize", "target-1", "--print-prompt", "next"], f"optimize needs {STUDIES}"),
-    (["export", "run", "--format", "optuna"], f"--format optuna needs {STUDIES}"),
     (["datasheet", "run"], 'datasheet needs matplotlib: pip install "armwright[figures]"'),
 )
 

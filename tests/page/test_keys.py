@@ -18,7 +18,7 @@ from starlette.routing import Mount, Route
 
 from armwright.editor.app import SHELLS, Editor
 from armwright.editor.edited_files import EditedFiles
-from armwright.page.live_app import LivePage, OpenPages, live_app
+from armwright.page.live_app import LivePage, live_app
 from tests.support.browser import Tab
 from tests.support.command_line import PATIENCE, start
 from tests.support.editor import served_editor
@@ -41,20 +41,17 @@ class Server(Served):
 
 @contextmanager
 def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Server]:
-    pages = OpenPages()
     if kind == "live":
         with served_run(run, port) as address:
-            routes = tuple(one for one in live_app(run, pages).routes if isinstance(one, Route))
+            routes = tuple(one for one in live_app(run).routes if isinstance(one, Route))
             yield Server(address, kind, routes, ("/",))
     else:
         task = folder / "secret-cell.yaml"
         task.write_text(TASK, encoding="utf-8")
         with served_editor(task, port) as editor:
-            mine = Editor(EditedFiles(task), pages).routes()
+            mine = Editor(EditedFiles(task)).routes()
             assert [one.path for one in mine if isinstance(one, Mount)] == ["/run"]
-            live = [
-                Route(f"/run{one.path}", one.endpoint, methods=one.methods) for one in LivePage(run, pages).routes()
-            ]
+            live = [Route(f"/run{one.path}", one.endpoint, methods=one.methods) for one in LivePage(run).routes()]
             yield Server(editor.address, kind, (*(one for one in mine if isinstance(one, Route)), *live), SHELLS)
 
 

@@ -61,7 +61,7 @@ def test_responses_have_security_headers(served: tuple[Path, int, str]) -> None:
     for status, request in (
         (200, lines("GET / HTTP/1.1", host)),
         (200, lines("GET /run HTTP/1.1", host, with_key)),
-        (200, lines("HEAD /events HTTP/1.1", host, with_key)),
+        (200, lines("HEAD /status HTTP/1.1", host, with_key)),
         (404, lines("GET /config.yaml HTTP/1.1", host, with_key)),
         (405, lines("GET /control HTTP/1.1", host, with_key)),
         (403, lines("POST /control HTTP/1.1", host, "Content-Length: 0")),
@@ -82,7 +82,7 @@ def test_other_methods_are_refused(served: tuple[Path, int, str], method: str) -
     folder, port, key = served
     before = read_control(folder)
     more = ["Access-Control-Request-Method: POST", "X-HTTP-Method-Override: POST", "Content-Length: 0"]
-    for path in ("/control", "/", "/run", "/file?design=0&format=urdf", "/events"):
+    for path in ("/control", "/", "/run", "/file?design=0&format=urdf", "/status"):
         assert said(port, lines(f"{method} {path} HTTP/1.1", *right(port, key), *more))[0] in (400, 405)
     assert read_control(folder) == before
 

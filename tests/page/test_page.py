@@ -5,7 +5,6 @@ import io
 import json
 import re
 import shutil
-from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,6 @@ import yourdfpy
 import armwright as aw
 from armwright.exceptions import RunFolderError
 from armwright.kinematics.arms.forward import joint_positions
-from armwright.page.content import RunContent
 from armwright.page.page import write_report
 from armwright.pareto import front_indices
 from armwright.problem.conditions import read_condition
@@ -156,11 +154,6 @@ def test_address_stepper_and_comparison_agree(run: Path, tab: Tab) -> None:
     assert tab.page.locator("#ring-compared").get_attribute("style").count("translate") == 1
     tab.page.locator("#compare").click()
     assert tab.ask("armwright.state.compared") is None
-    # A live page forgets the failures of a run that began anew, all of whose designs it receives again.
-    tab.ask("armwright.content.failures[3] = 'exception: no licence'")
-    packed = b64encode(RunContent(run).packed()).decode()
-    tab.ask(f"armwright.content.add(Uint8Array.from(atob('{packed}'), (c) => c.charCodeAt(0)).buffer)")
-    assert tab.ask("armwright.content.hasFailed(3)") is False
     tab.page.goto("about:blank")
     tab.open(run / "report.html", "#design=99999&target=<script>")
     assert tab.ask("armwright.content.head.front.includes(armwright.state.design)")

@@ -1,9 +1,7 @@
 """Pause, stop and status of a running study."""
 
-import json
 import os
 import shlex
-import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -11,16 +9,12 @@ from pathlib import Path
 import pytest
 
 from armwright import History, Proposal, Proposer
-from armwright.exceptions import ModelError, ProposalError, RunFolderError, SettingsError, StoppedError
+from armwright.exceptions import ModelError, ProposalError, RunFolderError, StoppedError
 from armwright.runs.control import (
     CONTROL,
     MAX_FILE_SIZE,
-    MAX_HINT_LENGTH,
-    MAX_HINTS,
     STATUS,
     Control,
-    Hint,
-    add_hint,
     pause_study,
     read_control,
     read_status,
@@ -101,16 +95,14 @@ def test_paused_study_can_be_stopped(tmp_path: Path) -> None:
     assert len(lines(out)) == 7
 
 
-def test_only_hints_survive_an_earlier_session(tmp_path: Path) -> None:
+def test_no_request_survives_an_earlier_session(tmp_path: Path) -> None:
     """This holds even if that session had no trial."""
     out = tmp_path / "run"
     out.mkdir()
-    hint = add_hint(out, "shorter links")
-    pause_study(out)
     stop_study(out)
-    assert read_control(out) == Control(paused=True, stop=True, hints=(hint,))
+    assert read_control(out) == Control(stop=True)
     assert len(run(out).trials) == 13
-    assert read_control(out) == Control(hints=(hint,))
+    assert read_control(out) == Control()
 
 
 def test_stopped_command_exits_as_after_ctrl_c(chat_server: ChatServer, in_folder: Path) -> None:
@@ -136,10 +128,6 @@ def test_stopped_command_exits_as_after_ctrl_c(chat_server: ChatServer, in_folde
 # control.json and status.json.
 
 
-def hints(*them: object) -> bytes:
-    return json.dumps({"paused": True, "hints": them}).encode()
-
-
 HOSTILE: Mapping[str, bytes] = {
     "empty": b"",
     "cut": b'{"paused": true, "st',
@@ -147,13 +135,7 @@ HOSTILE: Mapping[str, bytes] = {
     "a list": b"[true]",
     "words": b'{"paused": "yes"}',
     "more": b'{"paused": true, "speed": 2}',
-    "two hints of one id": hints({"id": 1, "text": "a"}, {"id": 1, "text": "b"}),
-    "an id below 1": hints({"id": 0, "text": "a"}),
-    "no words": hints({"id": 1, "text": ""}),
-    "too long": hints({"id": 1, "text": "x" * (MAX_HINT_LENGTH + 1)}),
-    "too many": hints(*({"id": i, "text": "x"} for i in range(1, MAX_HINTS + 2))),
-    "half a letter": hints({"id": 1, "text": "\ud800"}),
-    "deep": b'{"hints": ' + b"[" * 100_000,
+    "deep": b'{"paused": ' + b"[" * 100_000,
     "huge": b'{"paused": true' + b" " * MAX_FILE_SIZE + b"}",
 }
 
@@ -162,7 +144,8 @@ HOSTILE: Mapping[str, bytes] = {
 def test_damaged_control_file_is_ignored(tmp_path: Path, name: str) -> None:
     (tmp_path / CONTROL).write_bytes(HOSTILE[name])
     assert read_control(tmp_path) == Control()
-    assert add_hint(tmp_path, "and it can be written anew") == Hint(1, "and it can be written anew")
+    pause_study(tmp_path)
+    assert read_control(tmp_path) == Control(paused=True)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
@@ -174,35 +157,7 @@ def test_control_path_that_is_not_a_file_is_ignored(tmp_path: Path, make: Callab
     assert read_status(tmp_path) is None
 
 
-def test_watchers_do_not_overwrite_each_other(tmp_path: Path) -> None:
-    def watcher(name: int) -> None:
-        for i in range(5):
-            add_hint(tmp_path, f"hint {i} of {name}")
-            pause_study(tmp_path)
-
-    threads = [threading.Thread(target=watcher, args=(name,)) for name in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    there = read_control(tmp_path)
-    assert there.paused
-    assert [hint.id for hint in there.hints] == list(range(1, 41))
-    assert len({hint.text for hint in there.hints}) == 40
-
-
-def test_invalid_hints_are_refused_with_a_reason(tmp_path: Path) -> None:
-    for text, length in (("", "0"), (" \n\t", "0"), ("x" * (MAX_HINT_LENGTH + 1), "2,001")):
-        with pytest.raises(SettingsError, match=f"expected a hint of 1 to 2,000 characters, got {length}"):
-            add_hint(tmp_path, text)
-    assert not (tmp_path / CONTROL).exists()
-    for text in ("x" * MAX_HINT_LENGTH, "\U0001f9be" * MAX_HINT_LENGTH, "half a letter \ud800"):
-        add_hint(tmp_path, text)
-    assert [len(hint.text) for hint in read_control(tmp_path).hints] == [MAX_HINT_LENGTH, MAX_HINT_LENGTH, 15]
-    for i in range(len(read_control(tmp_path).hints), MAX_HINTS):
-        add_hint(tmp_path, f"hint {i}")
-    with pytest.raises(SettingsError, match="expected at most 100 hints for a run"):
-        add_hint(tmp_path, "one more")
+def test_request_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(RunFolderError, match="cannot write"):
         pause_study(tmp_path / "file")

@@ -207,7 +207,7 @@ def test_prompts_describe_parameters_and_answers_are_read() -> None:
     lines = """ORIGIN: (0.1, 0, 0.2)
 JOINTS: (Y, P, P)
 LINKS: (0.1, 0.2, 0.2)
-**GEAR**: (1.5, gear_2 = 2, 3)
+**GEAR**: (1.5, 2, 3)
 KP: 40 N m/rad
 CELLS: 2
 BELT: HTD3

@@ -246,10 +246,8 @@ FAULTS = {
     "GeneratorExit": lambda: stop(GeneratorExit()),
     "SystemExit: 3": lambda: sys.exit(3),
     "Unprintable: (its __str__ raises ValueError)": lambda: stop(Unprintable()),
-    "forked": lambda: fork(lambda: None),
-    "forked, exits": lambda: fork(sys.exit),
-    "forked, raises": lambda: fork(lambda: stop(ValueError())),
-    "none, ends its fork": lambda: fork(lambda: os._exit(0)),
+    "none, its fork returns": lambda: fork(lambda: None),
+    "none, its fork raises": lambda: fork(lambda: stop(ValueError())),
 }
 
 @aw.evaluator("reach [m]", "number")
@@ -281,7 +279,5 @@ def test_faults_of_an_evaluator_are_failed_trials_wherever_it_runs(in_folder: Pa
         assert json.loads(done.stdout)["n_trials"] == len(runs[place]) == 40
     for number, x, reason in runs["here"]:
         expected = names[int(abs(x) * 1e6) % len(names)]
-        if expected.startswith("forked"):
-            expected = "returned in a forked process as well; end that process with os._exit"
         assert reason == ("" if expected.startswith("none") else expected), number
     assert runs["here"] == runs["process"] == runs["workers"]

@@ -1,4 +1,4 @@
-"""Short runs that tests watch, stop and give hints."""
+"""Short runs that tests watch and stop."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -10,7 +10,7 @@ from tests import ROOT
 PAGES = tuple(sorted(str(file.relative_to(ROOT)) for file in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))))
 
 PROGRAMS = ("armwright", ".venv/bin/armwright", "python", "python3", ".venv/bin/python", "pip", "make", "export", "sh",
-            "xargs", "sudo", "apt", "apt-get", "dask", "ssh", "git", "docker", "optuna-dashboard", ".")  # fmt: skip
+            "xargs", "sudo", "apt", "apt-get", "dask", "ssh", "git", "docker", ".")  # fmt: skip
 
 
 @dataclass(frozen=True)

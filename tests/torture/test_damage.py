@@ -1,6 +1,5 @@
 """Truncated and overwritten run files: the run resumes, or one line names the file."""
 
-import json
 import random
 import shutil
 from collections import Counter
@@ -11,10 +10,7 @@ from typing import Any
 import pytest
 
 from armwright.exceptions import ArmwrightError
-from armwright.page.page import write_report
-from armwright.pictures.figures import write_figures
 from armwright.problem.problem import Problem
-from armwright.proof.selection import pick_from
 from armwright.runs.folder import read_config, read_run
 from armwright.study.front.front_run import find_front
 from armwright.study.progress import StudyResult
@@ -38,9 +34,7 @@ def short(folder: Path, **settings: Any) -> StudyResult:
 def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("intact") / "run"
     short(folder)
-    (folder / "control.json").write_text(
-        '{"paused": false, "stop": false, "hints": [{"id": 1, "text": "a hint"}]}', encoding="utf-8"
-    )
+    (folder / "control.json").write_text('{"paused": false, "stop": false}', encoding="utf-8")
     return folder
 
 
@@ -147,25 +141,6 @@ def test_wrong_line_of_trials_is_named(folder: Path, change: Callable[[list[byte
         with pytest.raises(ArmwrightError) as refusal:
             read(folder)
         assert words in str(refusal.value)
-
-
-def test_trials_with_line_ends_of_windows_resume(folder: Path, intact: Path) -> None:
-    content = (folder / "trials.jsonl").read_bytes()
-    (folder / "trials.jsonl").write_bytes(content.replace(b"\n", b"\r\n"))
-    short(folder, n_total=10)
-    assert trials(folder)[: len(trials(intact))] == trials(intact)
-
-
-@pytest.mark.parametrize("values", [(-1e60, 1e60), (5e-324, -5e-324)])
-def test_numbers_at_the_limits_are_read_drawn_and_extended(folder: Path, values: tuple[float, float]) -> None:
-    """Warnings are errors."""
-    lines = [json.dumps({**trial, "values": values}) + "\n" for trial in trials(folder)]
-    (folder / "trials.jsonl").write_text("".join(lines), encoding="utf-8")
-    for file in (write_report(folder), *write_figures(folder)):
-        assert file.is_file()
-    pick_from(folder)
-    run = short(folder, n_total=12)
-    json.dumps(run.summary, allow_nan=False, default=str)
 
 
 def test_damaged_transcripts_are_reported_or_harmless(

@@ -2,9 +2,8 @@
 
 import random
 import resource
-import subprocess
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -55,35 +54,6 @@ def test_no_space_for_page_and_figures(tmp_path: Path, record_property: Tell, ki
         assert "File too large; the trials are safe" in one_line(done)
         is_resumed(folder, whole, "--figures")
     record_property("no room for page and figures", f"{rounds} sizes; each made again")
-
-
-@pytest.fixture
-def disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of 64 kB."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    made = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place], capture_output=True, text=True, encoding="utf-8"
-    )
-    if made.returncode:
-        pytest.skip(f"no disk may be mounted here: {made.stderr.strip()}")
-    yield place
-    subprocess.run(["umount", place], check=True)
-
-
-def test_full_disk_keeps_finished_trials(disk: Path, whole: Path, kills: int, record_property: Tell) -> None:
-    """A real disk, full after a random number of pages; then it grows."""
-    chance = random.Random("disk")
-    rounds = max(1, kills // 10)
-    for n in range(rounds):
-        folder, other = disk / f"run{n}", disk / "other"
-        subprocess.run(["mount", "-o", "remount,size=64k", disk], check=True)
-        other.write_bytes(bytes(chance.randint(8, 15) * 4096))  # a disk counts in pages
-        assert "No space left on device" in one_line(armwright(*study(folder)))
-        subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
-        is_resumed(folder, whole)
-        subprocess.run(["rm", "-r", folder, other], check=True)
-    record_property("a full disk", f"{rounds} times; each resumed")
 
 
 def test_no_space_for_a_search(tmp_path: Path) -> None:

@@ -1,14 +1,12 @@
 """Closed pipes, missing terminals and closed standard streams."""
 
 import json
-import os
-import pty
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from tests.torture.short import armwright, command, is_resumed, is_same_run, n_lines, run, study
+from tests.torture.short import armwright, command, is_resumed, is_same_run, run, study
 
 
 def test_closed_output_pipe_ends_the_command(tmp_path: Path, whole: Path) -> None:
@@ -35,28 +33,6 @@ def test_closed_standard_streams_and_no_terminal(tmp_path: Path, whole: Path) ->
     done = run(shell, environment=nothing, start_new_session=True)
     assert (done.returncode, done.stderr) == (0, "")
     is_same_run(tmp_path / "run", whole)
-
-
-def test_error_without_a_stderr(tmp_path: Path) -> None:
-    (tmp_path / "run").write_text("", encoding="utf-8")
-    done = run(["sh", "-c", 'exec "$@" 2>&-', "sh", *command(study(tmp_path / "run"))])
-    assert (done.returncode, done.stderr) == (1, "")
-
-
-def test_terminal_that_disappears(tmp_path: Path, whole: Path) -> None:
-    folder = tmp_path / "run"
-    master, slave = pty.openpty()
-    process = subprocess.Popen(
-        command(study(folder)), stdin=slave, stdout=slave, stderr=subprocess.PIPE, start_new_session=True
-    )
-    os.close(slave)
-    while n_lines(folder / "trials.jsonl") < 3:
-        os.read(master, 1000)
-    os.close(master)
-    _, said = process.communicate()
-    assert process.returncode in (0, 1)  # it ends before it says anything more, perhaps
-    assert b"Traceback" not in said
-    is_resumed(folder, whole)
 
 
 CHATTY = """

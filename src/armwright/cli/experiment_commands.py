@@ -107,7 +107,6 @@ def experiment(
 def compare(
     folders: list[Path] | None = None,
     *,
-    list_: bool = False,
     baseline: str | None = None,
     figures: bool = True,
     out: Path | None = None,
@@ -118,25 +117,17 @@ def compare(
 
     Parameters:
         folders: Run folders, or folders that contain them. Default: runs.
-        list_: Only list the runs and their progress.
         baseline: The method that the others are compared with. Default: of the first run.
         out: Folder for tables and figures. Default: none are written.
     """
     from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import show_comparison, show_files
-    from armwright.cli.show_results import show_runs
     from armwright.experiments.compare_runs import compare_summaries
-    from armwright.experiments.run_list import find_runs, list_runs, read_finished_runs
+    from armwright.experiments.run_list import read_finished_runs
     from armwright.experiments.tables import tables, write_tables
 
     console = open_console(check_formats(json_, csv_))
     places = folders or [Path("runs")]
-    if list_:
-        with activity("reading the runs"):
-            listed = list_runs(find_runs(places))
-        if not print_records(json_, csv_, listed):
-            show_runs(console, listed)
-        return
     with activity("comparing the runs"):
         finished, unfinished = read_finished_runs(places)
         comparison = compare_summaries(finished, baseline)

@@ -107,23 +107,17 @@ def tasks(names: list[str] | None = None, *, json_: bool = False, csv_: bool = F
         show_task(console, task, *results_of(task))
 
 
-def actuators(
-    names: list[str] | None = None, *, where: list[str] | None = None, json_: bool = False, csv_: bool = False
-) -> None:
+def actuators(names: list[str] | None = None, *, json_: bool = False, csv_: bool = False) -> None:
     """List the catalogue of actuators that a space file may name, or the values of some and where they are from.
 
     Parameters:
         names ([NAME]...): Actuators to list in full.
-        where: A condition, such as "peak_torque>=2" or "mass<=80 g" (may be repeated).
     """
-    from armwright.cli.actuator_filter import choose, count_unknown, read_conditions
     from armwright.cli.show_inputs import actuator_rows, show_actuator, show_actuators
     from armwright.robot.actuators import catalogue, named_actuator
 
     console = open_console(check_formats(json_, csv_))
-    conditions = read_conditions(where or ())
-    known = [named_actuator(name) for name in names] if names else list(catalogue().values())
-    records = choose(known, conditions)
+    records = [named_actuator(name) for name in names] if names else list(catalogue().values())
     content = [record.completed().model_dump(exclude_none=True) | {"assumed": record.assumed} for record in records]
     if print_records(json_, csv_, content, actuator_rows(records)):
         return
@@ -131,9 +125,6 @@ def actuators(
         show_actuator(console, record)
     if not names:
         show_actuators(console, records)
-        for name in dict.fromkeys(condition.name for condition in conditions):
-            if count := count_unknown(known, name):
-                console.print(f"left out, as their {name.replace('_', ' ')} is unknown: {count}")
 
 
 def draft(

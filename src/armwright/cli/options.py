@@ -90,13 +90,6 @@ def _declare(parameter: inspect.Parameter, settings: dict[str, Any]) -> inspect.
     return parameter.replace(annotation=Annotated[parameter.annotation, declaration], kind=parameter.KEYWORD_ONLY)
 
 
-def is_run(name: str) -> bool:
-    """Return whether this is a run folder; unlike Path.is_file, also for a name that is too long."""
-    from armwright.runs.folder import CONFIG
-
-    return os.path.isfile(os.path.join(name, CONFIG))
-
-
 def load_problem(
     task: str,
     space: Path | None,
@@ -111,12 +104,13 @@ def load_problem(
     from armwright.problem.evaluators import load_evaluator
     from armwright.problem.objectives import PAPER_OBJECTIVES, named_objectives
     from armwright.problem.problem import Problem
-    from armwright.runs.folder import read_config
+    from armwright.runs.folder import CONFIG, read_config
     from armwright.spaces.design_space import default_space, load_space
     from armwright.spaces.tolerance import TOLERANCE
     from armwright.tasks.catalogue import load_task
 
-    run = read_config(Path(task)) if is_run(task) else None
+    is_run = os.path.isfile(os.path.join(task, CONFIG))  # unlike Path.is_file, also for a name that is too long
+    run = read_config(Path(task)) if is_run else None
     loaded = load_task(task) if run is None else run.task
     measured = None if evaluator is None else load_evaluator(evaluator)
     names = () if objectives is None else tuple(name.strip() for name in objectives.split(","))

@@ -1,6 +1,5 @@
 """Commands that show and export what a run holds: pick, export, report, doctor."""
 
-import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -62,29 +61,17 @@ def pick(
 
 
 def export(run: Path, *, design: int | None = None, format_: str = "urdf", out: Path | None = None) -> None:
-    """Write a design of RUN for a simulator or a workshop, or all of RUN for Optuna.
+    """Write a design of RUN for a simulator or a workshop.
 
     Any design of the run can be exported, not only those of the front.
 
     Parameters:
         design: Number of the design. Default: the knee of the front.
-        format_: urdf, ros2_control or mjcf; optuna: the whole run as a study.
-        out: Output file. Default: stdout; for optuna, study.db in the run folder.
+        format_: urdf, ros2_control or mjcf.
+        out: Output file. Default: stdout.
     """
-    from armwright.extras import naming_extras
-    from armwright.proof.export import OPTUNA, export_design
+    from armwright.proof.export import export_design
 
-    if format_ == OPTUNA:
-        with naming_extras(f"--format {OPTUNA}"):
-            from armwright.study.optuna_export import export_study
-
-        if design is not None:
-            raise SettingsError(f"--design {design} does not go with --format optuna, which exports the whole run")
-        with activity(f"exporting {run}"):
-            database = export_study(run, out)
-        print_text(f"{database}; to view it in a browser (pip install optuna-dashboard):")
-        print_text(f"  {shlex.join(['optuna-dashboard', f'sqlite:///{database.as_posix()}'])}")
-        return
     with activity(f"exporting a design of {run}"):
         text = export_design(run, design, format_)
     if out is None:

@@ -4,14 +4,12 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from armwright.cli.options import is_run, load_problem, select_workers
+from armwright.cli.options import load_problem, select_workers
 from armwright.cli.signals import interruptible
 from armwright.cli.streams import (
     activity,
@@ -152,8 +150,8 @@ def optimize(
         prompt: Prompt: plus (with analysis instructions), minus, or full (whole front, mechanics). Default: plus.
         memory: What the model remembers of a run: none (every question is new) or chat (the whole conversation).
             Default: none.
-        print_prompt (WHAT): Print what a model is sent, and exit: next (the next prompt of TASK, a new run or a run
-            folder), or schema (of the answer).
+        print_prompt (WHAT): Print what a model is sent, and exit: next (the first prompt of a new run), or schema (of
+            the answer).
 
     Evaluation:
         workers: Local processes that evaluate designs; 0: this process (extra distributed).
@@ -175,13 +173,10 @@ def optimize(
 
     console = open_console(json_)
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
-    load = partial(load_problem, task, space, robust, device, objectives=objectives, evaluator=evaluator)
+    problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
     if print_prompt is not None:
-        if space is not None and is_run(task):
-            raise SettingsError(f"--space {space} is for a new run; {task} has its own")
-        _show_prompt(print_prompt, task, load, given, n_init=n_init, n_total=n_total, seed=seed)
+        _show_prompt(print_prompt, problem, given, n_init=n_init, n_total=n_total, seed=seed)
         return
-    problem = load()
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     choice = choose_proposer(proposer, given)
     from armwright.study.study import optimize as run_study  # the extra `llm`, if it is missing, was named
@@ -244,13 +239,13 @@ def optimize(
         raise typer.Exit(1)
 
 
-def _show_prompt(what: str, task: str, load: Callable[[], "Problem"], options: "ModelOptions", **new_run: int) -> None:
-    """Print the next prompt, or the schema of its answer: of a run if the task is one, else of a new run."""
-    from armwright.study.prompt_preview import preview, preview_after
+def _show_prompt(what: str, problem: "Problem", options: "ModelOptions", **settings: int) -> None:
+    """Print the first prompt of a run with these settings, or the schema of its answer."""
+    from armwright.study.prompt_preview import preview
 
     if what not in ("next", "schema"):
         raise SettingsError(f'--print-prompt "{what}": expected next or schema')
-    shown = preview_after(Path(task), options) if is_run(task) else preview(load(), options, **new_run)
+    shown = preview(problem, options, **settings)
     if what == "schema":
         print_json(shown.schema)
         return

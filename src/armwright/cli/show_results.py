@@ -22,7 +22,7 @@ from armwright.spaces.custom_parameters import describe_custom
 from armwright.study.front.direct_search import FrontRun
 from armwright.study.front.time_plan import MAX_DESIGNS
 from armwright.study.progress import StudyResult
-from armwright.text import decimals, percent
+from armwright.text import decimals
 
 SHORT_NAMES = {position_error: "error [m]", torque: "torque"}
 MAX_ROWS = 16  # of the front; front.csv has all
@@ -178,20 +178,6 @@ def _hypervolume_lines(history: History, summary: Record, remedy: str) -> Iterat
         yield f"{gap['share']:.1%} of the best known hypervolume ({gap['hypervolume']:.3f})"
         if gap["gain"]:
             yield f"NEW: the front adds at least {gap['gain']:.4%} to the best known hypervolume"
-
-
-def show_runs(console: Console, listed: Sequence[Record]) -> None:
-    """Print a table with a line per run."""
-    if not listed:
-        console.print("no runs found")
-        return
-    columns = (
-        text("run", "folder"), text("task", "task", rank=3, least=10), text("method", "method", rank=1, least=8),
-        number("seed", "seed", str, rank=4), number("trials", "trials", str, rank=2),
-        number("hypervolume", "hypervolume", lambda volume: decimals(volume, 3)),
-        number("share", "share_of_best_known", lambda share: percent(share, 1)), text("state", "state", least=10),
-    )  # fmt: skip
-    print_table(console, columns, listed)
 
 
 def _proposer_lines(proposer: Record) -> Iterator[str]:

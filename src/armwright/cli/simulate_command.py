@@ -36,7 +36,6 @@ def simulate(
 
     from pydantic_core import to_jsonable_python
 
-    from armwright.cli.notes import can_draw
     from armwright.proof.design_record import read_records
     from armwright.proof.recommendation import recommend
     from armwright.proof.results import SUMMARY, read_summary
@@ -74,10 +73,6 @@ def simulate(
         if choice and summary is not None:
             summary["recommended"] = choice
             folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
-        for member in members if not all_ and can_draw(open_console(json_ or csv_)) else ():
-            from armwright.pictures.simulation_figure import write_simulation_figure
-
-            write_simulation_figure(run, history.member(member.result.design).arm, member)
     results = [member.result for member in members]
     if not print_records(json_, csv_, record, map(_row, results)):
         _show(open_console(), run, results, choice)

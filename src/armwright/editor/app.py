@@ -34,7 +34,7 @@ from armwright.editor.edited_files import MAX_BYTES, ChangedOnDiskError, EditedF
 from armwright.editor.editor_page import editor_shell
 from armwright.editor.yaml_edits import Edit, edit_text
 from armwright.exceptions import ArmwrightError, SpaceError, TaskError
-from armwright.page.live_app import LivePage, OpenPages, show_shell
+from armwright.page.live_app import LivePage, show_shell
 from armwright.page.request_guard import read_request
 from armwright.tasks.points_file import parse_points
 from armwright.tasks.task import Task
@@ -86,21 +86,19 @@ class StopBody(BaseModel, frozen=True, extra="forbid"):
     """Nothing."""
 
 
-def editor_app(files: EditedFiles, pages: OpenPages) -> Starlette:
-    """Return the editor's application, to be guarded; pages: counts the open live pages."""
-    editor = Editor(files, pages)
+def editor_app(files: EditedFiles) -> Starlette:
+    """Return the editor's application, to be guarded."""
+    editor = Editor(files)
     return Starlette(routes=editor.routes(), lifespan=editor.lifespan)
 
 
 class Editor:
     """The editor's requests."""
 
-    def __init__(self, files: EditedFiles, pages: OpenPages) -> None:
+    def __init__(self, files: EditedFiles) -> None:
         self._files = files
-        self._pages = pages
         self._job: DesignRun | None = None
         self._live: Router | None = None
-        self._watching: asyncio.Task[None] | None = None
 
     def routes(self) -> list[Route | Mount]:
         """Return the routes of the application."""
@@ -120,8 +118,6 @@ class Editor:
     @asynccontextmanager
     async def lifespan(self, app: Starlette) -> AsyncGenerator[None]:
         yield
-        if self._watching is not None:
-            self._watching.cancel()
         if self._job is not None:
             await asyncio.to_thread(self._job.close)
 
@@ -158,11 +154,7 @@ class Editor:
         name = parse_document(body.task, Task, TaskError, str(self._files.task)).name
         await asyncio.to_thread(self._files.save, body.texts, body.overwrite)
         self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
-        page = LivePage(self._job.folder, self._pages)
-        self._live = Router(page.routes())
-        if self._watching is not None:
-            self._watching.cancel()
-        self._watching = asyncio.create_task(page.watch())
+        self._live = Router(LivePage(self._job.folder).routes())
         return _json(self._job.status())
 
     async def stop(self, body: StopBody) -> Response:

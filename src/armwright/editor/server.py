@@ -22,9 +22,7 @@ def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0,
     """
     check_extra("live", "the editor")
     from armwright.editor.app import SHELLS, editor_app
-    from armwright.page.live_app import OpenPages
 
-    pages = OpenPages()
     with TemporaryDirectory(prefix="armwright-") as private:
 
         def announce(address: str) -> None:
@@ -32,7 +30,7 @@ def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0,
             if opens_browser:
                 _open(address, Path(private))
 
-        serve_app(editor_app(files, pages), SHELLS, pages, announce, LOOPBACK, port)
+        serve_app(editor_app(files), SHELLS, announce, LOOPBACK, port)
 
 
 def _open(address: str, private: Path) -> None:

@@ -87,7 +87,9 @@ def read_text(text: str, problem: Problem) -> Answer:
     last_object, content, incomplete = _last_object(text, {parameter.name for parameter in problem.space.parameters})
     last_line, line_content = design_in_lines(text, per_joint(problem.space))
     if incomplete > max(last_line, last_object):
-        raise DesignError("the last JSON object is incomplete: give one value per parameter, and close its braces")
+        raise DesignError(
+            "the last JSON object is incomplete: give valid JSON with one value per parameter, and close its braces"
+        )
     if max(last_line, last_object) < 0:
         raise DesignError(
             "no design found: give JSON with one value per parameter, or the lines ORIGIN, JOINTS and LINKS"
@@ -206,9 +208,6 @@ def _last_object(text: str, names: set[str]) -> tuple[int, dict[str, Any], int]:
     Positions are -1 if there is none.
     """
     names = {"origin", "joints", "links", *names}
-    # Trailing commas and comments are common; blanks in their place keep the positions.
-    text = "\n".join(map(_without_comment, text.split("\n")))
-    text = re.sub(r",(?=\s*[}\]])", " ", text)
     last, found, incomplete = -1, dict[str, Any](), -1
     starts = [match.start() for match in re.finditer(r'\{\s*"', text)][-MAX_OBJECTS:]
     for start, _, content in _outermost_objects(text, starts):
@@ -218,9 +217,3 @@ def _last_object(text: str, names: set[str]) -> tuple[int, dict[str, Any], int]:
         elif any(f'"{name}"' in text[start : start + 200].lower() for name in names):
             incomplete = start
     return last, found, incomplete
-
-
-def _without_comment(line: str) -> str:
-    """Replace a comment after the last quotation mark of a line by blanks."""
-    start = line.find("//", line.rfind('"') + 1)
-    return line if start < 0 else line[:start] + " " * (len(line) - start)

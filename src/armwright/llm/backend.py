@@ -8,7 +8,6 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from armwright.exceptions import ProposalError
-from armwright.runs.control import Hint
 
 MAX_REQUESTS = 3  # per question: an invalid answer goes back with the reason, at most twice
 FINAL = frozenset({"key", "quota", "unknown_model", "budget"})  # faults that a repeated call does not cure
@@ -27,7 +26,6 @@ class Question:
     step: str
     prompt: str
     known: Count = 0  # number of finished trials that the prompt was made from
-    hints: tuple[Hint, ...] = ()  # hints of the user in the prompt
 
     @property
     def trial(self) -> int:

@@ -3,14 +3,12 @@
 The same model validates `--model-options`, the user's config.yaml, the methods of an experiment and the Python API.
 """
 
-import json
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal, Self
 
 from pydantic import BaseModel, Field, PrivateAttr
 
 MODEL_SECONDS = 120.0  # default timeout
-DIRECT = ("model", "prompt", "memory", "max_cost")  # fields with a command-line option of their own
 
 
 class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -83,10 +81,3 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
         copy = self.model_copy(update=update)
         copy._named_in = file  # pyright: ignore[reportAttributeAccessIssue] (frozen are only the fields)
         return copy
-
-    def command_options(self) -> dict[str, str]:
-        """Return the command-line options that state the fields that were set, by name."""
-        given = {name: value for name, value in self.given.items() if value is not None}
-        others = {name: value for name, value in given.items() if name not in DIRECT}
-        options = {name: str(value) for name, value in given.items() if name in DIRECT}
-        return options | ({"model_options": json.dumps(others)} if others else {})

@@ -1,7 +1,7 @@
 """Prompts for a language model, rendered from the templates in templates/."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, TypeVar
 
@@ -11,10 +11,9 @@ from armwright.llm.feedback import Feedback
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt_values import Limits, common_values, shown_values
 from armwright.problem.problem import Problem
-from armwright.runs.control import MAX_HINT_LENGTH
 from armwright.runs.history import History
 from armwright.spaces.parameters import exact
-from armwright.text import end_of, fence, one_line, without_thoughts
+from armwright.text import end_of, fence, without_thoughts
 
 MAX_TOKENS = 12_000  # longer prompts show fewer designs and targets
 MAX_ANALYSIS_LENGTH = 40_000  # characters from the end of a free answer that the second call reads
@@ -23,18 +22,14 @@ DEFAULTS = PromptOptions()
 T = TypeVar("T")
 
 
-def design_prompt(
-    history: History, seed: int, options: PromptOptions = DEFAULTS, *, name: str = "llm", hints: Sequence[str] = ()
-) -> str:
+def design_prompt(history: History, seed: int, options: PromptOptions = DEFAULTS, *, name: str = "llm") -> str:
     """Return the prompt for the next design.
 
-    Fewer designs, then fewer targets are shown until the prompt has at most about MAX_TOKENS, unless hints and the
-    template itself are longer. The seed draws the designs that are shown; those of the proposer `name` are marked as
-    its own. Hints are the user's notes.
+    Fewer designs, then fewer targets are shown until the prompt has at most about MAX_TOKENS, unless the template
+    itself is longer. The seed draws the designs that are shown; those of the proposer `name` are marked as its own.
     """
     feedback = Feedback(history, seed, name)
     common = common_values(history, options)
-    common["hints"] = [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))]  # visible ones
     return shortened(
         lambda most: rendered(f"{options.prompt}.md.j2", {**common, **shown_values(history, feedback, most)}),
         Limits(),

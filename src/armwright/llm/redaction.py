@@ -3,7 +3,7 @@
 import logging
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 
 from armwright.text import one_line
 
@@ -13,9 +13,8 @@ _MIXED = re.compile(r"[A-Za-z][0-9]|[0-9][A-Za-z]")
 SHORTEST = 8  # shorter values occur in ordinary text
 LONG = 20  # longer values are not words
 PART = 12  # a beginning or an end of this length identifies a key
-# sk-abcd****wxyz, as vendors show it. It begins where a word does, and what follows the mask is only looked at, since
-# it may be followed by another one.
-_MASKED = re.compile(r"(?<![\w-])([\w-]*+)(?:\*{2,}+|\.{3,}+|…)(?=([\w-]*+))")
+# sk-abcd****wxyz, as vendors show it, from the beginning of a word or from the mask on
+_MASKED = re.compile(r"((?<![\w-])[\w-]*+|)((?:\*{2,}+|\.{3,}+|…))([\w-]*+)")
 
 
 class WithoutKeys(logging.Filter):
@@ -32,10 +31,7 @@ def redacted(text: str) -> str:
     This includes its beginning, its end, and forms with a masked middle.
     """
     for name, key in _keys():
-        blot = f"<{name}>"
-        text = text.replace(key, blot)
-        text = _without(_parts(key, text), blot, text)
-        text = _without(_masked(key, text), blot, text)
+        text = _MASKED.sub(_blot(key, f"<{name}>"), _whole(key).sub(lambda _, name=name: f"<{name}>", text))
     return text
 
 
@@ -44,43 +40,26 @@ def redacted_line(fault: object) -> str:
     return one_line(redacted(str(fault)), 300).rstrip(".")
 
 
-def _parts(key: str, text: str) -> Iterator[tuple[int, int]]:
-    """Yield where beginnings and ends of a key are that identify it, in linear time."""
-    reversed_key, reversed_text = key[::-1], text[::-1]
-    spans = [(at, at + n) for at, n in _beginnings(key, text)]
-    spans += [(len(text) - at - n, len(text) - at) for at, n in _beginnings(reversed_key, reversed_text)]
-    yield from sorted(spans)
+def _whole(key: str) -> re.Pattern[str]:
+    """Return the pattern of a key and of words with its beginning or its end, which takes linear time."""
+    found = re.escape(key)
+    if len(key) > PART:
+        start, end = re.escape(key[:PART]), re.escape(key[-PART:])
+        found += rf"|{start}[\w-]*+|(?<![\w-])[\w-]*{end}|{end}"
+    return re.compile(found)
 
 
-def _beginnings(key: str, text: str) -> Iterator[tuple[int, int]]:
-    """Yield the position and the length of each beginning of a key that identifies it."""
-    at = text.find(key[:PART]) if len(key) > PART else -1
-    while at >= 0:
-        length = PART
-        while length < len(key) and text.startswith(key[length], at + length):
-            length += 1
-        yield at, length
-        at = text.find(key[:PART], at + length)
+def _blot(key: str, blot: str) -> Callable[[re.Match[str]], str]:
+    """Return what replaces a masked word: `blot` for the mask and what of the key is beside it."""
 
+    def replaced(found: re.Match[str]) -> str:
+        left, mask, right = found.groups()
+        starts, ends = key.startswith(left), key.endswith(right)
+        if starts * len(left) + ends * len(right) < 4:
+            return left + mask + right
+        return ("" if starts else left) + blot + ("" if ends else right)
 
-def _masked(key: str, text: str) -> Iterator[tuple[int, int]]:
-    """Yield where forms of a key with a masked middle are: the mask, and what of the key is beside it."""
-    for found in _MASKED.finditer(text):
-        left, right = (len(word) for word in found.groups())
-        left, right = left * key.startswith(found[1]), right * key.endswith(found[2])
-        if left + right >= 4:
-            yield found.end(1) - left, found.start(2) + right
-
-
-def _without(spans: Iterable[tuple[int, int]], blot: str, text: str) -> str:
-    """Replace spans of a text, which may overlap, by `blot`; they are sorted by their starts."""
-    pieces: list[str] = []
-    end = 0
-    for start, stop in spans:
-        if start >= end:
-            pieces += [text[end:start], blot]
-        end = max(end, stop)
-    return "".join([*pieces, text[end:]])
+    return replaced
 
 
 def _keys() -> Iterator[tuple[str, str]]:

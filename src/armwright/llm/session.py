@@ -4,7 +4,6 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from armwright.exceptions import ModelError, ProposalError
@@ -25,7 +24,6 @@ from armwright.llm.conversation import conversation, new_part
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, total_cost
 from armwright.proof.summary_file import ProposerSummary
-from armwright.runs.control import Hint
 
 
 class LlmSession:
@@ -81,7 +79,7 @@ class LlmSession:
             ModelError: There is no answer, or its price is unknown under a cost limit.
         """
         try:
-            self._call(CHECK, partial(self._send, CHECK, CHECK_FORMAT), self._over)
+            self._call(CHECK, CHECK_FORMAT, self._over)
         except ProposalError as fault:
             if fault.kind == "budget":
                 return ""
@@ -106,10 +104,10 @@ class LlmSession:
         """Return the calls that the budget and the summary count."""
         return self._transcript.calls
 
-    def _question(self, number: int, prompt: str, known: int, hints: tuple[Hint, ...] = ()) -> Question:
+    def _question(self, number: int, prompt: str, known: int) -> Question:
         """Return the question for trial `number`, to be followed by a second one if the answer is in two steps."""
         step = "reasoning" if self.options.answer == "two-step" else "answer"
-        return Question(self.identity(number), step, prompt, known, hints)
+        return Question(self.identity(number), step, prompt, known)
 
     def _ask(self, question: Question, output: OutputFormat, extraction: Callable[[str], str] = str) -> str:
         """Return the answer in the format `output`.
@@ -118,12 +116,9 @@ class LlmSession:
         """
         over = self._over  # of this session, even if another one begins meanwhile
         if question.step == "reasoning":
-            thoughts = self._call(question, partial(self._send, question, None), over)
-            question = replace(question, step="parameters", prompt=extraction(thoughts), hints=())
-        return self._call(question, partial(self._send, question, output), over)
-
-    def _send(self, question: Question, output: OutputFormat | None, most_requests: int | None) -> Reply:
-        return self.backend.ask(question, output, most_requests, self._earlier(question))
+            thoughts = self._call(question, None, over)
+            question = replace(question, step="parameters", prompt=extraction(thoughts))
+        return self._call(question, output, over)
 
     def _earlier(self, question: Question) -> Sequence[Turn] | None:
         """Return the turns that go with a question; None for the check and for second questions, which stand alone."""
@@ -134,17 +129,17 @@ class LlmSession:
         """Return what a question for a trial says of a prompt: in a chat, what the turns before it do not."""
         return new_part(prompt, conversation(self._transcript.calls, trial)) if self.chat else prompt
 
-    def _call(self, question: Question, ask: Callable[[int | None], Reply], over: threading.Event) -> str:
+    def _call(self, question: Question, output: OutputFormat | None, over: threading.Event) -> str:
         """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call.
 
-        `ask` takes the largest number of requests. A question that is too long is repeated without the oldest turns,
-        within that number. `over` is set once no answer is wanted any more.
+        A question that is too long is repeated without the oldest turns. `over` is set once no answer is wanted any
+        more.
         """
         with self._budget.reserved(self._calls, over) as left:
             while True:
                 earlier = self._earlier(question)
                 try:
-                    reply = ask(left)
+                    reply = self.backend.ask(question, output, left, earlier)
                 except (CallError, Interrupted) as fault:
                     if fault.kind != "cancelled" or fault.reply.requests:
                         self._keep(question, fault.reply, fault)

@@ -15,12 +15,10 @@ from pydantic import TypeAdapter, ValidationError
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, open_to_append, read_records
 from armwright.llm.backend import Question, Reply
-from armwright.runs.control import Hint
 
 TRANSCRIPTS = "transcripts.jsonl"  # in a run folder
-FIRST_STEPS = ("reasoning", "answer")  # steps whose prompts show the history and hints
+FIRST_STEPS = ("reasoning", "answer")  # steps whose prompts show the history
 LAST_STEPS = ("parameters", "answer")  # steps whose answers are designs
-READ = (None, "answer", "limit", "refused", "rejected", "context")  # faults of calls whose prompt was read
 
 
 @dataclass(frozen=True)
@@ -66,15 +64,6 @@ class Transcript:
         return last_call([call for call in self._calls if call.fault is None], proposal, step)
 
 
-def used_hints(calls: Iterable[Call]) -> dict[Hint, str]:
-    """Return the used hints and their proposals.
-
-    A hint is used by the call that carried it to the model, whatever came back. If the model read nothing (no
-    connection, timeout, Ctrl-C), the hint goes with the next question.
-    """
-    return {hint: call.proposal for call in calls if call.fault in READ for hint in call.hints}
-
-
 def n_requests(calls: Iterable[Call]) -> int:
     """Return the number of requests, at least one per call."""
     return sum(max(1, call.requests) for call in calls)
@@ -84,12 +73,6 @@ def total_cost(calls: Iterable[Call]) -> float | None:
     """Return the cost of all answers [USD]; None if a price is unknown."""
     costs = [call.cost_usd for call in calls if call.requests]
     return None if None in costs else sum(cost for cost in costs if cost is not None)
-
-
-def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:
-    """Return the hints in the latest prompt for a proposal."""
-    call = last_call(calls, proposal, *FIRST_STEPS)
-    return () if call is None else call.hints
 
 
 def last_call(calls: Sequence[Call], proposal: str, *steps: str) -> Call | None:
@@ -110,7 +93,7 @@ def _append(file: FileIO, line: bytes) -> None:
 
 
 def _record(call: Call) -> dict[str, Any]:
-    return {name: value for name, value in asdict(call).items() if value or name not in ("hints", "output_mode")}
+    return {name: value for name, value in asdict(call).items() if value or name != "output_mode"}
 
 
 def _read(path: Path, mend: bool) -> Iterator[Call]:

@@ -1,6 +1,6 @@
 """The content of the page: a run, and what is kept beside it, packed as bytes for the page's script.
 
-report.html embeds these bytes; the live server sends them, reduced to what is new.
+report.html embeds these bytes; the live server sends them whenever they change.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,10 +23,9 @@ from armwright.proof.results import COMMAND, SUMMARY, read_summary
 from armwright.proof.shown_run import Arrays, ShownRun, read_shown_run, show_run, shown_facts
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.config import FrontMethod, Method, RunConfig
-from armwright.runs.folder import read_config
-from armwright.runs.history import History
-from armwright.runs.trials_file import TrialsReader
+from armwright.runs.config import FrontMethod, Method
+from armwright.runs.folder import read_run
+from armwright.runs.trial import FinishedTrial
 from armwright.sheet.record import NOT_MODELLED
 
 FILES = {"urdf": "arm.urdf", "mjcf": "arm.xml"}  # of designs of the front, by format
@@ -47,67 +46,46 @@ def finished_content(folder: Path) -> bytes | None:
 
 
 class RunContent:
-    """A run folder as the page shows it; `refresh` reads only what is new."""
+    """A run folder as the page shows it; records of designs are taken from what the page showed of it earlier."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, earlier: "RunContent | None" = None) -> None:
         self.folder = folder
-        self.config: RunConfig = read_config(folder)
-        self._reader = TrialsReader(folder, self.config)
-        self._is_finished = False
-        self._records: dict[int, DesignRecord] = {}  # of designs that are or were on the front
-        self.history = self._nothing()
-        self.refresh()
-
-    def is_still(self, config: RunConfig) -> bool:
-        """Return whether a folder with these settings holds the same run, possibly extended."""
-        changing: dict[str, Any] = {"reference_point": None, "versions": {}, "earlier_versions": [], "method": None}
-        ours, theirs = (one.model_copy(update=changing) for one in (self.config, config))
-        return ours == theirs and type(self.config.method) is type(config.method)
-
-    def refresh(self) -> bool:
-        """Read what is new; return whether the trials file was replaced and had to be read from the start."""
-        self.config = read_config(self.folder)  # the reference point may have been chosen since
-        is_other = self._reader.read_on() or len(self._reader.trials) < len(self.history)
-        if is_other:
-            self._records, self.history = {}, self._nothing()
-        summary = read_summary(self.folder)
+        self.config, self.history = read_run(folder)
+        self.study: Method | None = None if isinstance(self.config.method, FrontMethod) else self.config.method
+        summary = read_summary(folder)
         # A summary of another kind of run does not belong to this one.
         self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
-        self.history = self.history.grown(self._reader.trials, self.config.reference_point)
-        if self.summary is not None and not self._is_finished:
-            self._records = {}  # those of a finished run are its results
-        self._is_finished = self.summary is not None
-        self.calls = _calls(self.folder)
-        lacking = [member.number for member in self.history.front if member.number not in self._records]
-        self._records |= read_records(self.folder, self.history, lacking)
-        return is_other
+        self.calls = _calls(folder)
+        known: dict[int, DesignRecord] = {}
+        if earlier is not None and self.summary is None:  # those of a finished run are its results
+            known = {
+                n: one for n, one in earlier.records.items() if self.history.trials[n : n + 1] == [earlier.trial(n)]
+            }
+        front = [member.number for member in self.history.front]
+        known |= read_records(folder, self.history, [number for number in front if number not in known])
+        self.records = {number: known[number] for number in front}
 
-    def _nothing(self) -> History:
-        return History(self.config.problem, (), self.config.method.n_init, self.config.reference_point)
+    def trial(self, number: int) -> FinishedTrial:
+        """Return a trial."""
+        return self.history.trials[number]
 
-    @property
-    def study(self) -> Method | None:
-        """The settings of its study; None for a direct search."""
-        return None if isinstance(self.config.method, FrontMethod) else self.config.method
-
-    def packed(self, designs_from: int = 0, calls_from: int = 0) -> bytes:
-        """Pack the run without what a page has that knows so many designs and calls."""
-        first = designs_from if designs_from <= len(self.history) else 0
-        records = {member.number: self._records[member.number] for member in self.history.front}
-        shown = show_run(self.config, self.history, self.summary, records, first)
-        maps = read_reach_maps(self.folder, len(self.history), self._params)
-        return _packed(self.folder, shown, maps, {}, self.calls, calls_from)
+    def packed(self) -> bytes:
+        """Pack the run."""
+        shown = show_run(self.config, self.history, self.summary, self.records)
+        return _packed(
+            self.folder, shown, read_reach_maps(self.folder, len(self.history), self._params), {}, self.calls
+        )
 
     def file(self, number: int, kind: str) -> str | None:
         """Return a design as text for simulators, urdf or mjcf; None for other kinds."""
-        is_stored = self.summary is not None and number in {member.number for member in self.history.front}
+        is_stored = self.summary is not None and number in self.records
         if is_stored and kind in (stored := _files(self.folder, number)):
             return stored[kind]
         name, arm = f"{self.history.problem.task.name}-{number}", self.history.member(number).arm
         return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}.get(kind)
 
     def _params(self, number: int) -> Array:
-        return self.history.problem.space.matrix([self.history.trials[number].design])[0]
+        return self.history.problem.space.matrix([self.trial(number).design])[0]
 
 
 def _calls(folder: Path) -> tuple[Call, ...]:
@@ -120,19 +98,17 @@ def _packed(
     maps: Mapping[int, PageReachMap],
     files: Mapping[int, Mapping[str, str]],
     calls: Sequence[Call],
-    calls_from: int = 0,
 ) -> bytes:
     """Pack what is shown of a run with what its folder holds beside it.
 
-    Maps and files are by number of the design, files also by format. The page lacks the calls from `calls_from` on.
+    Maps and files are by number of the design, files also by format.
     """
     head = {
         **shown.head,
         "files": files,
         "folder": replace_surrogates(folder.resolve().name),
         "command": _command(folder),
-        "calls_from": calls_from,
-        "calls": [asdict(call) for call in calls[calls_from:]],
+        "calls": [asdict(call) for call in calls],
         "reach_maps": {number: one.head for number, one in maps.items()},
         "existing_arms": [
             {"name": arm.name, "values": arm.values, "facts": shown_facts(arm.facts), "violated": arm.violated}

@@ -1,28 +1,24 @@
 """A run folder as the live server shows it: its content, and the status of the study."""
 
 import threading
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 from armwright.exceptions import ArmwrightError
 from armwright.existing.compare_arms import EXISTING_ARMS
 from armwright.extras import naming_extras
 from armwright.files import replace_surrogates
-from armwright.llm.transcript import TRANSCRIPTS, used_hints
+from armwright.llm.transcript import TRANSCRIPTS
 from armwright.page.content import RunContent
 from armwright.proof.results import REPORT, SUMMARY
-from armwright.runs.control import (
-    CONTROL,
-    STATUS,
-    read_control,
-    read_status,
-)
+from armwright.runs.config import FrontMethod
+from armwright.runs.control import read_control, read_status
 from armwright.runs.folder import CONFIG, REACH_MAPS, is_held, read_config
 from armwright.runs.trials_file import TRIALS
 
-BESIDE = (REACH_MAPS, EXISTING_ARMS, REPORT)  # what commands beside the run add to the page; they end with the report
-WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL, *BESIDE)
+SHOWN = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, REACH_MAPS, EXISTING_ARMS, REPORT)  # files that change the page
+CHANGING = {"reference_point", "versions", "earlier_versions", "method"}  # settings of one and the same run
 RECENT = 20  # trials whose mean duration predicts the remaining time
 RUNNING = ("evaluating", "asking", "paused", "searching")
 
@@ -34,35 +30,21 @@ class LiveRun:
         self.folder = folder
         self.fault = ""  # the reason why the folder cannot be read
         self._content: RunContent | None = None
+        self._version = 0  # of the content
+        self._run = 0  # by which a page recognises another run
         self._seen: list[tuple[int, ...] | None] = []
-        self._run = 0  # number of runs seen in this folder since the server started
         self._lock = threading.Lock()
-        self.status = self._status()
 
-    def look(self) -> None:
-        """Read the files that have changed."""
+    def packed(self) -> bytes | None:
+        """Return the content of the page; None while there is no run."""
         with self._lock:
-            seen = [_stamp(self.folder / name) for name in WATCHED]
-            if seen == self._seen and not (self.status["doing"] in RUNNING and not is_held(self.folder)):
-                return
-            self._seen = seen
-            try:
-                self._read()
-                self.fault = ""
-            except ArmwrightError as fault:
-                self.fault = str(fault)  # for example a file that is being rewritten; it is read again when it changes
-            except Exception as fault:  # noqa: BLE001 (the server must survive any folder content)
-                self.fault = f"the run folder cannot be read: {type(fault).__name__}: {fault}"
-            self.status = self._status()
-
-    def packed(self, designs: int, calls: int) -> bytes | None:
-        """Return what is new for a page; None while there is no run."""
-        with self._lock:
-            return None if self._content is None else self._content.packed(designs, calls)
+            self._look()
+            return None if self._content is None else self._content.packed()
 
     def file(self, number: int, kind: str) -> str | None:
         """Return a design as text; None if it does not exist. kind: urdf, mjcf or datasheet."""
         with self._lock:
+            self._look()
             if self._content is None or number >= len(self._content.history):
                 return None
             if kind == "datasheet":
@@ -72,21 +54,39 @@ class LiveRun:
                 return to_html(design_sheet(self.folder, number))
             return self._content.file(number, kind)
 
-    def _read(self) -> None:
-        if not (self.folder / CONFIG).is_file():
+    def _look(self) -> None:
+        """Read the files that have changed."""
+        seen = [_stamp(self.folder / name) for name in SHOWN]
+        if seen == self._seen:
             return
-        if self._content is None or not self._content.is_still(read_config(self.folder)):
-            self._content = None  # an unreadable run must not appear as the previous one
-            self._run += 1
-            self._content = RunContent(self.folder)
-        elif self._content.refresh():
-            self._run += 1
+        self._seen = seen
+        try:
+            if (self.folder / CONFIG).is_file():
+                self._read()
+            self.fault = ""
+        except ArmwrightError as fault:
+            self.fault = str(fault)  # for example a file that is being rewritten; it is read again when it changes
+        except Exception as fault:  # noqa: BLE001 (the server must survive any folder content)
+            self.fault = f"the run folder cannot be read: {type(fault).__name__}: {fault}"
 
-    def _status(self) -> dict[str, Any]:
+    def _read(self) -> None:
+        config = read_config(self.folder)
+        run = crc32(config.model_dump_json(exclude=CHANGING).encode())
+        if isinstance(config.method, FrontMethod):  # a longer search replaces its trials
+            run = crc32(str(_stamp(self.folder / TRIALS)).encode(), run)
+        if run != self._run:
+            self._content = None  # an unreadable run must not appear as the previous one
+        self._run = run
+        self._content = RunContent(self.folder, self._content)
+        self._version += 1
+
+    def status(self) -> dict[str, Any]:
         """Return the content of the page's status bar."""
-        content, status, control = self._content, read_status(self.folder), read_control(self.folder)
+        with self._lock:
+            self._look()
+            content, version, run = self._content, self._version, self._run
+        status, control = read_status(self.folder), read_control(self.folder)
         trials = () if content is None else content.history.trials
-        calls = () if content is None else content.calls
         study = None if content is None else content.study
         is_finished = content is not None and content.summary is not None
         doing = status.doing if status is not None else "finished" if is_finished else "unknown"
@@ -96,32 +96,19 @@ class LiveRun:
             doing = "gone"
         recent = [trial.seconds.get("total", 0.0) for trial in trials[-RECENT:]]
         planned = None if study is None else study.n_trials
-        n_init = 0 if study is None else study.n_init
-        used = used_hints(calls)  # proposals, named PROPOSER-NUMBER, by hint
         return {
             "name": replace_surrogates(self.folder.resolve().name),
-            "run": self._run,
+            "run": run,
+            "version": version,
             "doing": doing,
             "since": 0.0 if status is None else status.since,
             "designs": len(trials),
-            "calls": len(calls),
             "planned": planned,
-            "finished": is_finished,
-            "beside": str([_stamp(self.folder / name) for name in BESIDE]),
             "left": None if planned is None or not recent else (planned - len(trials)) * sum(recent) / len(recent),
             "paused": control.paused,
             "fault": self.fault or ("" if status is None else status.fault),
-            "takes_hints": study is not None and _asks_a_model(study.proposer or {}),
-            "hints": [
-                {"text": hint.text, "used": int(used[hint].rpartition("-")[2]) - n_init + 1 if hint in used else None}
-                for hint in control.hints
-            ],
+            "asks_a_model": study is not None and "prompt" in (study.proposer or {}),
         }
-
-
-def _asks_a_model(proposer: Mapping[str, Any]) -> bool:
-    """Return whether a hint would reach a model; rules, people and replays take none."""
-    return "prompt" in proposer and "replay" not in proposer and proposer["name"] != "manual"
 
 
 def _stamp(path: Path) -> tuple[int, ...] | None:

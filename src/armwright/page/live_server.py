@@ -4,12 +4,12 @@ The server reads the run folder and writes the user's requests into control.json
 Needs the extra `live`.
 """
 
-import asyncio
 import ipaddress
 import secrets
 import socket
 import subprocess
 import threading
+import time
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
@@ -22,13 +22,10 @@ from armwright.extras import check_extra
 if TYPE_CHECKING:
     from starlette.applications import Starlette
 
-    from armwright.page.live_app import OpenPages
-
 LOOPBACK = "127.0.0.1"
 HTTP_PORT = 80  # omitted in addresses
-POLL = 0.25  # [s] between checks for open pages
 GRACE = 3.0  # [s] to wait for a first page after the study has ended
-LINGER = 60.0  # [s] to wait for a page to come back, such as a tab in the background
+LINGER = 60.0  # [s] to wait for the next request of a page, such as a tab in the background
 
 
 def serve(
@@ -44,16 +41,14 @@ def serve(
         FailureError: The address cannot be used.
     """
     check_extra("live", "the live page")
-    from armwright.page.live_app import OpenPages, live_app
+    from armwright.page.live_app import live_app
 
-    pages = OpenPages()
-    serve_app(live_app(folder, pages), {"/"}, pages, tell, host, port, study)
+    serve_app(live_app(folder), {"/"}, tell, host, port, study)
 
 
 def serve_app(
     app: "Starlette",
     shells: Collection[str],
-    pages: "OpenPages",
     tell: Callable[[str], None],
     host: str,
     port: int,
@@ -61,7 +56,7 @@ def serve_app(
 ) -> None:
     """Serve an application as `serve` does, behind a guard with a key of 192 bits.
 
-    `shells` are the paths of its pages, which need no key; `pages` counts the open ones.
+    `shells` are the paths of its pages, which need no key.
     """
     import uvicorn
 
@@ -69,8 +64,9 @@ def serve_app(
 
     listener, key = _listen(host, port), secrets.token_urlsafe(24)
     port = listener.getsockname()[1]
+    guard = Guard(app, key, shells, _hosts(host, listener))
     settings = uvicorn.Config(
-        Guard(app, key, shells, _hosts(host, listener)), log_config=None, access_log=False,
+        guard, log_config=None, access_log=False,
         log_level="error",  # a client's invalid requests are not news
         lifespan="on", timeout_graceful_shutdown=1, server_header=False,
         proxy_headers=False,  # any user of this machine can send X-Forwarded-Proto and -For
@@ -84,26 +80,18 @@ def serve_app(
             tell(f"http://{f'[{host}]' if ':' in host else host}:{port}/#key={key}")
 
     server = Server(settings)
-    is_alone = threading.Event()
+
+    def end_after(study: BinaryIO) -> None:
+        study.read()
+        time.sleep(GRACE)
+        while guard.latest is not None and time.monotonic() - guard.latest < LINGER:
+            time.sleep(GRACE)
+        server.should_exit = True
+
     if study is not None:
-        threading.Thread(target=lambda: (study.read(), is_alone.set()), daemon=True).start()
-
-    async def end() -> None:
-        idle = 0.0
-        while not server.should_exit:
-            await asyncio.sleep(POLL)
-            idle = idle + POLL if pages.count == 0 and is_alone.is_set() else 0.0
-            if idle >= (LINGER if pages.were_open else GRACE):
-                server.should_exit = True
-        pages.is_closing = True
-
-    async def run() -> None:
-        ending = asyncio.create_task(end())
-        await server.serve(sockets=[listener])
-        ending.cancel()
-
+        threading.Thread(target=end_after, args=(study,), daemon=True).start()
     with suppress(KeyboardInterrupt):
-        asyncio.run(run())
+        server.run(sockets=[listener])
 
 
 def _listen(host: str, port: int) -> socket.socket:

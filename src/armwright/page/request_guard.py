@@ -6,6 +6,7 @@ which belongs to one port, and sends it as a header. A cookie would reach the se
 """
 
 import secrets
+import time
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -36,6 +37,7 @@ class Guard:
         self._key = key.encode()
         self._shells = shells
         self._is_allowed = is_allowed
+        self.latest: float | None = None  # when a page last asked for data [s of the monotonic clock]
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         async def send_with_headers(message: Any) -> None:
@@ -56,7 +58,10 @@ class Guard:
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._is_allowed(hosts[0]):  # with two, a proxy might use the other one
             return PlainTextResponse("unknown host; use the address that the server printed", 421)
-        if scope["path"] in self._shells or secrets.compare_digest(headers.get(KEY_HEADER, "").encode(), self._key):
+        if scope["path"] in self._shells:
+            return None
+        if secrets.compare_digest(headers.get(KEY_HEADER, "").encode(), self._key):
+            self.latest = time.monotonic()
             return None
         return PlainTextResponse("the key is missing or wrong; use the address that the server printed", 403)
 

@@ -37,7 +37,7 @@ from armwright.robot.arm import Arm
 from armwright.spaces.parameters import Design
 from armwright.tasks.task import Task
 from armwright.text import one_line
-from armwright.user_code import MAX_REASON_LENGTH, ForkError, contained, describe_exception, place_of, traceback_of
+from armwright.user_code import MAX_REASON_LENGTH, contained, describe_exception, place_of, traceback_of
 
 Measure = Callable[[Arm, Task], Sequence[float] | float] | Callable[[Arm, Task, Design], Sequence[float] | float]
 Measurement = tuple[float, ...] | Failure  # the objectives of one arm, or why there are none
@@ -94,8 +94,6 @@ class Evaluator:
                 )
         except KeyboardInterrupt:
             raise
-        except ForkError as fault:
-            return self._wrong_result(str(fault))
         except BaseException as fault:  # noqa: BLE001 (the failure is recorded; user code may raise anything)
             kind = type(fault).__name__
             return Failure("exception", describe_exception(fault), kind, place_of(fault), traceback_of(fault))

@@ -11,14 +11,11 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 
-OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
-
 
 def export_design(run: Path, number: int | None, kind: str) -> str:
     """Return a design of a run in a format; without a number, the knee of its front."""
     if kind not in FORMATS:
-        kinds = (*FORMATS, OPTUNA)
-        raise SettingsError(f'unknown format "{kind}".{did_you_mean(kind, kinds)} Formats: {", ".join(kinds)}')
+        raise SettingsError(f'unknown format "{kind}".{did_you_mean(kind, FORMATS)} Formats: {", ".join(FORMATS)}')
     _, history = read_run(run)
     member = pick(history)[0] if number is None else history.member(number)
     return FORMATS[kind](history, member)

@@ -50,7 +50,7 @@ class _Head(BaseModel, extra="allow"):
 
 @dataclass(frozen=True)
 class ShownRun:
-    """What the page shows of a run, or of its newest designs."""
+    """What the page shows of a run."""
 
     head: Mapping[str, Any]  # in JSON types
     arrays: Arrays  # one row for each design; `curve`: hypervolume after each design of the run
@@ -76,15 +76,11 @@ def read_shown_run(folder: Path) -> ShownRun | None:
     return ShownRun(head, arrays)
 
 
-def show_run(
-    config: RunConfig, history: History, summary: Summary, records: Mapping[int, DesignRecord], first: int = 0
-) -> ShownRun:
-    """Return what the page shows of a run: the records of its front, and its designs from number `first` on."""
-    trials = history.trials[first:]
+def show_run(config: RunConfig, history: History, summary: Summary, records: Mapping[int, DesignRecord]) -> ShownRun:
+    """Return what the page shows of a run, with the records of its front."""
     head = {
         **_settings(config, history),
         "n": len(history),
-        "designs_from": first,
         "front": [member.number for member in history.front],
         "arms": {  # the numbers by which `pick` selects, besides parameters and objectives
             number: {name: fact.value for name, fact in one.facts.items() if fact.value is not None}
@@ -104,12 +100,12 @@ def show_run(
                 "fault": trial.fault,
                 "screened": None if trial.screened is None else trial.screened.describe(history.problem.objectives),
             }
-            for trial in trials
+            for trial in history
             if trial.answer is not None or trial.fault is not None
         },
         "failures": {
             trial.number: f"{trial.failure.kind.replace('_', ' ')}: {trial.failure.description}"
-            for trial in trials
+            for trial in history
             if trial.failure is not None
         },
         "sources": list(dict.fromkeys(trial.source for trial in history)),
@@ -117,7 +113,7 @@ def show_run(
         "recommended": _recommended((summary or {}).get("recommended", ()), records),
         "nothing": _why_nothing(history, summary),
     }
-    return ShownRun(head, {**_designs(history, range(first, len(history))), "curve": history.hypervolumes})
+    return ShownRun(head, {**_designs(history), "curve": history.hypervolumes})
 
 
 def shown_facts(facts: Facts) -> dict[str, dict[str, Any]]:
@@ -193,9 +189,9 @@ def _motions(task: Task) -> list[dict[str, Any]]:
     ]
 
 
-def _designs(history: History, numbers: range) -> Arrays:
+def _designs(history: History) -> Arrays:
     """Return arms, parameters and values of designs; `q`: (n, T, J) joint angles [rad] or strokes [m]."""
-    problem, trials = history.problem, [history.trials[number] for number in numbers]
+    problem, trials = history.problem, history.trials
     if not trials:
         return {}
     space = problem.space
@@ -205,15 +201,15 @@ def _designs(history: History, numbers: range) -> Arrays:
     offset = arms.offset.copy()
     offset[last] -= arms.tool.tip.astype(np.float32)
     q = np.zeros((len(trials), len(problem.task.targets), arms.dof), dtype=np.float32)
-    angles = history.angles(numbers)[:, :, : arms.dof]
+    angles = history.angles(range(len(trials)))[:, :, : arms.dof]
     q[:, :, : angles.shape[2]] = angles
     sources = list(dict.fromkeys(trial.source for trial in history))
     up = [mounted_vector(DIRECTIONS["+z"], space.mount_of(trial.design)) for trial in trials]
     arrays: dict[str, NDArray[Any]] = {
         "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
-        "values": history.values[numbers.start : numbers.stop],
+        "values": history.values,
         "params": params,
-        "violations": history.violations[numbers.start : numbers.stop],
+        "violations": history.violations,
         "q": q,
         "base": arms.base,
         "up": np.array(up, dtype=np.float32),

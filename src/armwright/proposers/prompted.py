@@ -1,6 +1,5 @@
 """The base class of proposers that ask a language model or a person, or repeat what one of them answered."""
 
-import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -14,10 +13,9 @@ from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
-from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Transcript, used_hints
+from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.runs.control import Hint, read_control
 from armwright.runs.history import History
 
 
@@ -32,23 +30,14 @@ class PromptedProposer(LlmSession, Proposer):
     ) -> None:
         super().__init__(backend, name, options, budget)
         self.overlaps = self.overlaps and not self.chat  # a turn follows the one before it
-        self._folder: Path | None = None
-        self._hints_under_way: set[Hint] = set()  # in questions that are not answered yet
-        self._lock = threading.Lock()
 
     def settings(self) -> Mapping[str, Any]:
         """Return prompt, memory and form of the answer."""
         return self.options.model_dump(include=set(PromptOptions.model_fields))
 
     def open(self, folder: Path | None) -> None:
-        """Open the run's transcript and hints."""
+        """Open the run's transcript."""
         self._begin(None if folder is None else folder / TRANSCRIPTS)
-        self._folder = folder
-
-    def open_read_only(self, folder: Path) -> None:
-        """Open the transcript and hints of a run without changing them."""
-        self._transcript = Transcript(folder / TRANSCRIPTS, read_only=True)
-        self._folder = folder
 
     def unused(self, history: History) -> Sequence[Proposal]:
         """Return recorded designs of a killed run that no trial has used yet."""
@@ -62,44 +51,25 @@ class PromptedProposer(LlmSession, Proposer):
 
     def propose(self, history: History, seed: int, number: int) -> Proposal:
         """Propose the next design; recorded thoughts of a killed run are used rather than asked for again."""
-        question, problem = self.question(history, seed, number), history.problem
+        question, problem = self._next_question(history, seed, number), history.problem
         try:
             text = self._ask(question, self.output_format(problem), partial(parameters_prompt, problem))
         except ProposalError as fault:
             fault.known = question.known
             raise
-        finally:  # the transcript shows which hints were used
-            with self._lock:
-                self._hints_under_way.difference_update(question.hints)
         return proposal_of(question, text, problem)
 
-    def question(self, history: History, seed: int, number: int) -> Question:
+    def _next_question(self, history: History, seed: int, number: int) -> Question:
         """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
         thoughts = self._transcript.answered(self.identity(number), "reasoning")
         if thoughts is not None:
             prompt = parameters_prompt(history.problem, thoughts.answer)
             return Question(self.identity(number), "parameters", prompt, thoughts.known)
-        hints = self.next_hints()
-        prompt = self.prompt_for(history, seed, number, hints)
-        return self._question(number, prompt, len(history), hints)
+        return self._question(number, self.prompt_for(history, seed, number), len(history))
 
-    def next_hints(self) -> tuple[Hint, ...]:
-        """Return the unused hints, which go with a question that is asked now, and no other one.
-
-        Manual answers get none: their question has to stay the same until it is answered.
-        """
-        if self.options.answer == "text":
-            return ()
-        with self._lock:
-            used = self._hints_under_way | used_hints(self._transcript.calls).keys()
-            hints = tuple(hint for hint in read_control(self._folder).hints if hint not in used)
-            self._hints_under_way.update(hints)
-        return hints
-
-    def prompt_for(self, history: History, seed: int, number: int, hints: Sequence[Hint] = ()) -> str:
+    def prompt_for(self, history: History, seed: int, number: int) -> str:
         """Return the prompt for trial `number`; in a chat, the part of it that is new."""
-        prompt = design_prompt(history, seed, self.options, name=self.name, hints=[hint.text for hint in hints])
-        return self._part_to_ask(prompt, number)
+        return self._part_to_ask(design_prompt(history, seed, self.options, name=self.name), number)
 
     def output_format(self, problem: Problem) -> OutputFormat:
         """Return the form of the answer that holds the design; it is recorded as JSON that `read_text` reads."""

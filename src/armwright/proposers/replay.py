@@ -10,7 +10,7 @@ from armwright.llm.backend import LlmBackend
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import parameters_prompt
 from armwright.llm.recording_file import read_recording
-from armwright.llm.transcript import LAST_STEPS, Call, hints_of, last_call
+from armwright.llm.transcript import LAST_STEPS, Call, last_call
 from armwright.proof.summary_file import ProposerSummary
 from armwright.proposers.prompted import PromptedProposer, proposal_of
 from armwright.proposers.proposer import Proposal
@@ -87,7 +87,7 @@ class ReplayProposer(PromptedProposer):
 
     def _prompts(self, history: History, seed: int, number: int, calls: Sequence[Call]) -> list[str]:
         """Return today's prompts of recorded calls for trial `number`."""
-        first = self.prompt_for(history, seed, number, hints_of(calls, self.identity(number)))
+        first = self.prompt_for(history, seed, number)
         thoughts = last_call(calls, self.identity(number), "reasoning")
         second = "" if thoughts is None else parameters_prompt(history.problem, thoughts.answer)
         return [second if call.step == "parameters" else first for call in calls]

@@ -1,6 +1,6 @@
 """Control of a running study from another process, by two small files in the run folder.
 
-control.json   requests: pause, stop, hints for the language model; written by the watcher
+control.json   requests: pause, stop; written by the watcher
 status.json    activity of the study, written by the study when it changes
 
 Neither process waits for the other, and a study gives the same trials without a watcher.
@@ -8,38 +8,20 @@ Neither process waits for the other, and a study gives the same trials without a
 
 import os
 import time
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, Field
 
-from armwright.exceptions import SettingsError
 from armwright.files import naming_write_errors, read_bytes, replace_file, replace_surrogates
-from armwright.runs.private_lock import private_lock
 
 CONTROL = "control.json"
 STATUS = "status.json"
-LOCK = ".control.lock"  # held while control.json is changed; there may be several watchers
-CHANNEL_FILES = (CONTROL, STATUS, LOCK)
-MAX_HINT_LENGTH = 2_000  # characters
-MAX_HINTS = 100  # of a run
-MAX_FILE_SIZE = 4 * 1024 * 1024  # [bytes]; the longest allowed hints, each letter escaped, take about 2.4 MB
-LOCK_SECONDS = 5.0  # to wait for changes by other watchers
+CHANNEL_FILES = (CONTROL, STATUS)
+MAX_FILE_SIZE = 1024 * 1024  # [bytes]; the message of a fault may be long
 
 Doing = Literal["evaluating", "asking", "paused", "stopped", "finished"]
-
-
-@dataclass(frozen=True)
-class Hint:
-    """A hint to the language model, for its next prompt only."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True)
-
-    id: Annotated[int, Field(ge=1)]
-    text: Annotated[str, Field(min_length=1, max_length=MAX_HINT_LENGTH)]
 
 
 class Control(BaseModel, frozen=True, extra="forbid", strict=True):
@@ -47,15 +29,6 @@ class Control(BaseModel, frozen=True, extra="forbid", strict=True):
 
     paused: bool = False  # no trial begins
     stop: bool = False  # the session ends before the next trial
-    hints: tuple[Hint, ...] = Field(default=(), max_length=MAX_HINTS)  # all of the run, used ones too, by increasing id
-
-    @field_validator("hints")
-    @classmethod
-    def _ids_rise(cls, hints: tuple[Hint, ...]) -> tuple[Hint, ...]:
-        ids = [hint.id for hint in hints]
-        if ids != sorted(set(ids)):
-            raise ValueError("expected increasing ids of hints")
-        return hints
 
 
 class Status(BaseModel, frozen=True, extra="forbid", strict=True):
@@ -83,32 +56,17 @@ def read_status(folder: Path) -> Status | None:
 
 def pause_study(folder: Path) -> None:
     """Begin no new trial until `resume_study`."""
-    _change(folder, lambda control: control.model_copy(update={"paused": True}))
+    _write(folder, Control(paused=True))
 
 
 def resume_study(folder: Path) -> None:
     """Continue a paused study."""
-    _change(folder, lambda control: control.model_copy(update={"paused": False}))
+    _write(folder, Control())
 
 
 def stop_study(folder: Path) -> None:
     """End the study's session after the current trial, or at once if it is paused."""
-    _change(folder, lambda control: control.model_copy(update={"stop": True}))
-
-
-def add_hint(folder: Path, text: str) -> Hint:
-    """Give the language model a hint for its next prompt; SettingsError if the text is empty or too long."""
-    message = replace_surrogates(text).strip()
-    if not 1 <= len(message) <= MAX_HINT_LENGTH:
-        raise SettingsError(f"expected a hint of 1 to {MAX_HINT_LENGTH:,} characters, got {len(message):,}")
-
-    def add(control: Control) -> Control:
-        if len(control.hints) >= MAX_HINTS:
-            raise SettingsError(f"expected at most {MAX_HINTS} hints for a run; {folder} has as many already")
-        hint = Hint(control.hints[-1].id + 1 if control.hints else 1, message)
-        return control.model_copy(update={"hints": (*control.hints, hint)})
-
-    return _change(folder, add).hints[-1]
+    _write(folder, Control(stop=True))
 
 
 class Channel:
@@ -119,10 +77,9 @@ class Channel:
         self._status: Status | None = None  # written in this session
 
     def begin(self, number: int) -> None:
-        """Begin a session with this trial; clear earlier requests, but keep hints."""
-        earlier = self.control()
-        if self._folder is not None and (earlier.paused or earlier.stop):
-            _change(self._folder, lambda control: Control(hints=control.hints))
+        """Begin a session with this trial; clear earlier requests."""
+        if self._folder is not None and self.control() != Control():
+            _write(self._folder, Control())
         self.report("evaluating", number)
 
     def control(self) -> Control:
@@ -152,12 +109,9 @@ class Channel:
             self.report("finished", number)
 
 
-def _change(folder: Path, change: Callable[[Control], Control]) -> Control:
-    """Replace the request by the result of `change`."""
-    with naming_write_errors(folder / CONTROL), private_lock(folder / LOCK, LOCK_SECONDS):
-        control = change(read_control(folder))
+def _write(folder: Path, control: Control) -> None:
+    with naming_write_errors(folder / CONTROL):
         replace_file(folder / CONTROL, control.model_dump_json().encode())
-    return control
 
 
 def _read(path: Path, schema: type[Content]) -> Content | None:

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from filelock import BaseFileLock, Timeout
+from filelock import BaseFileLock, FileLock, Timeout
 
 from armwright.exceptions import RunConflictError, RunFolderError
 from armwright.files import check_no_links, is_part, naming_write_errors, open_to_append, read_text, replace_file
@@ -29,13 +29,13 @@ from armwright.problem.evaluators import Evaluator
 from armwright.runs.config import Method, RunConfig, check_same_run, versions
 from armwright.runs.control import CHANNEL_FILES
 from armwright.runs.history import History
-from armwright.runs.private_lock import private_lock
 from armwright.runs.trial import FinishedTrial, trial_line
 from armwright.runs.trials_file import TRIALS, count_trials, read_trials
 from armwright.yaml_documents import MAX_BYTES, dump_document, parse_document
 
 LOCK = ".lock"  # locked by the process that writes; the system releases the lock of a dead process
 LOCK_SECONDS = 2.0  # to wait for it: the workers of a killed experiment take a moment to end
+OWNER_ONLY = 0o600
 CONFIG = "config.yaml"
 MAX_CONFIG = 4 * MAX_BYTES  # [bytes]; a task and a space with all their defaults
 KEPT = ". What was written before is safe; free room or give another --out DIR, and run the same command again"
@@ -58,7 +58,7 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
         check_no_links(self.path)
         with naming_write_errors(self.path / LOCK, KEPT):
-            self._lock = private_lock(self.path / LOCK, LOCK_SECONDS)
+            self._lock = _private_lock(self.path / LOCK)
             try:
                 self._lock.acquire()
             except Timeout as fault:
@@ -167,6 +167,14 @@ class RunFolder:
         with naming_write_errors(target, KEPT):
             target.parent.mkdir(parents=True, exist_ok=True)
             replace_file(target, content)
+
+
+def _private_lock(path: Path) -> BaseFileLock:
+    """Return a lock whose file no other user can open: whoever can read a file can lock it, and so block a run."""
+    with suppress(OSError):  # there is none yet, or it is another user's
+        if not path.is_symlink():
+            path.chmod(OWNER_ONLY)
+    return FileLock(path, timeout=LOCK_SECONDS, mode=OWNER_ONLY)
 
 
 def is_held(folder: Path) -> bool:

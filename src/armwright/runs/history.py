@@ -1,10 +1,8 @@
 """The history of a study: its finished trials, their front and hypervolume."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +39,6 @@ _LABELS = {  # of sources, where they differ from the name
     "scripted": "scripted stand-in",
 }
 FEW = 5  # successful trials that a reference point is chosen from
-# Properties that a longer history extends.
-CACHED = ("values", "violations", "masked_objectives", "front", "proposed", "_hypervolumes", "_first_of")
 
 
 def source_label(source: str) -> str:
@@ -70,10 +66,6 @@ class History:
     n_init: int  # number of random trials
     frozen_reference_point: tuple[float, ...] | None = None  # from the random trials, if the task states none
     method: Method | None = None  # the search settings of the study; None outside one
-    # Values of the history that this one extends (`grown`), with its number of trials
-    earlier: Mapping[str, tuple[int, Any]] = field(
-        default_factory=dict[str, tuple[int, Any]], repr=False, compare=False
-    )
 
     def __len__(self) -> int:
         return len(self.trials)
@@ -81,26 +73,10 @@ class History:
     def __iter__(self) -> Iterator[FinishedTrial]:
         return iter(self.trials)
 
-    def grown(self, trials: Sequence[FinishedTrial], frozen_reference_point: tuple[float, ...] | None) -> "History":
-        """Return the history of these trials, which begin with this one's, and reuse the values computed for those."""
-        same_point = frozen_reference_point == self.frozen_reference_point
-        if same_point and len(trials) == len(self):
-            return self
-        known = {**self.earlier, **{name: (len(self), vars(self)[name]) for name in CACHED if name in vars(self)}}
-        if not same_point:
-            known.pop("_hypervolumes", None)
-        return History(self.problem, trials, self.n_init, frozen_reference_point, self.method, known)
-
-    def _known(self, name: str, nothing: Any) -> tuple[Any, Sequence[FinishedTrial]]:
-        """Return the earlier history's value, and the trials after it."""
-        n, known = self.earlier.get(name, (0, nothing))
-        return known, self.trials[n:]
-
     def _matrix(self, name: str, width: int) -> Array:
         """Return the (N, width) matrix of a field of the trials."""
-        known, new = self._known(name, np.empty((0, width)))
-        rows = np.array([getattr(trial, name) for trial in new], dtype=np.float64)
-        return np.vstack([known, rows.reshape(len(new), width)])
+        rows = np.array([getattr(trial, name) for trial in self.trials], dtype=np.float64)
+        return rows.reshape(len(self), width)
 
     @cached_property
     def values(self) -> Array:
@@ -127,9 +103,7 @@ class History:
         """(N, M) `values`, infinite for infeasible designs, as fronts and hypervolumes need them."""
         if not self.problem.constraints:
             return self.values
-        known, _ = self._known("masked_objectives", np.empty((0, len(self.problem.objectives))))
-        n = len(known)
-        return np.vstack([known, masked_objectives(self.values[n:], self.violations[n:])])
+        return masked_objectives(self.values, self.violations)
 
     def nearest(self, n: int) -> list[int]:
         """Return at most `n` trial numbers, by increasing total violation; failed evaluations last."""
@@ -143,29 +117,20 @@ class History:
     @cached_property
     def front(self) -> list[FrontMember]:
         """The Pareto set of the feasible designs, by increasing first objective."""
-        known, new = self._known("front", [])
-        members = {member.number: member for member in known}
-        numbers = [*sorted(members), *range(len(self) - len(new), len(self))]
-        on_front = [numbers[i] for i in front_indices(self.masked_objectives[numbers])] if numbers else []
-        return [members[number] if number in members else self.member(number) for number in on_front]
+        return [self.member(number) for number in front_indices(self.masked_objectives)] if len(self) else []
 
     @cached_property
     def proposed(self) -> tuple[FinishedTrial, ...]:
         """The trials of proposers."""
-        known, new = self._known("proposed", ())
-        return (*known, *(trial for trial in new if trial.source not in NOT_PROPOSED))
+        return tuple(trial for trial in self.trials if trial.source not in NOT_PROPOSED)
 
     @cached_property
-    def _first_of(self) -> dict[Design, int]:
-        """The first trial of each design; histories that extend each other share one dictionary."""
-        known, new = self._known("_first_of", {})
-        for trial in new:
-            known.setdefault(trial.design, trial.number)
-        return known
+    def _designs(self) -> set[Design]:
+        return {trial.design for trial in self.trials}
 
     def has_tried(self, design: Design) -> bool:
         """Return whether a trial has this design."""
-        return self._first_of.get(design, len(self)) < len(self)
+        return design in self._designs
 
     def before(self, number: int) -> "History":
         """Return the history at the start of trial `number`."""
@@ -181,21 +146,15 @@ class History:
         return FrontMember(number, trial.source, trial.design, self.problem.arm(trial.design), trial.values)
 
     @cached_property
-    def _hypervolumes(self) -> tuple[Array, FrontTracker]:
-        """(N,) `hypervolumes`, and the front that a longer history continues with."""
-        assert self.reference_point is not None
-        tracker = FrontTracker(len(self.problem.objectives), self.reference_point)
-        (known, tracker), _ = self._known("_hypervolumes", (np.zeros(0), tracker))
-        tracker, new = copy(tracker), np.zeros(len(self) - len(known))
-        for i, row in enumerate(self.masked_objectives[len(known) :]):
-            tracker.add(row)
-            new[i] = tracker.hypervolume
-        return np.concatenate([known, new]), tracker
-
-    @property
     def hypervolumes(self) -> Array:
         """(N,) after each trial, the random ones included; (0,) without a reference point."""
-        return np.zeros(0) if self.reference_point is None else self._hypervolumes[0]
+        if self.reference_point is None:
+            return np.zeros(0)
+        tracker, volumes = FrontTracker(len(self.problem.objectives), self.reference_point), np.zeros(len(self))
+        for i, row in enumerate(self.masked_objectives):
+            tracker.add(row)
+            volumes[i] = tracker.hypervolume
+        return volumes
 
     @property
     def hypervolume(self) -> Array:

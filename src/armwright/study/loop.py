@@ -20,11 +20,11 @@ from armwright.search.samplers import BlackBox, SamplerFactory
 from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
-from armwright.study.overlapping_schedule import request_schedule
+from armwright.study.overlapping_schedule import OverlappingSchedule
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
 from armwright.study.record import Record
-from armwright.study.schedule import ReplaySchedule, Schedule
+from armwright.study.schedule import AlternatingSchedule, ReplaySchedule, Schedule
 from armwright.study.settings import EvaluationOptions
 from armwright.study.workers.dask_backend import DaskBackend
 from armwright.study.workers.evaluation_backend import Evaluated, LocalBackend
@@ -156,7 +156,10 @@ class Study:
         record = self._proposer.recorded_trials()
         if record:
             return ReplaySchedule(self._requests, record)
-        return request_schedule(self._requests)
+        in_flight = self._method.in_flight
+        return (
+            AlternatingSchedule(self._requests) if in_flight is None else OverlappingSchedule(self._requests, in_flight)
+        )
 
     def _wait_for_start(self, number: int) -> None:
         """Take results until trial `number` may start; StoppedError if the watcher ended the session."""

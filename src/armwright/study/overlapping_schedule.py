@@ -7,7 +7,7 @@ from itertools import count
 
 from armwright.runs.history import History
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
-from armwright.study.schedule import AlternatingSchedule, Schedule
+from armwright.study.schedule import Schedule
 
 POLL_SECONDS = 0.2  # between two checks for Ctrl-C, because a wait cannot be interrupted everywhere
 GRACE_SECONDS = 0.5  # for requests to save their answers when a study ends
@@ -59,11 +59,6 @@ class OverlappingSchedule(Schedule):
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
 
-    def upcoming(self, number: int) -> int:
-        """Return the trial of the next request: the first of a block without one."""
-        numbers = count(self._method.n_init, self._method.n_step)
-        return next(number for number in numbers if number not in self._asked)
-
     def _black_box_may_run(self, n_drawn: int) -> bool:
         """Return whether the black box may draw another trial after `n_drawn` counted ones."""
         method = self._method
@@ -77,7 +72,8 @@ class OverlappingSchedule(Schedule):
             due = (supplied - self._max_in_flight + 1) * self._method.n_step
             if counted < due or supplied >= self._method.n_proposals:
                 return
-            number = self.upcoming(counted + self._method.n_init)
+            blocks = count(self._method.n_init, self._method.n_step)
+            number = next(first for first in blocks if first not in self._asked)
             self._asked.add(number)
             self.n_in_flight += 1
             thread = threading.Thread(
@@ -101,9 +97,3 @@ class OverlappingSchedule(Schedule):
             if slot is not None:
                 self._arrived.append(slot)
             self._change.notify_all()
-
-
-def request_schedule(requests: ProposalRequests) -> AlternatingSchedule | OverlappingSchedule:
-    """Return the schedule of a proposer; its requests overlap with black-box trials if `in_flight` is set."""
-    in_flight = requests.method.in_flight
-    return AlternatingSchedule(requests) if in_flight is None else OverlappingSchedule(requests, in_flight)

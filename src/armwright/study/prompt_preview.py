@@ -1,7 +1,6 @@
-"""Preview of the prompt that a run would send to a language model."""
+"""Preview of the first prompt that a new run would send to a language model."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from armwright.llm.backend import LlmBackend
@@ -9,10 +8,7 @@ from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import estimated_tokens
 from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
-from armwright.proposers.replay import recorded_options
-from armwright.runs.folder import read_run
-from armwright.study.overlapping_schedule import request_schedule
-from armwright.study.proposal_requests import ProposalRequests, proposal_seed
+from armwright.study.proposal_requests import proposal_seed
 from armwright.study.study import optimize
 
 
@@ -35,30 +31,4 @@ def preview(
     history = replace(history, method=history.method.model_copy(update={"n_total": n_total}))
     proposer = PromptedProposer(LlmBackend(), "llm", options)
     text = proposer.prompt_for(history, proposal_seed(seed, n_init), n_init)
-    return _preview(proposer, problem, n_init, text)
-
-
-def preview_after(run: Path, options: PromptOptions | None = None) -> Preview:
-    """Return the prompt for the next proposal of a run, requested as the run would.
-
-    Options that are set replace those of the run.
-    """
-    config, history = read_run(run)
-    stated = {} if options is None else options.given
-    given = {name: value for name, value in stated.items() if name in PromptOptions.model_fields}
-    asked = recorded_options(config).model_copy(update=given)
-    settings = config.study.proposer or {}
-    proposer = PromptedProposer(LlmBackend(), settings["name"] if "prompt" in settings else "llm", asked)
-    proposer.open_read_only(run)
-    requests = ProposalRequests(proposer, config.seed, config.study, lambda: history)
-    number = request_schedule(requests).upcoming(len(history))
-    # With other options the new prompt is shown, even if the run waits for the second call of an answer.
-    if given:
-        text = proposer.prompt_for(history, proposal_seed(config.seed, number), number, proposer.next_hints())
-    else:
-        text = proposer.question(history, proposal_seed(config.seed, number), number).prompt
-    return _preview(proposer, history.problem, number, text)
-
-
-def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: str) -> Preview:
-    return Preview(number, text, estimated_tokens(text), dict(proposer.output_format(problem).schema))
+    return Preview(n_init, text, estimated_tokens(text), dict(proposer.output_format(problem).schema))

@@ -26,16 +26,16 @@ class Record:
         self.front = FrontTracker(len(problem.objectives), config.reference_point)
         self._folder = folder
         self._allow_failures = allow_failures
-        self._history = History(problem, (), config.study.n_init, config.reference_point, config.study)
+        self._problem = problem
         self._is_frozen = problem.reference_point is not None
         for trial in self.trials:
             self._count(trial)
         self._freeze_reference_point()
 
     def history(self) -> History:
-        """Return the finished trials; extends the last history, so that the cost does not grow with the trials."""
-        self._history = self._history.grown(tuple(self.trials), self.config.reference_point)
-        return self._history
+        """Return the finished trials."""
+        config = self.config
+        return History(self._problem, tuple(self.trials), config.study.n_init, config.reference_point, config.study)
 
     def add(self, trial: FinishedTrial) -> None:
         """Write an evaluated trial, which is part of the run from now on.

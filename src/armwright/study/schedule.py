@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Sequence
-from itertools import count
 
 from armwright.runs.trial import FinishedTrial
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot
@@ -33,11 +32,6 @@ class AlternatingSchedule(Schedule):
         if not self._requests.method.is_first_trial(number):
             return None
         return self._ready.popleft() if self._ready else self._requests.request(self._requests.history(), number)
-
-    def upcoming(self, number: int) -> int:
-        """Return the trial of the next request, once `number` trials are finished."""
-        first = next(n for n in count(number) if self._requests.method.is_first_trial(n))
-        return first + len(self._ready) * self._requests.method.n_step
 
 
 class ReplaySchedule(Schedule):

@@ -1,4 +1,4 @@
-// The content of the page: unpacked from the bytes of a run, and extended while the run goes on.
+// The content of the page: unpacked from the bytes of a run.
 
 const VIEWS = {
   uint8: Uint8Array, int32: Int32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
@@ -31,46 +31,26 @@ export async function embedded(text) {
 export class Content {
   constructor() {
     this.head = null;
-    this.calls = [];
-    this._clear();
-  }
-
-  _clear() {
     this.n = 0;
-    this._chunks = [];
-    this._chunk = []; // of each design
-    this._row = [];
+    this.calls = [];
     this.proposals = {};
     this.failures = {}; // why evaluations failed, which then have no finite values
   }
 
-  // Adds a packed run, or only its new part.
-  add(buffer) {
+  // Takes a packed run in place of what was there.
+  load(buffer) {
     const { head, arrays } = unpack(buffer);
-    if (head.designs_from === 0) this._clear();
-    if (head.designs_from !== this.n) throw new Error("designs are missing in between");
     this.head = head;
+    this._arrays = arrays;
     this.curve = arrays.curve.data;
     this.reach = Object.fromEntries(Object.entries(head.reach_maps).map(([i, map]) => [i, { ...map, levels: arrays[`reach_${i}`].data }]));
-    Object.assign(this.proposals, head.proposals);
-    Object.assign(this.failures, head.failures);
-    this.calls = [...this.calls.slice(0, head.calls_from), ...head.calls];
-    if (arrays.values) {
-      const rows = arrays.values.shape[0];
-      for (let row = 0; row < rows; row++) {
-        this._chunk.push(this._chunks.length);
-        this._row.push(row);
-      }
-      this._chunks.push(arrays);
-      this.n += rows;
-    }
+    ({ n: this.n, proposals: this.proposals, failures: this.failures, calls: this.calls } = head);
   }
 
   // A view of the part of an array that belongs to a design.
   _part(name, i) {
-    const { data, shape } = this._chunks[this._chunk[i]][name];
-    const size = data.length / shape[0];
-    return data.subarray(this._row[i] * size, (this._row[i] + 1) * size);
+    const { data, shape } = this._arrays[name], size = data.length / shape[0];
+    return data.subarray(i * size, (i + 1) * size);
   }
 
   get objectives() { return this.head.config.objectives; }
@@ -113,7 +93,7 @@ export class Content {
 
   // What is drawn of a design: `kind` (kinematics.js) and `axis` of each joint, and its parts of these arrays.
   arm(i) {
-    const arrays = this._chunks[this._chunk[i]], [, room] = arrays.motion.shape, n = this._part("joints", i)[0], arm = {};
+    const arrays = this._arrays, [, room] = arrays.motion.shape, n = this._part("joints", i)[0], arm = {};
     for (const name of OF_ARM) if (name in arrays) arm[name] = this._part(name, i);
     for (const name of OF_JOINTS) {
       if (!(name in arrays)) continue;

@@ -3,18 +3,13 @@
 import { $, duration, element, plural } from "./format.js";
 import { openKey, post, request } from "./key.js";
 
-const AGAIN = 1000; // [ms] between attempts to reach a lost server
+const LOOK = 500, AGAIN = 1000; // [ms] between two looks at the status, and between attempts to reach a lost server
 
 let content = null;
 let take = null;
 let status = null;
-let beside = null; // state of the reach maps and existing arms that the page shows
-let busy = false, behind = false, lost = false;
-
-// Fetches the part of the run that the page lacks.
-async function fetchRun() {
-  return (await request(`run?designs=${content.n}&calls=${content.calls.length}`)).arrayBuffer();
-}
+let version = 0; // of the content that the page shows
+let busy = false, lost = false;
 
 // Fetches the file of a design that the page does not hold; null offline.
 export function fileFetcher() {
@@ -29,50 +24,28 @@ export function openLive(shownContent, taken) {
   $("loading").textContent = "The first designs are being evaluated …";
   $("pause").addEventListener("click", () => send({ action: status?.paused ? "resume" : "pause" }));
   $("stop").addEventListener("click", () => send({ action: "stop" }));
-  $("hint").addEventListener("submit", async (event) => {
-    event.preventDefault();
-    const text = $("hint-text").value.trim();
-    if (text && (await send({ action: "hint", text }))) $("hint-text").value = "";
-  });
-  // A browser allows six connections to a server over all its tabs, so hidden tabs disconnect.
-  listenTo();
-  document.addEventListener("visibilitychange", listenTo);
+  follow();
   setInterval(show, 1000); // updates the elapsed seconds
 }
 
-let listening = new AbortController();
-
-// Follows the status while the tab is visible; not by an EventSource, which cannot send the key.
-async function listenTo() {
-  listening.abort();
-  if (document.hidden) return;
-  listening = new AbortController();
-  const { signal } = listening;
-  while (!signal.aborted) {
+// Follows the status while the tab is visible.
+async function follow() {
+  for (;;) {
     try {
-      // Out of this function, so that no fault of the page is taken for a lost connection.
-      await readLines(await request("events", { signal }), (line) => queueMicrotask(() => takeStatus(JSON.parse(line))));
+      if (!document.hidden) {
+        const news = await (await request("status")).json();
+        queueMicrotask(() => takeStatus(news)); // so that no fault of the page is taken for a lost connection
+      }
     } catch (fault) {
-      if (signal.aborted) return;
       if (fault.status === 403) {
         $("loading").textContent = `This page cannot be shown: ${fault.message}`;
         complain("refusal", fault.message);
         return;
       }
+      lost = true;
+      show();
     }
-    lost = true;
-    show();
-    await new Promise((next) => setTimeout(next, AGAIN));
-  }
-}
-
-async function readLines(reply, listener) {
-  const reader = reply.body.pipeThrough(new TextDecoderStream()).getReader();
-  let rest = "";
-  for (let part = await reader.read(); !part.done; part = await reader.read()) {
-    const lines = (rest + part.value).split("\n");
-    rest = lines.pop();
-    lines.forEach(listener);
+    await new Promise((next) => setTimeout(next, lost ? AGAIN : LOOK));
   }
 }
 
@@ -80,37 +53,24 @@ function takeStatus(news) {
   lost = false;
   const before = status;
   status = news;
-  if (before !== null && before.run !== status.run) { // another run in this folder
+  if (before?.designs && before.run !== status.run) { // another run in this folder
     location.reload();
     return;
   }
   document.title = `${status.name}: armwright, live`;
   show();
-  const isNews = status.designs !== content.n || status.calls !== content.calls.length
-    || status.finished !== content.head?.result.finished || status.beside !== beside;
-  if (isNews && (status.designs || content.n)) catchUp();
+  if (status.version !== version && (status.designs || content.n)) catchUp(status.version);
 }
 
-async function catchUp() {
-  if (busy) {
-    behind = true;
-    return;
-  }
+// Fetches the run; a later look at the status tries again if that fails.
+async function catchUp(latest) {
+  if (busy) return;
   busy = true;
-  let news = null;
-  const fetched = status.beside;
-  try {
-    news = await fetchRun();
-    beside = fetched;
-  } catch (fault) {
-    if (fault.status !== 403) setTimeout(catchUp, AGAIN);
-  }
+  const news = await request("run").then((reply) => reply.arrayBuffer()).catch(() => null);
   busy = false;
-  if (news !== null) take(news);
-  if (behind) {
-    behind = false;
-    catchUp();
-  }
+  if (news === null) return;
+  version = latest;
+  take(news);
 }
 
 async function send(action) {
@@ -133,7 +93,7 @@ const since = () => duration(Math.max(0, Date.now() / 1000 - status.since));
 
 function doing() {
   switch (status.doing) {
-    case "asking": return `asking the ${status.takes_hints ? "model" : "proposer"}, ${since()}`;
+    case "asking": return `asking the ${status.asks_a_model ? "model" : "proposer"}, ${since()}`;
     case "evaluating":
       return status.designs < status.planned ? `evaluating ${status.designs + 1} of ${status.planned}` : "writing the results";
     case "paused": return `paused for ${since()}, at ${status.designs} of ${status.planned}`;
@@ -157,9 +117,5 @@ function show() {
   $("pause").disabled = $("stop").disabled = lost;
   $("pause").setAttribute("aria-pressed", status.paused);
   $("pause").textContent = status.paused ? "Resume" : "Pause";
-  $("hint").hidden = !status.takes_hints || isOver;
   complain("fault", status.fault ? `last fault: ${status.fault}` : "");
-  const used = status.hints.filter((hint) => hint.used !== null), waiting = status.hints.filter((hint) => hint.used === null);
-  $("hints").replaceChildren(...[...used.slice(-1), ...waiting].map((hint) => element("li", {},
-    hint.used === null ? "waiting for the next prompt: " : `used at iteration ${hint.used}: `, element("em", {}, hint.text))));
 }

@@ -10,7 +10,7 @@ import { drawConfiguration, drawHeader, openHeader } from "./header.js";
 import { fileFetcher, openLive } from "./live.js";
 import { drawLoads, openLoads } from "./loads.js";
 import { growPareto, openPareto } from "./pareto.js";
-import { drawPick, forget, openPick, ranked } from "./pick.js";
+import { drawPick, openPick, ranked } from "./pick.js";
 import { drawReach, openReach } from "./reach.js";
 import { arrange, drawRecommended, openRecommended } from "./recommended.js";
 import { fromAddress, keepAddress, set, state } from "./state.js";
@@ -66,20 +66,15 @@ function grow() {
 }
 
 function take(buffer) {
-  const known = content.n, before = content.head?.result.finished;
-  content.add(buffer);
+  const before = content.head?.result.finished;
+  content.load(buffer);
   if (content.n === 0) return;
   if (!isOpen) {
     open();
     return;
   }
-  const isAnother = content.n < known || content.head.designs_from === 0; // the trials were replaced
-  if (isAnother) {
-    forget();
-    set({ design: Math.min(state.design ?? 0, content.n - 1), compared: null });
-  }
   grow();
-  if (isAnother || content.head.result.finished !== before) {
+  if (content.head.result.finished !== before) {
     drawRecommended();
     drawLoads();
     drawDesign();

@@ -36,7 +36,7 @@ export function drawPick() {
 }
 
 // Shows the whole front again; the form keeps its values.
-export function forget() {
+function forget() {
   $("pick-message").textContent = "";
   $("pick-all").hidden = true;
   show(null);
