@@ -79,7 +79,7 @@ def looked_at(there: Path) -> None:
 
     any_of(
         (
-            lambda: pick_from(there, robust=True),
+            lambda: pick_from(there, holds=True),
             lambda: export_design(there, None, "urdf"),
             lambda: RunContent(there).packed(),
             lambda: finished_content(there),

@@ -89,7 +89,15 @@ def test_torque_terms_agree_with_pinocchio(dof: int, kind: str) -> None:
                 push = np.array([peer.mass_matrix(a) @ b for a, b in zip(q, q_s, strict=True)])
                 drag = rnea(peer, q, q_s, q_ss) - gravity
                 size = load(arm) + np.abs(q_s).max() ** 2 + np.abs(q_ss).max()
-                for mine, theirs in ((part.gravity, gravity), (part.drag, drag), (part.push, push)):
+                bare = loaded_peer(arm, found.task.payload, carries=False)
+                resting = rnea(bare, q, still, still)
+                added = (
+                    gravity - resting,
+                    drag - rnea(bare, q, q_s, q_ss) + resting,
+                    push - np.array([bare.mass_matrix(a) @ b for a, b in zip(q, q_s, strict=True)]),
+                )
+                pairs = ((part.gravity, gravity), (part.drag, drag), (part.push, push))
+                for mine, theirs in (*pairs, *zip(part.payload, added, strict=True)):
                     assert own_joints(arm, mine[at, some]) == pytest.approx(theirs, rel=1e-7, abs=1e-8 * size)
 
 

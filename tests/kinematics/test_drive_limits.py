@@ -9,15 +9,16 @@ import toppra
 from toppra import algorithm, constraint
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.actuation import Actuation, actuation_at_joints
+from armwright.kinematics.arms.actuation import Actuation, actuation_at_joints, ratings_of
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.cycle.drive_limits import (
     MotionLoad,
+    available_torque,
     least_time,
     motion_load,
     torque_speed_utilisation,
 )
-from armwright.robot.actuators import catalogue
+from armwright.robot.actuators import ActuatorRecord, catalogue
 from armwright.spaces.design_space import DesignSpace
 from tests.support.dynamics import inverse_dynamics
 
@@ -70,7 +71,7 @@ def random_motions(seed: int, samples: int = S, joints: int = D) -> tuple[Motion
 @pytest.mark.parametrize(("samples", "joints"), [(5, D), (3, 2), (2, 1)])
 def test_least_time_is_the_least_of_all_times(samples: int, joints: int) -> None:
     load, motors = random_motions(samples, samples, joints)
-    time = least_time(load, motors)
+    time = least_time((load, motors))
     holds = (motors.safety_factor[:, None, None] * np.abs(load.gravity) <= motors.peak[:, None]).all(axis=(1, 2))
     assert 0.1 < np.isfinite(time).mean() < 0.95
     assert np.isinf(time[~holds]).all()
@@ -93,9 +94,48 @@ def test_lifting_takes_the_friction_of_the_gear_and_lowering_gets_none_of_it() -
     assert torques.tolist() == [2.5, 2.0, 2.0]
     use = torque_speed_utilisation(load.torque(np.full(3, 10.0)), velocity / 10.0, motors).ravel()
     assert use.tolist() == [2.5 / 2.4 + 0.1 / 9.0, 2.0 / 2.4, 2.0 / 2.4]
-    assert np.isfinite(least_time(load, motors)).tolist() == [False, True, True]
+    assert np.isfinite(least_time((load, motors))).tolist() == [False, True, True]
     at_output = replace(motors, limit_friction=np.zeros((3, 1)))
-    assert np.isfinite(least_time(motion_load(gravity, still, velocity, still, at_output), at_output)).all()
+    assert np.isfinite(least_time((motion_load(gravity, still, velocity, still, at_output), at_output))).all()
+
+
+def test_least_time_of_several_cases_is_the_least_that_all_of_them_allow() -> None:
+    load, motors = random_motions(8)
+    weak = motors.at_makers_limits.at_voltage(0.9)
+    heavier = replace(load, gravity=1.1 * load.gravity, inertial=0.8 * load.inertial)
+    cases = ((load, motors), (load, weak), (heavier, motors.at_makers_limits))
+    time = least_time(*cases)
+    finite = np.isfinite(time)
+    assert 0.1 < finite.mean() < 0.95
+    assert (time >= np.max([least_time(case) for case in cases], axis=0) * (1.0 - 1e-9)).all()
+    for case in cases:
+        assert can_follow(*case, np.where(finite, time, 1.0), slack=1e-9)[finite].all()
+    holds = np.all([np.isfinite(least_time(case)) for case in cases], axis=0)
+    possible = np.array([np.all([can_follow(*case, np.full(N, t)) for case in cases], axis=0) & holds for t in TIMES])
+    assert not (possible & (TIMES[:, None] < time * (1.0 - 1e-9))).any()
+
+
+def test_available_torque_is_the_largest_within_the_limits() -> None:
+    rng = np.random.default_rng(6)
+    motors = drives(N, D, rng).at_makers_limits
+    torque, velocity = rng.normal(size=(2, N, S, D))
+    velocity = velocity * motors.no_load_speed[:, None] / np.abs(velocity).max()
+    most = np.sign(torque) * available_torque(torque, velocity, motors)
+    assert are_within(0.999 * most, velocity, motors).all()
+    assert not are_within(1.001 * most, velocity, motors).any()
+
+
+@pytest.mark.parametrize("record", [r for r in catalogue().values() if r.speed is not None], ids=lambda r: r.name)
+def test_torque_at_less_voltage_is_that_at_a_higher_speed(record: ActuatorRecord) -> None:
+    """Less voltage acts like a higher back-EMF, whatever the kind of motor."""
+    ratings = np.array([[ratings_of(record.actuator())]])
+    full = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
+    less, no_load = full.at_voltage(0.9), float(full.no_load_speed[0, 0])
+    speed = np.linspace(0.0, 0.9 * no_load, 50)[None, :, None]
+    push = np.ones_like(speed)
+    higher = available_torque(push, speed + 0.1 * no_load, full)
+    assert available_torque(push, speed + 1e-12, less) == pytest.approx(higher, rel=1e-9)
+    assert (less.continuous, less.rotor_inertia) == (full.continuous, full.rotor_inertia)
 
 
 def test_fixed_joints_do_not_limit_a_motion() -> None:
@@ -105,9 +145,9 @@ def test_fixed_joints_do_not_limit_a_motion() -> None:
     still = MotionLoad(*(np.where(np.arange(D) == 1, 0.0, each) for each in vars(load).values()))
     without = replace(motors, **{name: getattr(motors, name)[:, [0, 2]] for name in names})
     two = MotionLoad(*(each[:, :, [0, 2]] for each in vars(load).values()))
-    assert np.array_equal(least_time(still, fixed), least_time(two, without))
+    assert np.array_equal(least_time((still, fixed)), least_time((two, without)))
     rest = MotionLoad(*(np.zeros_like(each) for each in vars(load).values()))
-    assert not least_time(rest, fixed).any()
+    assert not least_time((rest, fixed)).any()
 
 
 @pytest.mark.parametrize(
@@ -117,7 +157,7 @@ def test_unknown_ratings_give_no_number(name: str) -> None:
     rng = np.random.default_rng(0)
     motors = drives(3, D, rng)
     unknown = replace(motors, **{name: np.where(np.arange(D) == 1, np.nan, getattr(motors, name))})
-    assert np.isnan(least_time(loads(unknown, rng), unknown)).all()
+    assert np.isnan(least_time((loads(unknown, rng), unknown))).all()
     if "speed" in name:
         moving = np.ones((3, S, D))
         assert np.isnan(torque_speed_utilisation(moving, moving, unknown)[..., 1]).all()
@@ -192,7 +232,7 @@ def test_time_optimal_motion_is_a_lower_bound() -> None:
         gravity = inverse_dynamics(arms, q, np.zeros_like(q), np.zeros_like(q), none)
         inertial = inverse_dynamics(arms, q, velocity[None], acceleration[None], none, gravity=False)
         load = motion_load(gravity, inertial, velocity[None], acceleration[None], motors)
-        (time,) = least_time(load, motors)
+        (time,) = least_time((load, motors))
         bound = fastest_by_toppra(arms, motors, start, end)
         ratios.append(time / bound)
     assert min(ratios) >= 1.0

@@ -238,14 +238,14 @@ def test_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: Histo
         assert verdict in row.inner_text()
 
 
-def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", robust: bool = False) -> list[int]:
+def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", holds: bool = False) -> list[int]:
     """The designs of the table, in its order, after a query was typed in."""
     page = tab.page
     page.locator("#pick-where").fill(where)
     page.locator("#pick-by").select_option(label=by)
     if by == "weights":
         page.locator("#pick-weights").fill(weights)
-    page.locator("#pick-robust").set_checked(robust)
+    page.locator("#pick-holds").set_checked(holds)
     page.get_by_role("button", name="Pick", exact=True).click()
     return [int(text) for text in page.locator("#table tbody tr td:first-child").all_inner_texts()]
 
@@ -263,7 +263,7 @@ def test_page_pick_matches_the_pick_command(run: Path, tab: Tab) -> None:
     assert asked(tab, by="least torque") == picked(run, by="torque")
     where = ("position_error<=2", " length < .6")
     assert asked(tab, ",".join(where), by="least mass") == picked(run, *where, by="mass")
-    assert asked(tab, robust=True) == picked(run, robust=True)
+    assert asked(tab, holds=True) == picked(run, holds=True)
     assert asked(tab, "origin_z >= 1e-2") == picked(run, "origin_z>=0.01")
     last = asked(tab, "torque < 4.5", by="weights", weights="position_error=2, torque=1")
     assert last == picked(run, "torque<4.5", weights={"position_error": 2.0, "torque": 1.0})

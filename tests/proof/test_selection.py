@@ -55,10 +55,11 @@ def test_weights_are_relative_to_the_reference_point(history: History) -> None:
         assert pick(history, weights=named)[0].number == best.number
 
 
-def test_pick_can_be_restricted_to_robust_designs(run: Path) -> None:
+def test_pick_can_be_restricted_to_designs_that_hold(run: Path) -> None:
+    """Without constraints, these are the robust ones."""
     robust = json.loads((run / "summary.json").read_text(encoding="utf-8"))["verification"]["robust_numbers"]
     assert robust
-    _, picked, _ = pick_from(run, robust=True)
+    _, picked, _ = pick_from(run, holds=True)
     assert sorted(member.number for member in picked) == sorted(robust)
 
 

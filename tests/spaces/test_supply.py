@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import SpaceError
-from armwright.robot.actuators import ActuatorRecord, catalogue, named_actuator, value_of
+from armwright.robot.actuators import ActuatorRecord, catalogue, named_actuator
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.supply import supply_voltages
@@ -109,18 +109,6 @@ def test_stacked_ratings_are_those_of_single_arms() -> None:
         assert actuation.voltage[row, : len(joints)].tolist() == volts
         peaks = [joint.effort if joint.actuator else np.inf for joint in joints]
         assert actuation.peak[row, : len(joints)] == pytest.approx(peaks)
-
-
-def test_actuators_of_a_design_are_pinned_at_its_supply() -> None:
-    own = space(["XL430-W250", "XM430-W350"], joints=2)
-    design = own.design(own.sample(1, 0)[0].params | {"motor_1": "XL430-W250", "motor_2": "XM430-W350"})
-    for record in own.supplied_actuators(design):
-        assert record.supply_range == (12.0, 12.0)
-        less = own.model_copy(update={"actuators": (record.at_voltage(0.9),)})
-        motor = less.arm(less.sample(1, 0)[0]).joints[0].actuator
-        assert motor is not None
-        assert motor.voltage == pytest.approx(10.8)
-        assert motor.speed == pytest.approx(0.9 * (value_of(record, "speed") or 0.0))
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ def pick(
     where: list[str] | None = None,
     by: str | None = None,
     weights: str | None = None,
-    robust: bool = False,
+    holds: bool = False,
     n: int = 1,
     all_: bool = False,
     json_: bool = False,
@@ -28,7 +28,7 @@ def pick(
         where: A condition such as "position_error<=0.05" (may be repeated).
         by: The quantity to minimise: torque, mass, link_1, …
         weights: Weights of objectives relative to the reference point: position_error=2,torque=1.
-        robust: Only designs that stay good with the base or a link 1 mm off.
+        holds: Only designs that hold with a heavier payload, less voltage, and the base or a link 1 mm off.
         n: Number of designs, the best first.
         all_: All designs that meet the conditions, in a table.
     """
@@ -42,7 +42,7 @@ def pick(
     conditions = [read_condition(text) for text in where or ()]
     weighed = None if weights is None else read_weights(weights)
     with activity(f"reading {run}"):
-        history, picked, records = pick_from(run, conditions, by, weighed, robust)
+        history, picked, records = pick_from(run, conditions, by, weighed, holds)
     chosen = picked if all_ else picked[:n]
     names = [*(condition.name for condition in conditions), *([] if by is None else [by])]
     rows = picked_rows(history, chosen, names, records)

@@ -124,7 +124,10 @@ def show_picked(
         if assumed := assumed_values(history.problem, [member.arm]):
             console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
         if member.number in survival:
-            console.print(f"  perturbed: {survival[member.number]['verdict']}")
+            found = survival[member.number]
+            console.print(f"  {found['verdict']}")
+            if found["assumed"] is not None:
+                console.print(f"  assumed values halved or doubled, at worst {found['assumed']['text']}")
     export = f"armwright export {shlex.quote(str(run))} --design {picked[0].number}"
     print_command(console, f"{export} --format urdf | mjcf | ros2_control")
 

@@ -15,6 +15,7 @@ from armwright.problem.assumptions import count_assumed
 from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import TORQUE_SCALE, position_error, torque
 from armwright.proof.infeasibility import describe_infeasibility
+from armwright.proof.perturbations import HEAVIER, MOVED, SUPPLY
 from armwright.proof.results import REPORT
 from armwright.runs.history import FrontMember, History, source_label
 from armwright.spaces.custom_parameters import describe_custom
@@ -62,21 +63,22 @@ def show_result(console: Console, run: StudyResult | FrontRun, figures: Sequence
 
 
 def show_front(console: Console, history: History, summary: Record) -> None:
-    """Print the front as a table and how much of it is robust; nothing if the front is empty."""
+    """Print the front as a table and how much of it is robust or holds; nothing if the front is empty."""
     if not history.front:
         return
     verified, custom = summary["verification"], history.problem.space.custom
-    robust = () if verified is None else verified["robust_numbers"]
+    found: Record = {} if verified is None else verified["verdict"]
 
     def objective(name: str, index: int) -> Column:
         return Column(name, lambda member: format_value(member.values[index]), is_number=True)
 
     names = [SHORT_NAMES.get(one, one.name.replace("_", " ")) for one in history.problem.objectives]
-    verdict = Column("verdict", lambda member: "robust" if member.number in robust else "sensitive", rank=1)
+    word = {number: str(found["good"]) for number in found.get("numbers", ())}
+    verdict = Column("verdict", lambda member: word.get(member.number, str(found["bad"])), rank=1)
     parameters = Column("parameters", lambda member: describe_custom(custom, member.design.params), rank=2)
     columns = (
         number("#", "number", str), Column("source", lambda member: source_label(member.source), rank=5),
-        *([] if verified is None else [verdict]), *(objective(name, i) for i, name in enumerate(names)),
+        *([verdict] if found else []), *(objective(name, i) for i, name in enumerate(names)),
         Column("joints", lambda member: member.design.joints), *([parameters] if custom else []),
         Column("base [m]", lambda member: " ".join(f"{value:5.2f}" for value in member.design.origin), rank=4),
         Column("links [m]", links_of, rank=3),
@@ -89,7 +91,12 @@ def show_front(console: Console, history: History, summary: Record) -> None:
     if left_out := len(history.front) - len(shown):
         beyond = len(history.front) - len(inside)
         console.print(f"and {left_out} more" + (f", {beyond} of them beyond the reference point" if beyond else ""))
-    if verified is not None:
+    if found and history.problem.constraints:
+        console.print(
+            f"{len(found['numbers'])} of {len(history.front)} designs hold: no limit is exceeded, no target missed "
+            f"and nothing touched with {HEAVIER} or 10 mm off-centre, {SUPPLY}, or {MOVED}"
+        )
+    elif verified is not None:
         console.print(
             f"recomputed in float64 and with the base or a link 1 mm off: {verified['robust']} robust, "
             f"{verified['sensitive']} sensitive; hypervolume of the robust designs "
@@ -145,6 +152,7 @@ def show_recommended(console: Console, recommended: Sequence[Record]) -> None:
     roles: dict[str, list[str]] = {}
     for one in recommended:
         demoted = "".join(f"; #{other['design']} was demoted: {other['reason']}" for other in one["demoted"])
+        demoted = (f"; {one['costs']}" if one["costs"] else "") + demoted
         survival = "perturbations not evaluated" if one["survival"] is None else one["survival"]["verdict"]
         roles.setdefault(f"#{one['design']}, {one['status']}; {survival}{demoted}", []).append(one["role"])
     for described, names in roles.items():

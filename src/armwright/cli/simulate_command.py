@@ -36,6 +36,7 @@ def simulate(
 
     from pydantic_core import to_jsonable_python
 
+    from armwright.proof.design_record import read_records
     from armwright.proof.recommendation import recommend
     from armwright.proof.results import SUMMARY, read_summary
     from armwright.proof.simulated_run import Simulator
@@ -57,7 +58,11 @@ def simulate(
             for member in history.front:
                 simulator(member.number)
         else:
-            choice = to_jsonable_python(recommend(history, simulator))
+            own = (read_summary(run) or {}).get("recommended", ())
+            numbers = dict.fromkeys([*(member.number for member in history.front), *(one["design"] for one in own)])
+            survival = {number: one.survival for number, one in read_records(run, history, list(numbers)).items()}
+            known = {number: one for number, one in survival.items() if one is not None}
+            choice = to_jsonable_python(recommend(history, known, simulator))
     members = [simulator.members[number] for number in sorted(simulator.members)]
     record = simulation_record(members)
     with Folder(run) as folder:

@@ -10,6 +10,8 @@ from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import quantity
 
+LIMITS = ("peak", "continuous", "corner_speed", "no_load_speed")  # of actuators, that reserves are measured from
+
 
 @quantity("of allowed", over="max", needs=("motions",), ratings=("peak",), symbol="E_util")
 def torque_utilisation(e: Evaluation) -> Array:
@@ -91,6 +93,22 @@ def bearing_utilisation(e: Evaluation) -> Array:
     if not (np.isfinite(limits).any(axis=-1) & (e.arms.motion < FIXED)).any():
         return np.zeros(e.position_error.shape)
     return np.nan_to_num(e.bearing_loads / limits[:, None]).max(axis=(-2, -1))
+
+
+@quantity("times", over="arm", needs=("motions", "durations"), ratings=LIMITS, symbol="reserve")
+def reserve(e: Evaluation) -> Array:
+    """How many times the torque, mean torque or speed that the cycle takes of any actuator its maker allows, without
+    safety factor; below 1 it cannot. Without a cycle, the torque that holds the arm at the targets.
+    """
+    return e.reserves.least
+
+
+@quantity("of allowed", over="arm", needs=("motions", "durations"), ratings=LIMITS)
+def limit_use(e: Evaluation) -> Array:
+    """The largest share of any actuator's limit of torque, mean torque or speed that the cycle takes, without safety
+    factor: 1 / reserve.
+    """
+    return 1.0 / e.reserves.least
 
 
 @quantity("A", over="arm", needs=("cycle", "durations"), ratings=("peak", "voltage", "current"), symbol="I_peak")

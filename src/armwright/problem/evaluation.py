@@ -1,9 +1,9 @@
 """Per-target kinematics and statics of arms, not aggregated."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import cast
+from typing import Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from armwright.kinematics.arms.forward import Frames, forward_kinematics, jacobi
 from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_bearing_loads, cycle_loads, holding_torques
 from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths, rough_paths
+from armwright.kinematics.cycle.reserves import Reserves, holding_reserves, reserves_of
 from armwright.kinematics.cycle.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
@@ -48,6 +49,7 @@ class Evaluation(Scene):
     angle_error: Array  # (N, T) of the tool from the target's axis or orientation [rad]; 0 where it has none
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
     cycle_paths: CyclePaths | None = None
+    durations: Array | None = None  # (N, M) that the motions keep [s]; None for those of the task and the drives
     device: Device = "cpu"
 
     def __len__(self) -> int:
@@ -84,7 +86,35 @@ class Evaluation(Scene):
     @cached_property
     def loads(self) -> CycleLoads:
         """Durations, torques and speeds along the cycle; SettingsError if a duration is not known."""
-        return cycle_loads(self.paths, self.torque_terms)
+        return cycle_loads(self.paths, self.torque_terms, self.durations)
+
+    @cached_property
+    def reserves(self) -> Reserves:
+        """Reserves of the actuators along the cycle, else at the targets; SettingsError if a duration is not known."""
+        if self.cycle_paths is None:
+            return holding_reserves(self.joint_torques, self.drives)
+        return reserves_of(self.loads, self.drives)
+
+    def keeping(self, durations: Array | None) -> Self:
+        """Return the evaluation with these durations of the motions (N, M) [s]; itself without any."""
+        if durations is None:
+            return self
+        kept = replace(self, durations=durations)
+        vars(kept).update(torque_terms=self.torque_terms, _clearances=self._clearances)
+        return kept
+
+    def reloaded(self, scene: Scene, drives: Actuation | None = None) -> "Evaluation":
+        """Return the arms on the same paths in the same time, with other payloads and drives, None for their own.
+
+        Without a cycle, the arms take their postures anew.
+        """
+        arms = replace(carrying(self.arms, scene.load_shape), actuation=drives or self.arms.actuation)
+        if self.cycle_paths is None:
+            return evaluate_arrays(arms, scene, self.device, self.q)
+        paths = replace(self.cycle_paths, groups=tuple(replace(g, arms=arms[g.index]) for g in self.cycle_paths.groups))
+        changed = replace(self, payload=scene.payload, load_shape=scene.load_shape, arms=arms, cycle_paths=paths)
+        vars(changed).update(_clearances=self._clearances)
+        return changed
 
     @cached_property
     def supply(self) -> SupplyCurrents:

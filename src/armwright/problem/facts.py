@@ -27,7 +27,7 @@ REACH, PAYLOAD_AT_FULL_REACH, VOLTAGE = "reach", "payload_at_full_reach", "volta
 # What an engineer asks of an arm, in this order. Views show what is known of it.
 ASKED = (
     REACH, PAYLOAD_AT_FULL_REACH, "price", "mass", "payload_capacity", "cycle_time", "worst_error", "deflection",
-    "backlash_error", "torque_utilisation", "dynamic_utilisation", "thermal_utilisation", "tilting_moment",
+    "backlash_error", "torque_utilisation", "dynamic_utilisation", "thermal_utilisation", "reserve", "tilting_moment",
     "peak_current", "mean_current",
 )  # fmt: skip
 FARTHEST = "The largest horizontal distance of the tip from the first joint."

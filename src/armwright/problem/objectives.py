@@ -20,10 +20,12 @@ from armwright.problem.drive_quantities import (
     bearing_utilisation,
     dynamic_torque,
     dynamic_utilisation,
+    limit_use,
     mean_current,
     peak_current,
     price,
     radial_force,
+    reserve,
     speed_utilisation,
     thermal_utilisation,
     tilting_moment,
@@ -248,27 +250,33 @@ OBJECTIVES: Mapping[str, Objective] = {
     for objective in (
         *PAPER_OBJECTIVES, worst_error, unreached_targets, peak_torque, rms_torque, torque_utilisation, mass, length,
         price, joints, orientation_error, worst_angle, collision, clearance_shortfall, path_error, path_angle, jumps,
-        cycle_time, dynamic_torque, dynamic_utilisation, speed_utilisation, thermal_utilisation, peak_current,
-        mean_current, uncovered_fraction, undexterous_fraction, anisotropy, deflection, payload_deflection,
-        backlash_error, friction_error, bearing_utilisation, tilting_moment, axial_force, radial_force,
+        cycle_time, dynamic_torque, dynamic_utilisation, speed_utilisation, thermal_utilisation, limit_use,
+        peak_current, mean_current, uncovered_fraction, undexterous_fraction, anisotropy, deflection,
+        payload_deflection, backlash_error, friction_error, bearing_utilisation, tilting_moment, axial_force,
+        radial_force,
     )
 }  # fmt: skip
 CLEARANCES = (clearance, self_clearance, obstacle_clearance)
 # More of these is better, so constraints can bound them, but they are no objectives.
-BENEFITS = (*CLEARANCES, manipulability, payload_capacity, dexterous_volume)
+BENEFITS = (*CLEARANCES, manipulability, payload_capacity, dexterous_volume, reserve)
 QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*BENEFITS, voltages)}}
+# Who asks for more of these minimises what is less then.
+MINIMISED: Mapping[str, Objective] = {
+    clearance.name: clearance_shortfall, dexterous_volume.name: undexterous_fraction, reserve.name: limit_use,
+}  # fmt: skip
 
 
 def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> tuple[Objective, ...]:
     """Return the objectives of these names, built in or in `others`; SettingsError if unknown, repeated or too many."""
-    known = {objective.name: objective for objective in others} | dict(OBJECTIVES)
+    known = {**MINIMISED, **{objective.name: objective for objective in others}, **OBJECTIVES}
     for name in names:
         if name not in known:
             raise SettingsError(
                 f'unknown objective "{name}".{did_you_mean(name, known)} Objectives: {", ".join(known)}'
             )
-    if not 1 <= len(names) <= MAX_OBJECTIVES or len(set(names)) < len(names):
+    chosen = tuple(known[name] for name in names)
+    if not 1 <= len(names) <= MAX_OBJECTIVES or len(set(chosen)) < len(names):
         raise SettingsError(
             f"objectives: expected 1 to {MAX_OBJECTIVES} different ones, got {', '.join(names) or 'none'}"
         )
-    return tuple(known[name] for name in names)
+    return chosen

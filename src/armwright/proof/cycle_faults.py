@@ -29,7 +29,8 @@ _SHOWN: Mapping[str, tuple[str, str, float]] = {
     "path_error": ("path error", " mm", 1e3),
     "path_angle": ("angle error", "°", math.degrees(1.0)),
     "clearance": ("clearance", " mm", 1e3),
-    "limit_distance": ("distance to joint limits", "", 1.0),  # [rad], or [m] of a sliding joint
+    "limit_distance": ("distance to joint limits", "°", math.degrees(1.0)),  # of revolute joints
+    "slide_distance": ("distance to the ends of slides", " mm", 1e3),
     "manipulability": ("manipulability", " m³", 1.0),
 }
 
@@ -48,7 +49,7 @@ class Extreme:
     @property
     def place(self) -> str:
         """The step, the motion and the share on one line."""
-        return f"step {self.step}{', ' if self.motion else ''}{self.motion}, at {100.0 * self.share:.0f} %"
+        return f"{_place(self.step, self.motion)}, at {100.0 * self.share:.0f} %"
 
 
 def path_extremes(paths: CyclePaths, row: int) -> dict[str, Extreme]:
@@ -66,12 +67,17 @@ def path_extremes(paths: CyclePaths, row: int) -> dict[str, Extreme]:
     clearance = np.minimum(paths.self_clearance[row], paths.obstacle_clearance[row])
     if np.isfinite(clearance).any():
         found["clearance"] = _extreme(paths.plan, clearance, paths.worst[row, :, 2], smallest=True)
-    measures = {"limit_distance": _limit_distances, "manipulability": _manipulabilities}
-    for name, measure in measures.items():
-        values = [measure(arm, path.q) for path in of_motions]
+    distances = [arm.limit_distances(path.q)[0] for path in of_motions]
+    measured = {
+        "limit_distance": [np.where(arm.prismatic, np.inf, each).min(axis=1) for each in distances],
+        "slide_distance": [np.where(arm.prismatic, each, np.inf).min(axis=1) for each in distances],
+        "manipulability": [_manipulabilities(arm, path.q) for path in of_motions],
+    }
+    for name, values in measured.items():
         least = np.array([one.min() for one in values])
         shares = np.array([one.argmin() / (len(one) - 1) for one in values])
-        found[name] = _extreme(paths.plan, least, shares, smallest=True)
+        if np.isfinite(least).any():
+            found[name] = _extreme(paths.plan, least, shares, smallest=True)
     return found
 
 
@@ -155,6 +161,15 @@ def _avoid(paths: CyclePaths, row: int, obstacles: Sequence[Obstacle]) -> str:
     return f"try a via point, a target at {[round(float(c), 3) for c in point]} m, through which this arm moves freely"
 
 
+def motion_place(plan: CyclePlan, index: int) -> str:
+    """Return the step of a motion, and which of its motions it is: `step 3, line in`."""
+    return _place(plan.motions[index].step + 1, _part(plan, index))
+
+
+def _place(step: int, part: str) -> str:
+    return f"step {step}{', ' if part else ''}{part}"
+
+
 def _extreme(plan: CyclePlan, values: Array, shares: Array, smallest: bool = False) -> Extreme:
     """Return the largest or smallest of (M,) values of motions, with its share of the motion."""
     worst = int(values.argmin() if smallest else values.argmax())
@@ -169,11 +184,6 @@ def _part(plan: CyclePlan, index: int) -> str:
     if plan.motions[index].by == "joint":
         return "joint motion"
     return "line out" if index == own[0] else "line in"
-
-
-def _limit_distances(arm: ArmArrays, q: Array) -> Array:
-    """Return the (R,) smallest distance of a joint from its limits [rad] or [m]; q: (1, R, D)."""
-    return arm.limit_distance(q)[0]
 
 
 def _manipulabilities(arm: ArmArrays, q: Array) -> Array:

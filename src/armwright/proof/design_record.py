@@ -14,6 +14,7 @@ from typing import Any, Self, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, model_validator
+from pydantic_core import to_jsonable_python
 
 from armwright.arrays import Array
 from armwright.exceptions import UnknownQuantityError
@@ -27,6 +28,7 @@ from armwright.problem.over_reach import reach_lines
 from armwright.problem.unreached_reason import unreached_reason
 from armwright.proof.cycle_export import MODEL, cycle_files, trajectory_of
 from armwright.proof.cycle_faults import Extreme, path_record
+from armwright.proof.perturbations import Survival
 from armwright.robot.arm import Arm, Joint
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
@@ -98,14 +100,25 @@ class DesignRecord(BaseModel, extra="allow"):
     path: dict[str, Extreme | list[int]] | None = None  # where it is worst along the cycle (cycle_faults.py)
     motion: Motion | None = None
     loads: Loads | None = None  # of recommended designs
+    survival: Survival | None = None  # whether it holds, if it was verified; None without constraints
 
 
 def write_designs(
-    folder: RunFolder, history: History, verdicts: Mapping[int, Mapping[str, Any]], recommended: Collection[int]
+    folder: RunFolder,
+    history: History,
+    verdicts: Mapping[int, Mapping[str, Any]],
+    recommended: Collection[int],
+    survival: Mapping[int, Any],
 ) -> dict[int, DesignRecord]:
-    """Write the folders of the front's designs, with verdicts by number; remove the others; return the records."""
+    """Write the folders of designs of the front and of recommended ones; remove the others.
+
+    verdicts, survival: What was found about designs, by number.
+
+    Returns:
+        Their records by number.
+    """
     written: dict[int, DesignRecord] = {}
-    numbers = [member.number for member in history.front]
+    numbers = list(dict.fromkeys([*(member.number for member in history.front), *recommended]))
     names = {design_name(number) for number in numbers}
     for stale in (folder.path / DESIGNS).glob("[0-9]*"):
         if stale.name not in names:
@@ -118,6 +131,8 @@ def write_designs(
             folder.write_text(f"{place}/{file}", text)
         if number in verdicts:
             record["verification"] = verdicts[number]
+        if number in survival:
+            record["survival"] = to_jsonable_python(survival[number])
         folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
         written[number] = DesignRecord.model_validate(record)
     return written

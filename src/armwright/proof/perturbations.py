@@ -1,165 +1,142 @@
-"""Survival of recommended designs: which constraints they break if an arm, its supply, motors or payload are off.
+"""What designs have left if an arm, its supply or its payload are off: reserves of the motors, and clearances.
 
 A design is evaluated again, changed in one way at a time:
 
 - the base or one link is 1 mm off,
 - the motors get 90 % of their voltage,
-- an assumed quantity of all motors is halved or doubled, or all of them are,
 - the payload is 10 % heavier, or its centre is 10 mm off along an axis of the tip frame.
 
-Along a cycle, a changed design keeps its postures as far as it can, as a robot that was taught them would. What is
-feasible with all assumed values halved or doubled is also simulated.
+It holds if each change leaves a reserve of at least 1 and a geometry that serves the task. Along a cycle, a changed
+design keeps its durations and its path; with another base or link its postures, as far as it can, as a robot that was
+taught them would. Apart from these, an assumed quantity of all motors is halved or doubled, or all of them are.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, product
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
+from armwright.arrays import Array, finite_or_none
+from armwright.exceptions import UnknownQuantityError
+from armwright.kinematics.arms.actuation import Actuation
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.cycle.cycle_loads import MORE_PAYLOAD, VOLTAGE_SHARE
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.constraints import Constraint
 from armwright.problem.evaluation import Evaluation
+from armwright.problem.facts import fact_of
+from armwright.problem.objectives import CLEARANCES, FAR, clearance, collision, reserve
 from armwright.problem.problem import Problem
 from armwright.problem.scene import Scene
-from armwright.proof.simulated_run import simulate_arm
-from armwright.robot.actuators import ActuatorRecord
+from armwright.proof.cycle_faults import motion_place
 from armwright.robot.arm import Arm
 from armwright.runs.history import History
-from armwright.runs.trial import Count
+from armwright.spaces.parameters import Design
 from armwright.spaces.tolerance import TOLERANCE, length_columns, perturbed
 
-MOVED, SUPPLY, ASSUMED = "base or a link 1 mm off", "90 % of the voltage", "assumed values halved or doubled"
+NOMINAL, MOVED, SUPPLY = "as designed", "base or a link 1 mm off", "90 % of the voltage"
 HEAVIER, SHIFTED = "payload +10 %", "payload 10 mm off-centre"
-PERTURBATIONS = (MOVED, SUPPLY, ASSUMED, HEAVIER, SHIFTED)
-VOLTAGE_SHARE = 0.9
+ASSUMED = "assumed values halved or doubled"
 FACTORS = {"halved": 0.5, "doubled": 2.0}  # of assumed values
 ALL = "all"
-LOAD_FACTOR = 1.1
 OFF_CENTRE = 0.01  # [m]
-ROUNDING = 1e-3  # of a bound; a smaller violation breaks nothing
+ROUNDING = 1e-3  # of a limit; what exceeds it by less breaks nothing
+CONTACT = 1e-5  # [m] of overlap that is rounding
+# Bounded quantities that say whether a geometry serves the task; of clearances, contact counts
+ERRORS = ("unreached_targets", "position_error", "worst_error", "orientation_error", "worst_angle")
+GEOMETRY = (*ERRORS, "path_error", "path_angle", "jumps")
 
 
 @dataclass(frozen=True)
-class Change:
-    """A change of a design."""
-
-    perturbation: str  # the perturbation that it belongs to
-    text: str  # the change, such as `link_2 +1 mm`
-
-
-@dataclass(frozen=True)
-class Broken:
-    """A constraint that a changed design violates, or a failure in the simulator."""
-
-    change: str
-    constraint: str  # the constraint; the simulator's reason if it is none
-    measured: float | None = None  # what the constraint bounds, in its unit; None from the simulator
-    violation: float | None = None  # the violation of the constraint, relative to its bound; None from the simulator
-
-
-@dataclass(frozen=True)
-class Perturbation:
-    """A perturbation of a design."""
+class Left:
+    """What a perturbation of a design leaves, in the change that leaves least."""
 
     name: str
-    changes: Count  # the number of changes that were evaluated
-    broken: tuple[Broken, ...]  # the constraints that they violate, of each change the most violated one first
+    holds: bool  # whether no limit is exceeded, and the geometry serves the task
+    text: str  # the change and what decides: `link_2 +1 mm: reserve 0.96 (torque of joint 2, step 3)`
+    reserve: float | None  # the smallest reserve; None if it is not known
+    clearance: float | None  # smallest distance from anything [m]; None without anything near
 
 
 @dataclass(frozen=True)
 class Survival:
-    """Survival of a design."""
+    """Whether a design holds, and what perturbations leave of it."""
 
+    holds: bool
     verdict: str
-    perturbations: tuple[Perturbation, ...]
-    simulated: tuple[str, ...]  # changes that were simulated as well
+    perturbations: tuple[Left, ...]  # those that decide, the design as it is first
+    assumed: Left | None = None  # of assumed values; None if there are none, or they were not changed
+
+    @classmethod
+    def of(cls, found: Mapping[str, Left]) -> Self:
+        """Return the survival of a design by what each perturbation leaves."""
+        failing = [f"{one.name} ({one.text})" for one in found.values() if not one.holds]
+        least = min(found.values(), key=lambda one: np.inf if one.reserve is None else one.reserve)
+        verdict = f"does not hold: {', '.join(failing)}" if failing else f"holds; least with {least.name}: {least.text}"
+        return cls(not failing, verdict, tuple(found.values()))
 
 
 @dataclass(frozen=True)
-class _Batch:
-    """R changed designs in a changed scene."""
+class Changed:
+    """R designs with a change each."""
 
-    changes: Sequence[Change]
-    owners: NDArray[np.intp]  # (R,) index of the design that is changed
-    arms: ArmArrays
-    scenes: Sequence[Scene]  # the scene of each case
+    perturbation: str
+    texts: Sequence[str]  # the change of each, or one of all
+    evaluations: Sequence[Evaluation]  # of each case
+    owners: NDArray[np.intp] | None = None
+    """(R,) index of the design that is changed, -1 if the row does not count; None if these are all N designs."""
 
 
-def evaluate_survival(history: History, designs: Mapping[int, bool]) -> dict[int, Survival]:
-    """Return the survival of designs by trial number; empty without constraints.
+def survival_of(problem: Problem, designs: Sequence[Design]) -> list[Survival]:
+    """Return the survival of designs of a task with constraints."""
+    matrix = problem.space.matrix(designs)
+    nominal = [problem.physics(matrix, case) for case in range(len(problem.scenes))]
+    return survivals(problem, nominal, load_changes(problem, matrix, nominal))
 
-    designs: Trial numbers of feasible designs, and whether to simulate the changes of all their assumed values.
+
+def survivals(problem: Problem, nominal: Sequence[Evaluation], changes: Iterable[Changed]) -> list[Survival]:
+    """Return the survival of N designs; none without constraints, when all changes have been evaluated.
+
+    nominal: Their evaluation in each case.
     """
-    problem, numbers = history.problem, list(designs)
-    if not problem.constraints or not numbers:
-        return {}
-    matrix = problem.space.matrix([history.trials[number].design for number in numbers])
-    near = [problem.physics(matrix, case).entry_postures for case in range(len(problem.scenes))]
-    found: list[dict[Change, list[Broken]]] = [{} for _ in numbers]
-    simulated: list[list[str]] = [[] for _ in numbers]
-    for batch in (_moved(problem, matrix), *_loaded(problem, matrix)):
-        _evaluate(problem, batch, near, found)
-    rows, arms = _with_changed_motors(history, numbers)
-    if rows:
-        changes, owners = [change for _, change in rows], np.array([owner for owner, _ in rows])
-        batch = _Batch(changes, owners, stack_arms(arms), problem.scenes)
-        evaluation = _evaluate(problem, batch, near, found)
-        for row, (owner, change) in enumerate(rows):
-            if designs[numbers[owner]] and change.text.startswith(ALL) and not found[owner][change]:
-                simulated[owner].append(change.text)
-                result = simulate_arm(problem, arms[row], evaluation, row, numbers[owner]).result
-                found[owner][change] = [Broken(change.text, reason) for reason in result.reasons[:1]]
-    return {
-        number: _survival(problem.constraints, found[owner], simulated[owner]) for owner, number in enumerate(numbers)
-    }
+    everything = chain([Changed(NOMINAL, [NOMINAL], nominal)], changes)
+    if not problem.constraints:
+        deque(everything, maxlen=0)
+        return []
+    return [Survival.of(found) for found in _judged(problem, nominal, everything)]
 
 
-def _evaluate(
-    problem: Problem, batch: _Batch, near: Sequence[Array | None], found: Sequence[dict[Change, list[Broken]]]
-) -> Evaluation:
-    """Add what changed designs break to `found` by design and change; return their evaluation in the first case.
+def load_changes(problem: Problem, matrix: Array, nominal: Sequence[Evaluation]) -> Iterator[Changed]:
+    """Yield N designs with each change of the geometry, and with each of a load if the task has constraints.
 
-    near: (N, B, D) postures of the N designs in each case.
+    matrix: (N, P) designs.  nominal: their evaluation in each case.
     """
-    near = [None if postures is None else postures[batch.owners, :, : batch.arms.dof] for postures in near]
-    evaluations = list(problem.cases(batch.arms, near, batch.scenes))
-    violations = np.max([problem.violations(evaluation) for evaluation in evaluations], axis=0)
-    for change, owner, row in zip(batch.changes, batch.owners, violations, strict=True):
-        pairs = sorted(zip(row.tolist(), problem.constraints, strict=True), key=lambda pair: -pair[0])
-        found[owner][change] = [
-            Broken(change.text, constraint.description, constraint.measured(violation), violation)
-            for violation, constraint in pairs
-            if violation > ROUNDING
-        ]
-    return evaluations[0]
-
-
-def _moved(problem: Problem, matrix: Array) -> _Batch:
-    """Return the designs with one length or coordinate of the base off by ±1 mm."""
-    space = problem.space
+    space, near = problem.space, [evaluation.entry_postures for evaluation in nominal]
     names = [space.parameters[column].name for column in length_columns(space) for _ in "-+"]
-    active = np.array([space.active(name, matrix) for name in names])  # (K, N)
-    arms = problem.arms(np.stack(list(perturbed(space, matrix)))[active])
-    which, owners = np.nonzero(active)
-    changes = [Change(MOVED, f"{names[k]} {'-+'[k % 2]}{1e3 * TOLERANCE:g} mm") for k in which.tolist()]
-    return _Batch(changes, owners, arms, problem.scenes)
-
-
-def _loaded(problem: Problem, matrix: Array) -> Iterator[_Batch]:
-    """Yield the designs with a heavier payload, and with one whose centre is off; nothing without a payload."""
-    if not problem.task.payloads.any():
+    for index, (name, rows) in enumerate(zip(names, perturbed(space, matrix), strict=True)):
+        owners = np.where(space.active(name, matrix), np.arange(len(matrix)), -1)
+        arms = problem.arms(rows, nominal[0].arms.precision)
+        text = f"{name} {'-+'[index % 2]}{1e3 * TOLERANCE:g} mm"
+        yield Changed(MOVED, [text], list(problem.cases(arms, near)), owners)
+    if not problem.constraints:
         return
-    arms, owners = problem.arms(matrix), np.arange(len(matrix))
-    heavier = [replace(scene, payload=LOAD_FACTOR * scene.payload) for scene in problem.scenes]
-    yield _Batch([Change(HEAVIER, HEAVIER)] * len(matrix), owners, arms, heavier)
-    for axis in range(3):
-        for sign in (-1.0, 1.0):
-            change = Change(SHIFTED, f"{'xyz'[axis]} {sign * 1e3 * OFF_CENTRE:+g} mm")
-            shift = np.eye(3)[axis] * sign * OFF_CENTRE
-            yield _Batch([change] * len(matrix), owners, arms, [_shifted(scene, shift) for scene in problem.scenes])
+
+    def loaded(name: str, text: str, scenes: Iterable[Scene], drives: Actuation | None = None) -> Changed:
+        return Changed(name, [text], [e.reloaded(one, drives) for e, one in zip(nominal, scenes, strict=True)])
+
+    if (drives := nominal[0].arms.actuation) is not None:
+        yield loaded(SUPPLY, SUPPLY, problem.scenes, drives.at_voltage(VOLTAGE_SHARE))
+    if problem.task.payloads.any():
+        heavier = (replace(scene, payload=(1.0 + MORE_PAYLOAD) * scene.payload) for scene in problem.scenes)
+        yield loaded(HEAVIER, HEAVIER, heavier)
+        for axis, sign in product(range(3), (-1.0, 1.0)):
+            shift = sign * OFF_CENTRE * np.eye(3)[axis]
+            text = f"{'xyz'[axis]} {1e3 * sign * OFF_CENTRE:+g} mm"
+            yield loaded(SHIFTED, text, [_shifted(scene, shift) for scene in problem.scenes])
 
 
 def _shifted(scene: Scene, shift: Array) -> Scene:
@@ -168,65 +145,110 @@ def _shifted(scene: Scene, shift: Array) -> Scene:
     return replace(scene, load_shape=replace(scene.load_shape, center=(x, y, z)))
 
 
-def _with_changed_motors(history: History, numbers: Sequence[int]) -> tuple[list[tuple[int, Change]], list[Arm]]:
-    """Return the index of a design and its change for each design with changed motors, and these arms."""
-    rows: list[tuple[int, Change]] = []
-    arms: list[Arm] = []
-    space = history.problem.space
-    for owner, number in enumerate(numbers):
-        actuators = space.supplied_actuators(history.trials[number].design)
-        changed = {Change(SUPPLY, SUPPLY): tuple(record.at_voltage(VOLTAGE_SHARE) for record in actuators)}
-        for text, names in _assumed(history, number).items():
-            for verb, factor in FACTORS.items():
-                changed[Change(ASSUMED, f"{text} {verb}")] = tuple(
-                    supplied.scaled(names & set(record.assumed), factor)
-                    for supplied, record in zip(actuators, space.actuators, strict=True)
+def _judged(problem: Problem, nominal: Sequence[Evaluation], changes: Iterable[Changed]) -> list[dict[str, Left]]:
+    """Return what each perturbation leaves of N designs, at their nominal durations."""
+    geometry = [constraint for constraint in problem.constraints if constraint.quantity.name in GEOMETRY]
+    if any(constraint.quantity in (collision, *CLEARANCES) for constraint in problem.constraints):
+        geometry.append(Constraint(clearance, ">=", 0.0))
+    allowed = np.array([CONTACT if one.quantity == clearance else ROUNDING for one in geometry])
+    durations = [kept_durations(evaluation) for evaluation in nominal]
+    everyone = np.arange(len(nominal[0]))
+    found: list[dict[str, Left]] = [{} for _ in range(len(everyone))]
+    for changed in changes:
+        owners = everyone if changed.owners is None else changed.owners
+        for each, kept in zip(changed.evaluations, durations, strict=True):
+            evaluation = each.keeping(None if kept is None else kept[owners])
+            violations = np.array([constraint(evaluation) for constraint in geometry]).reshape(-1, len(owners))
+            fails = violations > allowed[:, None]
+            reserves = reserve.known(evaluation)[0]
+            holds = ~(fails.any(axis=0) | (reserves < 1.0 - ROUNDING))
+            distances = clearance.known(evaluation)[0]
+            for row in np.flatnonzero(owners >= 0).tolist():
+                own, least = found[int(owners[row])], finite_or_none(reserves[row])
+                worst = own.get(changed.perturbation)
+                if worst is not None and _rank(worst.holds, worst.reserve) <= _rank(bool(holds[row]), least):
+                    continue
+                faults = [
+                    _describe(constraint, constraint.measured(float(violation)))
+                    for constraint, violation, wrong in zip(geometry, violations[:, row], fails[:, row], strict=True)
+                    if wrong
+                ]
+                if least is not None and (least < 1.0 - ROUNDING or not faults):
+                    faults.append(f"reserve {least:.2f} ({_describe_limit(evaluation, row)})")
+                change = changed.texts[row % len(changed.texts)]
+                text = ", ".join(faults) or "geometry holds"
+                own[changed.perturbation] = Left(
+                    changed.perturbation,
+                    bool(holds[row]),
+                    text if change == changed.perturbation else f"{change}: {text}",
+                    least,
+                    float(distances[row]) if distances[row] < FAR else None,
                 )
-        for change, records in changed.items() if actuators else ():
-            rows.append((owner, change))
-            arms.append(_arm(history, number, records))
-    return rows, arms
+    return found
 
 
-def _assumed(history: History, number: int) -> dict[str, set[str]]:
-    """Return the assumed values of a design to change together, by name: each by itself, and all of them."""
-    assumed = assumed_values(history.problem, [history.member(number).arm])
-    names = list(dict.fromkeys(name for values in assumed.values() for name, value in values.items() if value))
-    return {name: {name} for name in names} | ({ALL: set(names)} if names else {})
+def _rank(holds: bool, least: float | None) -> tuple[bool, float]:
+    """Return what makes one change worse than another: the smaller is."""
+    return holds, np.inf if least is None else least
 
 
-def _arm(history: History, number: int, actuators: tuple[ActuatorRecord, ...]) -> Arm:
-    """Return the arm of a design with other actuators of the same names."""
-    changed = history.problem.space.model_copy(update={"actuators": actuators, "supply": None})
-    return changed.arm(history.trials[number].design, history.problem.task.tool)
+def kept_durations(evaluation: Evaluation) -> Array | None:
+    """Return the (N, M) durations of motions [s]; None without a cycle of known durations."""
+    try:
+        return evaluation.loads.durations
+    except UnknownQuantityError:
+        return None
 
 
-def _survival(
-    constraints: Sequence[Constraint], found: Mapping[Change, Sequence[Broken]], simulated: Sequence[str]
-) -> Survival:
-    """Return the survival of a design from what each of its changes breaks."""
-    of_perturbation: dict[str, list[Sequence[Broken]]] = {name: [] for name in PERTURBATIONS}
-    for change, broken in found.items():
-        of_perturbation[change.perturbation].append(broken)
-    perturbations = tuple(
-        Perturbation(name, len(of_changes), tuple(one for broken in of_changes for one in broken))
-        for name, of_changes in of_perturbation.items()
-        if of_changes
-    )
-    texts = [_describe(constraints, one) for one in perturbations if one.broken]
-    some = "holds all but" if len(texts) < len(perturbations) else "holds none"
-    verdict = f"{some}: {', '.join(texts)}" if texts else "holds all perturbations"
-    return Survival(verdict, perturbations, tuple(simulated))
+def _describe_limit(evaluation: Evaluation, row: int) -> str:
+    """Describe what limits an arm most, by its reserves: `torque of joint 2, step 3, line in`."""
+    cause, motion, joint = evaluation.reserves.weakest(row)
+    if motion is None:
+        return f"{cause} of joint {joint + 1}"
+    place = f"target {motion + 1}" if evaluation.plan is None else motion_place(evaluation.plan, motion)
+    return f"{cause} of joint {joint + 1}, {place}"
 
 
-def _describe(constraints: Sequence[Constraint], perturbation: Perturbation) -> str:
-    """Describe the worst that a perturbation breaks: `payload +10 % (torque_utilisation 1.04 > 1)`."""
-    worst = max(perturbation.broken, key=lambda one: one.violation or 0.0)
-    text = worst.constraint
-    for constraint in constraints:
-        if constraint.description == worst.constraint and worst.measured is not None:
-            sign = ">" if constraint.relation == "<=" else "<"
-            text = f"{constraint.quantity.name} {worst.measured:.4g} {sign} {constraint.bound:g}"
-    change = "" if worst.change == perturbation.name else f"{worst.change}: "
-    others = len({one.change for one in perturbation.broken}) - 1
-    return f"{perturbation.name} ({change}{text}{f' and {others} more' if others else ''})"
+def _describe(constraint: Constraint, value: float) -> str:
+    """Describe a bound that a geometry exceeds: `clearance -0.4 mm`."""
+    label = constraint.quantity.label.lower()
+    return label if constraint.quantity.unit == "targets" else f"{label} {fact_of(constraint.quantity, value).text}"
+
+
+def evaluate_survival(history: History, numbers: Sequence[int], known: Mapping[int, Survival]) -> dict[int, Survival]:
+    """Return the survival of feasible designs by trial number, assumed values included; empty without constraints.
+
+    known: The survival of designs without assumed values, as far as it is known.
+    """
+    problem, designs = history.problem, [history.trials[number].design for number in numbers]
+    if not problem.constraints or not designs:
+        return {}
+    found = dict(known if known.keys() >= set(numbers) else zip(numbers, survival_of(problem, designs), strict=True))
+    owners, texts, arms = _with_assumed_values(history, numbers)
+    if not arms:
+        return {number: found[number] for number in numbers}
+    nominal = [problem.physics(designs, case) for case in range(len(problem.scenes))]
+    stacked = stack_arms(arms)
+    near = [None if q is None else q[owners, :, : stacked.dof] for q in (e.entry_postures for e in nominal)]
+    changed = Changed(ASSUMED, texts, list(problem.cases(stacked, near)), np.array(owners))
+    assumed = _judged(problem, nominal, [changed])
+    return {n: replace(found[n], assumed=own.get(ASSUMED)) for n, own in zip(numbers, assumed, strict=True)}
+
+
+def _with_assumed_values(history: History, numbers: Sequence[int]) -> tuple[list[int], list[str], list[Arm]]:
+    """Return arms with changed motors, the index of the design of each, and its change."""
+    owners: list[int] = []
+    texts: list[str] = []
+    arms: list[Arm] = []
+    problem = history.problem
+    for owner, number in enumerate(numbers):
+        assumed = assumed_values(problem, [history.member(number).arm])
+        names = list(dict.fromkeys(name for values in assumed.values() for name, value in values.items() if value))
+        together = {name: {name} for name in names} | ({ALL: set(names)} if names else {})
+        for (text, changed), (verb, factor) in product(together.items(), FACTORS.items()):
+            records = tuple(one.scaled(changed & set(one.assumed), factor) for one in problem.space.actuators)
+            space = problem.space.model_copy(update={"actuators": records})
+            owners.append(owner)
+            texts.append(f"{text.replace('_', ' ')} {verb}")
+            arms.append(space.arm(history.trials[number].design, problem.task.tool))
+    return owners, texts, arms

@@ -25,11 +25,12 @@ from armwright.proof.attribution import attribution_by_source
 from armwright.proof.design_record import DESIGNS, design_name, objective_record, violation_record, write_designs
 from armwright.proof.front_gap import front_gap
 from armwright.proof.infeasibility import ViolationTally, feasibility_record
+from armwright.proof.perturbations import Survival
 from armwright.proof.proposer_bias import proposer_bias
 from armwright.proof.recommendation import recommend, unlimited
 from armwright.proof.shown_run import SHOWN, show_run
 from armwright.proof.summary_file import ProposerSummary, parse_summary
-from armwright.proof.verification import Verification, verify_front
+from armwright.proof.verification import Verification, front_survival, verify_front
 from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import History
@@ -58,8 +59,10 @@ def write_results(
     folder.write_text("trials.csv", to_csv(rows))
     on_front = sorted(member.number for member in history.front)
     folder.write_text("front.csv", to_csv(rows[number] | _flat_verdict(verdicts.get(number)) for number in on_front))
-    recommended = {one["design"] for one in summary.get("recommended", ())}
-    records = write_designs(folder, history, verdicts, recommended)
+    recommended = {one["design"]: one["survival"] for one in summary.get("recommended", ())}
+    survival: dict[int, Any] = {} if verification is None else front_survival(history, verification)
+    survival |= {number: one for number, one in recommended.items() if one is not None}
+    records = write_designs(folder, history, verdicts, recommended, survival)
     folder.write_bytes(SHOWN, show_run(config, history, summary, records).to_bytes())
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
@@ -135,7 +138,9 @@ def summarize(
         "history": curve.tolist(),
     }
     return {
-        **_common_record(history, config, history.masked_objectives, volume, verification),
+        **_common_record(
+            history, config, history.masked_objectives, volume, verification, front_survival(history, verification)
+        ),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         **({} if config.evaluator is None else {"failures": {kind: failed[kind] for kind in FAILURE_KINDS}}),
         **({"screened_out": dict(screened)} if config.study.screen else {}),
@@ -154,18 +159,20 @@ def summarize_front(
     found: Array,
     search: Mapping[str, Any],
     verification: Verification | None,
+    survival: Mapping[int, Survival],
     tally: ViolationTally | None = None,
     left: Callable[[], float] = unlimited,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a direct search.
 
     The trials of `history` are designs of the front, `found` are the (N, M) objectives of the whole front. `search`
-    holds evaluations, seconds, why it ended, and the hypervolume over the evaluations. `tally` is of all evaluated
-    designs. `left` returns the time that is left for simulations and survival of recommended designs [s].
+    holds evaluations, seconds, why it ended, and the hypervolume over the evaluations. `survival` is of the front, and
+    of a safe design beside it, by number. `tally` is of all evaluated designs. `left` returns the time that is left for
+    simulations of recommended designs [s].
     """
     volume = {"final": hypervolume(found, history.reference_point or ())}
     return {
-        **_common_record(history, config, found, volume, verification, tally, left),
+        **_common_record(history, config, found, volume, verification, survival, tally, left),
         "search": dict(search),
         "versions": dict(config.versions),
     }
@@ -177,6 +184,7 @@ def _common_record(
     found: Array,
     volume: Mapping[str, Any],
     verification: Verification | None,
+    survival: Mapping[int, Survival],
     tally: ViolationTally | None = None,
     left: Callable[[], float] = unlimited,
 ) -> dict[str, Any]:
@@ -195,7 +203,11 @@ def _common_record(
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         **({"assumed": assumed} if assumed else {}),
-        **({"recommended": to_jsonable_python(recommend(history, left=left))} if history.problem.constraints else {}),
+        **(
+            {"recommended": to_jsonable_python(recommend(history, survival, left=left))}
+            if history.problem.constraints
+            else {}
+        ),
     }
 
 
@@ -204,11 +216,15 @@ def _verification_record(history: History, verification: Verification | None) ->
     if verification is None:
         return None
     robust = [member.number for member, holds in zip(history.front, verification.robust, strict=True) if holds]
+    holding = [number for number, one in front_survival(history, verification).items() if one.holds]
     reference = history.reference_point or ()
     return {
         "robust": len(robust),
         "sensitive": len(history.front) - len(robust),
         "robust_numbers": robust,
+        "verdict": {"numbers": holding, "good": "holds", "bad": "does not hold"}
+        if history.problem.constraints
+        else {"numbers": robust, "good": "robust", "bad": "sensitive"},
         "hypervolume_of_robust": hypervolume(history.values[robust], reference),
         "hypervolume_worst_case": hypervolume(verification.worst_case, reference),
     }
@@ -221,6 +237,7 @@ def _verdicts(history: History, verification: Verification | None) -> dict[int, 
     return {
         member.number: {
             "robust": bool(verification.robust[i]),
+            **({"holds": verification.survival[i].holds} if verification.survival else {}),
             **{case: objective_record(history, getattr(verification, case)[i].tolist()) for case in CASES},
         }
         for i, member in enumerate(history.front)
@@ -233,6 +250,7 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
         return {}
     return {
         "verdict": "robust" if verdict["robust"] else "sensitive",
+        **({"holds": verdict["holds"]} if "holds" in verdict else {}),
         **{f"{name}_{case}": value for case in CASES for name, value in verdict[case].items()},
     }
 

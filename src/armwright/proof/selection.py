@@ -58,7 +58,7 @@ def pick(
         where: Conditions. Quantities that the run did not evaluate are evaluated now, in the task's first case.
         by: The quantity to sort by, smallest first.
         weights: Weights of the objectives, which are divided by the reference point and summed.
-        numbers: The trials to select from, such as the robust ones; None for all.
+        numbers: The trials to select from, such as those that hold; None for all.
         facts: What is known of the designs by number; None to compute it if needed.
 
     Raises:
@@ -105,19 +105,19 @@ def pick_from(
     where: Sequence[Condition] = (),
     by: str | None = None,
     weights: Mapping[str, float] | None = None,
-    robust: bool = False,
+    holds: bool = False,
 ) -> tuple[History, list[FrontMember], dict[int, DesignRecord]]:
     """Select designs of a run folder; return history, designs, and the records of the front by number.
 
-    robust: only verified robust designs.
+    holds: only designs that hold under perturbations; without constraints, robust ones.
     """
     _, history = read_run(run)
     numbers = None
-    if robust and history.front:
+    if holds and history.front:
         verification = (read_summary(run) or {}).get("verification")
         if verification is None:
             raise FailureError(f'{run} is not verified; armwright.verify_run("{run}") in Python verifies it')
-        numbers = verification["robust_numbers"]
+        numbers = verification["verdict"]["numbers"]
     records = read_records(run, history, [member.number for member in history.front])
     return history, pick(history, where, by, weights, numbers, facts_by_number(records)), records
 
@@ -125,13 +125,15 @@ def pick_from(
 def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:
     """Return records of the survival of designs of a run by number, as in its summary; empty without constraints.
 
-    Those of recommended designs are read; the others are evaluated.
+    Those of recommended designs are read; of the others, assumed values are changed now.
     """
     recommended = (read_summary(run) or {}).get("recommended", ())
     stored = {one["design"]: one["survival"] for one in recommended if one["survival"] is not None}
-    missing = dict.fromkeys((number for number in numbers if number not in stored), False)
+    missing = [number for number in numbers if number not in stored]
+    records = read_records(run, history, missing)
+    known = {number: one.survival for number, one in records.items() if one.survival is not None}
     evaluated: dict[int, dict[str, Any]] = {
-        number: to_jsonable_python(one) for number, one in evaluate_survival(history, missing).items()
+        number: to_jsonable_python(one) for number, one in evaluate_survival(history, missing, known).items()
     }
     return {number: one for number, one in {**stored, **evaluated}.items() if number in numbers}
 

@@ -18,6 +18,7 @@ from armwright.problem.assumptions import assumed_values
 from armwright.problem.facts import ASKED, Facts, describe_supply
 from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import QUANTITIES, TORQUE_SCALE, torque
+from armwright.proof.cycle_faults import describe_path
 from armwright.proof.design_record import DesignRecord, bounded_numbers
 from armwright.proof.front_gap import known_front
 from armwright.proof.infeasibility import describe_infeasibility
@@ -244,7 +245,7 @@ def _result(history: History, summary: Summary) -> dict[str, Any]:
         "evaluations": search.get("evaluations", len(history)),
         "infeasible": search.get("infeasible", int((~history.feasible & ~history.failed).sum())),
         "failed": int(history.failed.sum()),
-        "robust": (parts.get("verification") or {}).get("robust_numbers"),
+        "verdict": (parts.get("verification") or {}).get("verdict"),
         "search": search.get("hypervolume_history"),
     }
 
@@ -256,9 +257,10 @@ def _recommended(recommended: Sequence[Mapping[str, Any]], records: Mapping[int,
         number = one["design"]
         if number not in found:
             record = records[number]
-            found[number] = {key: one[key] for key in ("design", "status", "survival")} | {
+            found[number] = {key: one[key] for key in ("design", "status", "survival", "costs")} | {
                 "roles": [],
                 "facts": shown_facts(record.facts),
+                "path": describe_path(record.path),
                 "loads": None if record.loads is None else record.loads.model_dump(),
             }
         found[number]["roles"].append(one["role"])

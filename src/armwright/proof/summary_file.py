@@ -29,10 +29,17 @@ class _Curve(_Volume):
     history: list[float]
 
 
+class _Verdict(_Record):
+    numbers: list[int]  # of the designs that hold; without constraints, of robust ones
+    good: str
+    bad: str
+
+
 class _Verification(_Record):
     robust: Count
     sensitive: Count
     robust_numbers: list[int]
+    verdict: _Verdict
     hypervolume_of_robust: float
     hypervolume_worst_case: float
 

@@ -3,7 +3,7 @@
 Each design is evaluated again in float64: as it is, and with its base or one link off by 1 mm (docs/method.md §10).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.pareto import masked_objectives
 from armwright.problem.problem import Outcomes, Problem, worst_case
+from armwright.proof.perturbations import MOVED, Changed, Survival, load_changes, survival_of, survivals
 from armwright.runs.history import History
 from armwright.spaces.parameters import Design
-from armwright.spaces.tolerance import perturbed
 
 ALLOWED_SHARE = 0.05  # by which the worst case may exceed a value or the bound of a constraint
 ALLOWED_OF_REFERENCE = 0.005  # of the reference point's value; always allowed
@@ -29,6 +29,7 @@ class Verification:
     robust: NDArray[np.bool_]  # (N,) True if neither `exact` nor `moved` exceeds the allowed values and violations
     # (N, M) the worst of the search's values, `exact` and `moved`; infinite if a constraint is violated
     worst_case: Array
+    survival: tuple[Survival, ...] = ()  # of each, if the task has constraints
 
 
 def verify_front(history: History) -> Verification | None:
@@ -38,6 +39,19 @@ def verify_front(history: History) -> Verification | None:
     designs = [member.design for member in history.front]
     values = np.array([member.values for member in history.front])
     return verify(history.problem, designs, values, history.reference_point)
+
+
+def front_survival(history: History, verification: Verification | None) -> dict[int, Survival]:
+    """Return the survival of the designs of the front by number; empty without constraints.
+
+    With a custom evaluator, our perturbations do not say what it would measure.
+    """
+    problem, front = history.problem, history.front
+    if not front or not problem.constraints or problem.evaluator is not None:
+        return {}
+    designs = [member.design for member in front]
+    found = survival_of(problem, designs) if verification is None else verification.survival
+    return dict(zip((member.number for member in front), found, strict=True))
 
 
 def verify(
@@ -51,14 +65,20 @@ def verify(
     matrix = problem.space.matrix(designs)
     evaluations = list(problem.cases(problem.arms(matrix, "float64")))
     exact = worst_case(map(problem.outcomes, evaluations))
-    near = [evaluation.entry_postures for evaluation in evaluations]
-    copies = (problem.arms(rows, "float64") for rows in perturbed(problem.space, matrix))
-    moved = worst_case(problem.outcomes(each) for copy in copies for each in problem.cases(copy, near))
+    copies: list[Outcomes] = []
+
+    def changes() -> Iterator[Changed]:
+        for changed in load_changes(problem, matrix, evaluations):
+            copies.extend(map(problem.outcomes, changed.evaluations) if changed.perturbation == MOVED else ())
+            yield changed
+
+    survival = survivals(problem, evaluations, changes())
+    moved = worst_case(copies)
     allowed = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
     built = worst_case([exact, moved])
     robust = _within(built, allowed)
     as_built = masked_objectives(np.maximum(values, built.values), built.violations)
-    return Verification(exact.values, moved.values, robust, as_built)
+    return Verification(exact.values, moved.values, robust, as_built, tuple(survival))
 
 
 def _within(outcomes: Outcomes, allowed: Array) -> NDArray[np.bool_]:

@@ -4,7 +4,6 @@ A matrix of designs has one row per design and one column per parameter. A choic
 parameters have their default value: the middle of a range, the first of the choices.
 """
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -16,7 +15,6 @@ from pydantic import model_validator
 
 from armwright.arrays import Array
 from armwright.exceptions import DesignError, SpaceError, did_you_mean
-from armwright.robot.actuators import ActuatorRecord
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import build_arm
 from armwright.spaces.custom_parameters import NUMBERED
@@ -216,12 +214,6 @@ class DesignSpace(SpaceSchema, frozen=True):
         if not self.min_joints <= len(design.joints) == len(design.links) <= self.max_joints:
             self.design(design.params)  # raises the reason
         return build_arm(self, self.matrix([design]), tool)
-
-    def supplied_actuators(self, design: Design) -> tuple[ActuatorRecord, ...]:
-        """Return the actuators, those of a design at its supply."""
-        used = [joint.actuator for joint in self.arm(design).joints if joint.actuator is not None]
-        volts = {actuator.name: actuator.voltage or math.nan for actuator in used}
-        return tuple(record.at_supply(volts.get(record.name, math.nan)) for record in self.actuators)
 
     @property
     def is_toy(self) -> bool:

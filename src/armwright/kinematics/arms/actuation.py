@@ -1,7 +1,8 @@
 """Ratings of the actuators of stacked arms."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -61,6 +62,34 @@ class Actuation(PerArm):
     radial_limit: Array  # (N, D) largest force across it [N]
     price: Array  # (N,) of all actuators of an arm [USD]; NaN if one has no price
     safety_factor: Array  # (N,) by which required torques are multiplied
+
+    @property
+    def falling_range(self) -> Array:
+        """(N, D) range of speeds over which the available torque falls [rad/s]; 0 for fixed joints."""
+        fixed = np.isinf(self.no_load_speed)
+        return np.where(fixed, 0.0, self.no_load_speed - np.where(fixed, 0.0, self.corner_speed))
+
+    @property
+    def at_makers_limits(self) -> Self:
+        """The actuators with a safety factor of 1."""
+        return replace(self, safety_factor=np.ones_like(self.safety_factor))
+
+    def at_voltage(self, share: float) -> Self:
+        """Return the actuators at a share s of their voltage.
+
+        The falling line of torque over speed shifts in parallel, because the back-EMF takes what the winding lacks
+        (Siciliano et al. 2009, section 5.2): with the no-load speed ω₀, corner speed ω_c and peak torque P,
+
+            ω₀' = s ω₀ ,   ω_c' = max(0, ω_c - (1 - s) ω₀) ,   P' = P min(1, s ω₀ / (ω₀ - ω_c))
+
+        Up to a corner speed, the controller limits the current: the peak torque stays as long as the line allows it.
+        Copper loss at a torque does not change, nor does the continuous torque. Voltage and current stay as stated.
+        """
+        falling, less = self.falling_range, share * self.no_load_speed
+        falls = falling > 0.0
+        torque = np.where(falls, np.minimum(1.0, np.where(falls, less, 1.0) / np.where(falls, falling, 1.0)), 1.0)
+        corner = np.maximum(0.0, less - falling)
+        return replace(self, peak=torque * self.peak, no_load_speed=less, corner_speed=corner)
 
 
 def actuation_at_joints(ratings: Array, travel: Array, price: Array, safety_factor: Array) -> Actuation:

@@ -99,11 +99,15 @@ class ArmArrays(PerArm):
 
     def limit_distance(self, q: Array) -> Array:
         """Return the (N, ...) smallest distance of a joint from its limits [rad] or [m]; q: (N, ..., D)."""
+        return self.limit_distances(q).min(axis=-1)
+
+    def limit_distances(self, q: Array) -> Array:
+        """Return the (N, ..., D) distances of joints from their limits [rad] or [m]; q: (N, ..., D)."""
         lower, upper, motion = (
             values.reshape(len(self), *(1,) * (q.ndim - 2), self.dof)
             for values in (self.lower, self.upper, self.motion)
         )
-        return np.where(motion == FIXED, np.inf, np.minimum(q - lower, upper - q)).min(axis=-1)
+        return np.where(motion == FIXED, np.inf, np.minimum(q - lower, upper - q))
 
     def random_postures(self, n: int) -> Array:
         """Return (n, N, D) postures within the limits, the same in every call [rad] or [m].
@@ -226,7 +230,7 @@ def stack_columns(diameter: Array | float, length: Array, precision: Precision) 
 
 def carrying(arms: ArmArrays, shape: LoadShape) -> ArmArrays:
     """Return arms whose payloads have this shape in their tip frames."""
-    if shape == POINT_LOAD:
+    if shape == POINT_LOAD and not arms.payload_center.any():
         return arms
     x, z = arms.tool.side, arms.tool.axis
     frame = np.stack([x, np.cross(z, x), z], axis=-1)  # (N, 3, 3) of the tip

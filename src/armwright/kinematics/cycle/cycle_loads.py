@@ -23,6 +23,8 @@ from armwright.tasks.motions import CyclePlan
 
 ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite of rounding
 MIN_TIME, MAX_TIME = 0.15, 1e3  # [s] of a motion that is as fast as possible; drives cannot follow shorter ones
+MORE_PAYLOAD = 0.1  # share of the payload by which it may be heavier in a motion as fast as possible
+VOLTAGE_SHARE = 0.9  # of the voltage, that suffices for it
 BETWEEN = 16  # times as many instants of a sharp path, of which the largest values count
 
 
@@ -64,14 +66,15 @@ def holding_torques(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]])
     for group, of_motions in zip(paths.groups, terms, strict=True):
         density = _density(group)
         for i, part in enumerate(of_motions):
-            torques[group.index, i] = _thinned(
-                _instants(part.gravity.shape[1], paths.instants, density)[0] @ part.gravity, density
-            )
+            weights, _, _ = _instants(part.gravity.shape[1], density * (paths.instants - 1) + 1)
+            torques[group.index, i] = _thinned(weights @ part.gravity, density)
     return torques
 
 
-def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> CycleLoads:
+def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]], kept: Array | None = None) -> CycleLoads:
     """Return the loads of N arms along a cycle, by their torque terms from `torque_terms`.
+
+    kept: (N, M) durations of the motions [s]; None for those of the cycle and of the drives.
 
     Raises:
         UnknownQuantityError: A step should be as fast as possible, but the arms have no actuators with known speeds.
@@ -82,8 +85,8 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
     torques, speeds = np.empty((2, n, m, paths.instants, dof))
     for group, of_motions in zip(paths.groups, terms, strict=True):
         density = _density(group)
-        loads = [_load(part, group.arms, paths.instants, density) for part in of_motions]
-        times = _durations(group.arms, plan, loads)
+        loads = [_load(part, group.arms, density * (paths.instants - 1) + 1) for part in of_motions]
+        times = _durations(group.arms, plan, loads, of_motions) if kept is None else kept[group.index]
         durations[group.index] = times
         for i, load in enumerate(loads):
             torques[group.index, i] = _thinned(load.torque(times[:, i]), density)
@@ -127,9 +130,9 @@ def _thinned(values: Array, density: int) -> Array:
     return np.concatenate([values[:, :1], np.take_along_axis(nearby, largest, axis=-1)[..., 0], values[:, -1:]], axis=1)
 
 
-def _load(terms: TorqueTerms, arms: ArmArrays, instants: int, density: int) -> MotionLoad:
+def _load(terms: TorqueTerms, arms: ArmArrays, instants: int) -> MotionLoad:
     """Return the load of a motion; the drives' own inertia and friction count where they are known."""
-    weights, s_t, s_tt = _instants(terms.gravity.shape[1], instants, density)
+    weights, s_t, s_tt = _instants(terms.gravity.shape[1], instants)
     q_s, q_ss, drag, push = (weights @ values for values in (terms.q_s, terms.q_ss, terms.drag, terms.push))
     rate, change = s_t[:, None], s_tt[:, None]
     gravity, inertial, velocity = weights @ terms.gravity, drag * rate**2 + push * change, q_s * rate
@@ -149,9 +152,9 @@ def quintic(t: Array) -> tuple[Array, Array, Array]:
 
 
 @cache
-def _instants(samples: int, instants: int, density: int) -> tuple[Array, Array, Array]:
+def _instants(samples: int, instants: int) -> tuple[Array, Array, Array]:
     """Return (F, R) weights that interpolate between R samples at F instants, and s_τ and s_ττ there (F,)."""
-    s, rate, change = quintic(np.linspace(0.0, 1.0, density * (instants - 1) + 1))
+    s, rate, change = quintic(np.linspace(0.0, 1.0, instants))
     at = s * (samples - 1)
     before = np.minimum(at.astype(np.intp), samples - 2)
     weights = np.zeros((len(s), samples))
@@ -178,16 +181,33 @@ def check_durations(drives: Actuation | None, plan: CyclePlan) -> Actuation | No
     return None
 
 
-def _durations(arms: ArmArrays, plan: CyclePlan, loads: Sequence[MotionLoad]) -> Array:
+def _heavier(load: MotionLoad, terms: TorqueTerms) -> MotionLoad:
+    """Return the load of a motion with a heavier payload."""
+    weights, rate, change = _instants(terms.gravity.shape[1], load.gravity.shape[1])
+    gravity, drag, push = (MORE_PAYLOAD * (weights @ part) for part in terms.payload)
+    inertial = drag * rate[:, None] ** 2 + push * change[:, None]
+    return replace(load, gravity=load.gravity + gravity, inertial=load.inertial + inertial)
+
+
+def _durations(arms: ArmArrays, plan: CyclePlan, loads: Sequence[MotionLoad], terms: Sequence[TorqueTerms]) -> Array:
     """Return the (N, M) durations: the least for torques and speeds, scaled to a step's own time if it states one.
 
-    Without known torques and speeds, the motions of a step share its time by the largest travel of a joint.
+    The least ones keep the safety factor, and the makers' limits with less voltage and with a heavier payload. Without
+    known torques and speeds, the motions of a step share its time by the largest travel of a joint.
     """
     drives = check_durations(arms.actuation, plan)
     travel = np.stack([np.abs(load.velocity).max(axis=(1, 2)) for load in loads], axis=1)  # (N, M)
     durations = travel + 1e-9
     if drives is not None:
-        least = np.stack([least_time(load, drives) for load in loads], axis=1)
+        bare = drives.at_makers_limits
+        weak = bare.at_voltage(VOLTAGE_SHARE)
+        least = np.stack(
+            [
+                least_time((load, drives), (load, weak), *([(_heavier(load, part), bare)] if motion.carries else []))
+                for motion, load, part in zip(plan.motions, loads, terms, strict=True)
+            ],
+            axis=1,
+        )
         durations = np.clip(np.where(np.isfinite(least), ROUNDING * least, MAX_TIME), MIN_TIME, MAX_TIME)
     for step in {motion.step for motion in plan.motions}:
         own = [i for i, motion in enumerate(plan.motions) if motion.step == step]

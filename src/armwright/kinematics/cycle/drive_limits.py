@@ -74,12 +74,25 @@ def torque_speed_utilisation(torque: Array, velocity: Array, drives: Actuation) 
     torque: (N, K, D) required, without the safety factor [N m].  velocity: (N, K, D) [rad/s].
     """
     share = drives.safety_factor[:, None, None] * np.abs(torque) / drives.peak[:, None]
-    along_line = (share * _falling_range(drives)[:, None] + np.abs(velocity)) / drives.no_load_speed[:, None]
+    along_line = (share * drives.falling_range[:, None] + np.abs(velocity)) / drives.no_load_speed[:, None]
     return np.where(torque * velocity > 0.0, np.maximum(share, along_line), share)
 
 
-def least_time(load: MotionLoad, drives: Actuation) -> Array:
+def available_torque(torque: Array, velocity: Array, drives: Actuation) -> Array:
+    """Return the (N, K, D) torques that drives deliver at most at these speeds, in the direction of torques [N m].
+
+    torque: (N, K, D) required [N m].  velocity: (N, K, D) [rad/s].
+    """
+    peak, gap, no_load = (each[:, None] for each in (drives.peak, drives.falling_range, drives.no_load_speed))
+    below = no_load - np.abs(velocity)
+    line = np.where(gap > 0.0, below / np.where(gap > 0.0, gap, 1.0), below >= 0.0)
+    return np.where(torque * velocity > 0.0, np.clip(line, 0.0, 1.0), 1.0) * peak
+
+
+def least_time(*cases: tuple[MotionLoad, Actuation]) -> Array:
     """Return the least durations (N,) of motions of N arms that drives can follow [s]; infinite if there is none.
+
+    cases: Loads of the motions and their drives, such as with a heavier payload or less voltage; all of them hold.
 
     With u = 1 / T, each limit at each sample is a quadratic inequality α u² + β u + γ <= 0. Turned so that the velocity
     w is not negative, with the safety factor k and η = 1 + μ by the friction μ of the gear, the torque without this
@@ -104,28 +117,22 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
         >>> ratings = np.array([[ratings_of(motor)]])
         >>> drives = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
         >>> still, turn = np.zeros((1, 1, 1)), np.ones((1, 1, 1))
-        >>> float(least_time(motion_load(still, still, turn, still, drives), drives)[0])
+        >>> float(least_time((motion_load(still, still, turn, still, drives), drives))[0])
         0.1
     """
-    limits = _Limits.of(load, drives)
-    holds = (drives.safety_factor[:, None, None] * np.abs(load.gravity) <= drives.peak[:, None]).all(axis=(1, 2))
-    rate, rows = np.where(holds, limits.fastest, -np.inf), np.flatnonzero(holds)
-    while len(rows):  # each step passes at least one root for good
-        lower = limits.largest_root_below(rate, rows)
-        rows, lower = rows[lower < np.inf], lower[lower < np.inf]
-        rate[rows] = lower
-        rows = rows[lower > 0.0]
+    first, *others = [_Limits.of(load, drives) for load, drives in cases]
+    holds = np.all([one.hold for one in (first, *others)], axis=0)
+    rate = np.where(holds, np.min([one.fastest for one in (first, *others)], axis=0), -np.inf)
+    rows = np.flatnonzero(holds)
+    while len(rows):
+        first.lower(rate, rows)
+        allowed = rate.copy()
+        for one in others:
+            one.lower(rate, rows)
+        rows = np.flatnonzero((rate < allowed) & (rate > 0.0))
     with np.errstate(divide="ignore", over="ignore"):
         time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0))
-    known = ~np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
-    friction = load.coulomb + load.viscous + load.gear
-    return np.where(known & ~np.isnan(friction + load.inertial).any(axis=(1, 2)), time, np.nan)
-
-
-def _falling_range(drives: Actuation) -> Array:
-    """Return the (N, D) range of speeds over which the available torque falls [rad/s]; 0 for fixed joints."""
-    fixed = np.isinf(drives.no_load_speed)
-    return np.where(fixed, 0.0, drives.no_load_speed - np.where(fixed, 0.0, drives.corner_speed))
+    return np.where(np.all([one.known for one in (first, *others)], axis=0), time, np.nan)
 
 
 @dataclass(frozen=True)
@@ -138,6 +145,8 @@ class _Limits:
         d: (N, M) speed relative to the range of falling torque [s].
         level: (N, M) no-load speed relative to that range; infinite without one.
         fastest: (N,) largest u by the no-load speeds, at most MAX_RATE [1/s].
+        hold: (N,) True if the drives hold the arm at rest on the way.
+        known: (N,) True if all ratings are known.
     """
 
     a: Array
@@ -147,6 +156,8 @@ class _Limits:
     d: Array
     level: Array
     fastest: Array
+    hold: NDArray[np.bool_]
+    known: NDArray[np.bool_]
 
     @classmethod
     def of(cls, load: MotionLoad, drives: Actuation) -> Self:
@@ -155,10 +166,13 @@ class _Limits:
         pushing = 1.0 + np.abs(load.gear)
         scale = np.where(load.velocity < 0.0, -1.0, 1.0) * (drives.safety_factor[:, None] / drives.peak)[:, None]
         torques = (load.gravity + load.coulomb, load.viscous, load.inertial)
-        speed, gap = np.abs(load.velocity), _falling_range(drives)
+        speed, gap = np.abs(load.velocity), drives.falling_range
         falls = gap > 0.0
         width = np.where(falls, gap, 1.0)
         level = np.where(falls, np.where(falls, drives.no_load_speed, 1.0) / width, np.inf)
+        held = drives.safety_factor[:, None, None] * np.abs(load.gravity) <= drives.peak[:, None]
+        ratings = drives.peak + drives.corner_speed + drives.no_load_speed
+        needed = load.coulomb + load.viscous + load.gear + load.inertial
         with np.errstate(divide="ignore", over="ignore"):
             fastest = (drives.no_load_speed / speed.max(axis=1)).min(axis=1)
         return cls(
@@ -167,7 +181,16 @@ class _Limits:
             d=(speed * np.where(falls, 1.0 / width, 0.0)[:, None]).reshape(n, -1),
             level=np.repeat(level[:, None], samples, axis=1).reshape(n, -1),
             fastest=np.minimum(fastest, MAX_RATE),
+            hold=np.all(held, axis=(1, 2)),
+            known=~np.any(np.isnan(ratings)[:, None] | np.isnan(needed), axis=(1, 2)),
         )
+
+    def lower(self, rate: Array, rows: NDArray[np.intp]) -> None:
+        """Lower the rates (N,) of these rows, in place, until the limits allow them; -infinite if they allow none."""
+        while len(rows := rows[rate[rows] > 0.0]):  # each step passes at least one root for good
+            lower = self.largest_root_below(rate, rows)
+            rows, lower = rows[lower < np.inf], lower[lower < np.inf]
+            rate[rows] = lower
 
     def largest_root_below(self, rate: Array, rows: NDArray[np.intp]) -> Array:
         """Return, for each row, the least over the limits that its rate exceeds of their largest smaller roots.

@@ -80,8 +80,9 @@ def dynamics_kernels() -> SimpleNamespace:
         """Compute the terms of the torque along a motion.
 
         q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  carried: (S,) share of
-        the payload that is carried.  terms: (3, N, S, D) gravity, drag and push [N m] or [N].  wrenches: likewise the
-        force on each link and the moment about its joint, in its frame [N], [N m]; empty if they are not wanted.
+        the payload that is carried.  terms: (6, N, S, D) gravity, drag and push, and what the payload adds to each
+        [N m] or [N].  wrenches: (3, N, S, D) of gravity, drag and push, the force on each link and the moment about
+        its joint, in its frame [N], [N m]; empty if they are not wanted.
         """
         arm, sample = wp.tid()
         # Frames of all links: position of the joint, its axis, and the x and y axes of what it carries.
@@ -137,19 +138,23 @@ def dynamics_kernels() -> SimpleNamespace:
             frame = wp.matrix_from_cols(x, y, z)
             lever = tip - before + frame * bodies.payload_com[arm]
             mass, inertia = carried[sample] * bodies.payload_mass, carried[sample] * bodies.payload_inertia[arm]
-            total_force, total_moment = wrench(mass, inertia, frame, lever, acceleration, alpha, omega)
+            carried_force, carried_moment = wrench(mass, inertia, frame, lever, acceleration, alpha, omega)
+            # Products are copies; names alone would be the same variables, which the loop changes.
+            total_force, total_moment = one * carried_force, one * carried_moment
             after = before
             for step in range(bodies.dof):
                 j = bodies.dof - 1 - step
                 here = row(place, j)
                 total_moment = total_moment + wp.cross(after - here, total_force) + row(moment, j)
+                carried_moment = carried_moment + wp.cross(after - here, carried_force)
                 total_force = total_force + row(force, j)
-                load = real(0.0)
+                load, added = real(0.0), real(0.0)
                 if bodies.motion[arm, j] < wp.static(PRISMATIC):
-                    load = wp.dot(row(axis, j), total_moment)
+                    load, added = wp.dot(row(axis, j), total_moment), wp.dot(row(axis, j), carried_moment)
                 elif bodies.motion[arm, j] < wp.static(FIXED):
-                    load = wp.dot(row(axis, j), total_force)
+                    load, added = wp.dot(row(axis, j), total_force), wp.dot(row(axis, j), carried_force)
                 terms[term, arm, sample, j] = load
+                terms[3 + term, arm, sample, j] = added
                 if wrenches.shape[0] > 0:
                     lx = row(along_x, j)
                     ly = row(along_y, j)

@@ -28,6 +28,7 @@ class TorqueTerms:
     push: Array  # (N, R, D)
     q_s: Array  # (N, R, D) derivative of the joint values by s [rad] or [m]
     q_ss: Array  # (N, R, D) second derivative
+    payload: Array  # (3, N, R, D) what the payload adds to gravity, drag and push, in proportion to its mass
     wrenches: Array
     """(3, N, R, D, 6) terms of the forces on the links and moments about their joints, in the frames of the links [N],
     [N m]; empty if they were not wanted."""
@@ -44,10 +45,13 @@ def torque_terms(
     for group in paths.groups:
         states, carried, spans = _along(group)
         whole = np.empty((3, *states[0].shape, 6)) if wrenches else NO_WRENCHES
-        terms = _terms(group.arms, *states, carried, payload, device, whole)  # (3, n, S, D)
-        parts = (*terms, *states[1:])
+        terms = _terms(group.arms, *states, carried, payload, device, whole)  # (6, n, S, D)
+        parts = (*terms[:3], *states[1:])
         found.append(
-            tuple(TorqueTerms(*(values[:, a:b] for values in parts), wrenches=whole[:, :, a:b]) for a, b in spans)
+            tuple(
+                TorqueTerms(*(values[:, a:b] for values in parts), terms[3:, :, a:b], whole[:, :, a:b])
+                for a, b in spans
+            )
         )
     return found
 
@@ -68,8 +72,8 @@ def inverse_dynamics_torques(
     q, qd, qdd: (N, S, D) joint values [rad] or [m], speeds [rad/s] or [m/s] and accelerations [rad/s²] or [m/s²].
     carried: (S,) share of the payload that is carried.  payload: its mass [kg].
     """
-    gravity, drag, _ = _terms(arms, q, qd, qdd, carried, payload, device)  # M q_ss + C q_s, with the time as share
-    return gravity + drag
+    terms = _terms(arms, q, qd, qdd, carried, payload, device)
+    return terms[0] + terms[1]  # gravity, and M q_ss + C q_s with the time as share
 
 
 def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, device: Device = "cpu") -> Array:
@@ -93,16 +97,19 @@ def _terms(
     arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device,
     wrenches: Array = NO_WRENCHES,
 ) -> Array:  # fmt: skip
-    """Return (3, N, S, D) gravity, drag and push of N arms at S samples; fill (3, N, S, D, 6) wrenches, if any."""
+    """Return (6, N, S, D) gravity, drag and push of N arms at S samples, and what the payload adds to each.
+
+    wrenches: (3, N, S, D, 6) to be filled, if any.
+    """
     loaded = load_kernels("cycle.dynamics_kernels", device)
-    terms = np.empty((3, *q.shape))
+    terms = np.empty((6, *q.shape))
 
     def solve(chunk: slice) -> None:
         part = arms[chunk]
         values: dict[str, Any] = {name: getattr(part, name) for name in ("dof", "base", "motion", "offset")}
         values |= vars(part.rigid_bodies) | {"payload_mass": loaded.warp.float64(payload)}
         values |= {"payload_com": part.payload_center, "payload_inertia": payload * part.payload_gyration}
-        bodies, found = loaded.struct("Bodies", values), np.empty((3, *q[chunk].shape))
+        bodies, found = loaded.struct("Bodies", values), np.empty((6, *q[chunk].shape))
         states, full = (q[chunk], q_s[chunk], q_ss[chunk]), np.empty_like(wrenches[:, chunk])
         loaded.launch("torque_terms", found.shape[1:3], bodies, *states, carried, outputs=[found, full])
         terms[:, chunk], wrenches[:, chunk] = found, full

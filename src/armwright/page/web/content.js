@@ -111,7 +111,9 @@ export class Content {
     return all.subarray(target * size, target * size + this._part("joints", i)[0]);
   }
 
-  isRobust(i) { return this.head.result.robust === null ? null : this.head.result.robust.includes(i); }
+  // Whether a design of the front is found good, and the word for it; null without a verification.
+  isGood(i) { return this.head.result.verdict?.numbers.includes(i) ?? null; }
+  verdict(i) { const { verdict } = this.head.result; return verdict && (verdict.numbers.includes(i) ? verdict.good : verdict.bad); }
   callsOf(i) {
     const id = this.proposals[i]?.id;
     return id ? this.calls.filter((call) => isOf(call, id)) : [];

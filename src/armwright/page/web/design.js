@@ -59,8 +59,8 @@ export function drawDesign() {
   $("design-box").hidden = i === null;
   if (i === null) return;
   const { head } = content, arm = content.arm(i), posed = postures(i), values = content.values(i);
-  const robust = content.isRobust(i), n = content.targets.length;
-  const verdict = robust === null || !head.front.includes(i) ? "" : robust ? ", robust" : ", sensitive";
+  const n = content.targets.length, found = head.front.includes(i) ? content.verdict(i) : null;
+  const verdict = found === null ? "" : `, ${found}`;
   $("design-title").textContent = `#${i} ${content.joints(i)}, ${content.look(i).label}${verdict}`;
   const iteration = head.is_study && i >= content.nInit ? ` Iteration ${i - content.nInit + 1}.` : "";
   const objectives = content.hasFailed(i) ? [`Evaluation failed (${content.failures[i]})`] : content.objectives.map((o, k) => {

@@ -34,8 +34,8 @@ export function drawHeader() {
     research.push(fact("hypervolume", `${number(result.hypervolume)}${share}`));
     research.push(fact("reference point", `(${head.reference_point.map((v) => number(v)).join(", ")})`));
   }
-  const robust = result.robust === null ? "" : `, ${result.robust.length} robust`;
-  facts.push(fact("front", `${plural(head.front.length, "design")}${robust}`));
+  const good = result.verdict === null ? "" : `, ${result.verdict.numbers.length} ${result.verdict.good.replace("holds", "hold")}`;
+  facts.push(fact("front", `${plural(head.front.length, "design")}${good}`));
   if (head.result.failed) facts.push(fact("failed evaluations", `${head.result.failed}`));
   if (head.result.infeasible) facts.push(fact("infeasible", `${head.result.infeasible}`));
   for (const [source, n] of Object.entries(result.by_source)) {

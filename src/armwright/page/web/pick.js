@@ -32,7 +32,7 @@ export function openPick(shownContent) {
 }
 
 export function drawPick() {
-  $("pick-robust").parentElement.hidden = content.head.result.robust === null;
+  $("pick-holds").parentElement.hidden = content.head.result.verdict === null;
 }
 
 // Shows the whole front again; the form keeps its values.
@@ -119,9 +119,9 @@ function choose() {
   const quantities = new Map(content.head.front.map((i) => [i, numbersOf(i)]));
   const message = $("pick-message");
   try {
-    const requested = conditions(), robust = $("pick-robust").checked;
+    const requested = conditions(), holds = $("pick-holds").checked;
     const left = content.head.front.filter((i) => (
-      (!robust || content.isRobust(i)) && requested.every(({ name, relation, bound }) => HOLDS[relation](quantities.get(i).get(name), bound))
+      (!holds || content.isGood(i)) && requested.every(({ name, relation, bound }) => HOLDS[relation](quantities.get(i).get(name), bound))
     ));
     const order = ordered(left, quantities);
     message.classList.toggle("missed", !order.length);
@@ -131,7 +131,7 @@ function choose() {
     }
     show(order);
     $("pick-all").hidden = false;
-    message.textContent = `Design ${order[0]}, of ${plural(order.length, "design")} in the selection. ${command(requested, robust)}`;
+    message.textContent = `Design ${order[0]}, of ${plural(order.length, "design")} in the selection. ${command(requested, holds)}`;
     set({ design: order[0] });
   } catch (fault) {
     message.classList.add("missed");
@@ -140,11 +140,11 @@ function choose() {
 }
 
 // Returns the same selection as a command.
-function command(requested, robust) {
+function command(requested, holds) {
   const by = $("pick-by").value;
   const parts = requested.map(({ name, relation, bound }) => `--where "${name}${relation}${bound}"`);
   if (by === WEIGHTS) parts.push(`--weights ${[...weights()].map(([name, weight]) => `${name}=${weight}`).join(",")}`);
   else if (by !== KNEE) parts.push(`--by ${by}`);
-  if (robust) parts.push("--robust");
+  if (holds) parts.push("--holds");
   return `In a terminal: armwright pick RUN ${parts.join(" ")}`.trim();
 }

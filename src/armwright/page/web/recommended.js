@@ -3,10 +3,10 @@
 import { snapshot } from "./arm.js";
 import { downloadOf, hasServer } from "./design.js";
 import { listen, set, state } from "./state.js";
-import { $, element, onTheme, plural, quantity, why } from "./format.js";
+import { $, element, millimetres, onTheme, plural, quantity, why } from "./format.js";
 
 const ROLES = {
-  knee: "Best compromise", "least price": "Cheapest", "least deflection": "Stiffest", "least cycle_time": "Fastest", "least mass": "Lightest",
+  knee: "Best compromise", safe: "Safe", "least price": "Cheapest", "least deflection": "Stiffest", "least cycle_time": "Fastest", "least mass": "Lightest",
 };
 
 let content = null;
@@ -45,7 +45,7 @@ export function drawRecommended() {
 }
 
 function card(one) {
-  const { design, roles, status, survival } = one;
+  const { design, roles, status, survival, costs } = one;
   const show = () => set({ design });
   const title = roles.map((role, k) => { const name = ROLES[role] ?? role.replaceAll("_", " "); return k ? name.toLowerCase() : name; }).join(", ");
   return element("article", { class: "card", "data-design": design },
@@ -53,7 +53,9 @@ function card(one) {
     element("h3", {}, `${title[0].toUpperCase()}${title.slice(1)}: #${design} ${content.joints(design)}`),
     verdict(status),
     element("dl", { class: "asked" }, ...rows(one).flatMap(([label, value, text]) => [element("dt", {}, label, why(label, text)), element("dd", {}, value)])),
+    ...(costs ? [element("p", { class: "note" }, `${costs[0].toUpperCase()}${costs.slice(1)}.`)] : []),
     ...survives(survival),
+    ...(one.path ? [element("p", { class: "note" }, `Worst along its cycle: ${one.path}.`)] : []),
     element("p", { class: "buttons" }, element("button", { type: "button", onclick: show }, "Show"),
       ...downloads().map(([format, text]) => element("button", { type: "button", onclick: () => downloadOf(design, format) }, text))));
 }
@@ -74,17 +76,22 @@ function verdict(status) {
   return element("p", { class: passed ? "passed" : failed ? "missed" : "note" }, text);
 }
 
-// What the design holds and what breaks it.
+// Whether the design holds, and the reserve that each perturbation leaves.
 function survives(survival) {
   if (survival === null) return [];
-  const broken = survival.perturbations.filter((one) => one.broken.length);
-  const held = survival.perturbations.filter((one) => !one.broken.length).map((one) => one.name);
-  const lines = broken.map(({ name, broken: by }) => {
-    const [first, ...others] = by, more = others.length ? ` and ${plural(others.length, "other")}` : "";
-    const change = first.change === name ? "" : `${first.change}, `;
-    return element("p", { class: "missed" }, `Breaks with ${name}: ${change}${first.constraint}${more}`);
-  });
-  return [...lines, ...(held.length ? [element("p", { class: "note" }, `Holds ${held.join("; ")}.`)] : [])];
+  const { holds, verdict, perturbations, assumed } = survival;
+  const row = (one) => [element("dt", {}, one.name, why(one.name, one.text)), element("dd", one.holds ? {} : { class: "missed" }, left(one))];
+  return [
+    element("p", { class: holds ? "passed" : "missed" }, holds ? "Holds" : `${verdict[0].toUpperCase()}${verdict.slice(1)}`),
+    element("p", { class: "note" }, "Reserve of the motors, 1 at their limits, and distance from anything:"),
+    element("dl", { class: "asked" }, ...perturbations.flatMap(row)),
+    ...(assumed ? [element("p", { class: "note" }, `If assumed values are wrong, at worst ${assumed.text}.`)] : []),
+  ];
+}
+
+function left({ worst: { reserve, clearance, faults } }) {
+  const numbers = [reserve?.toFixed(2), clearance === null ? null : millimetres(clearance)];
+  return faults.length ? faults.join(", ") : numbers.filter((one) => one != null).join("; ") || "holds";
 }
 
 function drawPictures() {

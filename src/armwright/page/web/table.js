@@ -25,9 +25,8 @@ function columns() {
       key: String(k), name: heading(o), value: (i) => content.values(i)[k],
     })),
   ];
-  if (head.result.robust !== null) {
-    made.push({ key: "robust", name: "robustness", text: true, value: (i) => (content.isRobust(i) ? "robust" : "sensitive") });
-  }
+  if (head.result.verdict !== null) made.push({ key: "verdict", name: "verdict", text: true, value: (i) => content.verdict(i) });
+  if (head.front.some((i) => "reserve" in head.arms[i])) made.push({ key: "reserve", name: "reserve", value: (i) => head.arms[i].reserve });
   made.push({ key: "joints", name: "joints", text: true, value: (i) => content.joints(i) });
   for (const name of ["mount", "tube"]) {
     if (!head.parameters.some((p) => p.name === name)) continue;

@@ -14,8 +14,10 @@ from armwright.kinematics.ik.ik import MANY_ARMS
 from armwright.pareto import PENALTY
 from armwright.problem.problem import Problem
 from armwright.proof.infeasibility import ViolationTally
+from armwright.proof.perturbations import Survival
+from armwright.proof.recommendation import unsafe_roles
 from armwright.proof.results import complete_summary, discard_results, read_summary, summarize_front, write_results
-from armwright.proof.verification import Verification, verify, verify_front
+from armwright.proof.verification import Verification, front_survival, verify, verify_front
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import SEARCH, RunFolder, read_run
 from armwright.runs.history import FRONT_SEARCH, History
@@ -25,6 +27,7 @@ from armwright.search.front.screening import Screen, pays
 from armwright.search.front.variation import offspring
 from armwright.study.front.reference_survey import ReferenceSurvey
 from armwright.study.front.reported_front import reported_front
+from armwright.study.front.safe_search import find_safe_design
 from armwright.study.front.search_budget import SearchProgress
 from armwright.study.front.time_plan import MAX_DESIGNS, ChunkSize, TimePlan, files_seconds
 from armwright.study.progress import RunResult
@@ -250,28 +253,41 @@ class DirectSearch:
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }
 
-        def summarize(verification: Verification | None) -> dict[str, Any]:
-            values = np.vstack([self.search.values, history.masked_objectives])
-            after = len(trials) * files_seconds(self.problem.task)
-            return summarize_front(
-                history,
-                self.config,
-                values,
-                statistics,
-                verification,
-                self.tally,
-                lambda: self.plan.left - after,
-            )
-
-        if self.folder is None:
-            return FrontRun(history, self.config, summarize(None), None, self.resumed)
-        summary = complete_summary(self.folder.path, history)
+        folder = self.folder
+        summary = None if folder is None else complete_summary(folder.path, history)
         if summary is None or summary.get("search", {}).get("ended_by") != ended:
-            self.folder.replace_trials(trials)
-            verification = verify_front(history)
-            summary = summarize(verification)
-            write_results(self.folder, history, self.config, summary, verification)
-        return FrontRun(history, self.config, summary, self.folder.path, self.resumed)
+            after = len(trials) * files_seconds(self.problem.task)
+
+            def left() -> float:
+                return self.plan.left - after
+
+            history, verification, survival = self._with_safe_design(history, left)
+            values = np.vstack([self.search.values, history.masked_objectives])
+            summary = summarize_front(
+                history, self.config, values, statistics, verification, survival, self.tally, left
+            )
+            if folder is not None:
+                folder.replace_trials(list(history))
+                write_results(folder, history, self.config, summary, verification)
+        return FrontRun(history, self.config, summary, None if folder is None else folder.path, self.resumed)
+
+    def _with_safe_design(
+        self, history: History, left: Callable[[], float]
+    ) -> tuple[History, Verification | None, dict[int, Survival]]:
+        """Verify the front, and add a design that holds if recommended ones do not; return its survival by number."""
+        verification = None if self.folder is None else verify_front(history)
+        survival = front_survival(history, verification)
+        found, each = None, self.chunk_size.seconds / self.chunk_size.value
+        if unsafe_roles(history, survival):
+            found = find_safe_design(history, survival, left, each, self.config.seed)
+        if found is None:
+            return history, verification, survival
+        trial, own = found
+        grown = History(self.problem, [*history, trial], 0, self.config.reference_point)
+        if [member.number for member in grown.front] != [member.number for member in history.front]:
+            verification = None if self.folder is None else verify_front(grown)
+            survival = front_survival(grown, verification)
+        return grown, verification, {**survival, trial.number: own}
 
     def _settle_reference_point(self) -> None:
         """Store the reference point that the task leaves open; a longer search may still find another."""
