@@ -4,7 +4,6 @@
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arms.arm_arrays import FIXED
 from armwright.kinematics.arms.bearings import bearing_limits
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
@@ -89,24 +88,23 @@ def bearing_utilisation(e: Evaluation) -> Array:
     """The largest share of what the maker of an actuator allows across its shaft, of moment, axial and radial force,
     that any joint takes at rest and on the way to the target; 0 where no maker states a limit.
     """
-    limits = bearing_limits(e.drives)
-    if not (np.isfinite(limits).any(axis=-1) & (e.arms.motion < FIXED)).any():
+    if not e.has_bearing_limits:
         return np.zeros(e.position_error.shape)
-    return np.nan_to_num(e.bearing_loads / limits[:, None]).max(axis=(-2, -1))
+    return np.nan_to_num(e.bearing_loads / bearing_limits(e.drives)[:, None]).max(axis=(-2, -1))
 
 
 @quantity("times", over="arm", needs=("motions", "durations"), ratings=LIMITS, symbol="reserve")
 def reserve(e: Evaluation) -> Array:
-    """How many times the torque, mean torque or speed that the cycle takes of any actuator its maker allows, without
-    safety factor; below 1 it cannot. Without a cycle, the torque that holds the arm at the targets.
+    """How many times the torque, mean torque, speed or load across the axis that the cycle takes of any actuator its
+    maker allows, without safety factor; below 1 it cannot. Without a cycle, what holds the arm at the targets.
     """
     return e.reserves.least
 
 
 @quantity("of allowed", over="arm", needs=("motions", "durations"), ratings=LIMITS)
 def limit_use(e: Evaluation) -> Array:
-    """The largest share of any actuator's limit of torque, mean torque or speed that the cycle takes, without safety
-    factor: 1 / reserve.
+    """The largest share of any actuator's limit of torque, mean torque, speed or load across the axis that the cycle
+    takes, without safety factor: 1 / reserve.
     """
     return 1.0 / e.reserves.least
 

@@ -17,7 +17,7 @@ from armwright.kinematics.arms.forward import Frames, forward_kinematics, jacobi
 from armwright.kinematics.contact.clearance import clearances, straight_motor_clearance
 from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_bearing_loads, cycle_loads, holding_torques
 from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths, rough_paths
-from armwright.kinematics.cycle.reserves import Reserves, holding_reserves, reserves_of
+from armwright.kinematics.cycle.reserves import Reserves, bearing_reserves, holding_reserves, reserves_of
 from armwright.kinematics.cycle.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
@@ -79,9 +79,13 @@ class Evaluation(Scene):
     @cached_property
     def torque_terms(self) -> list[tuple[TorqueTerms, ...]]:
         """Terms of the torques along the cycle, for each group of arms."""
+        return torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=self.has_bearing_limits)
+
+    @property
+    def has_bearing_limits(self) -> bool:
+        """Whether the maker of an actuator states what it allows across its shaft."""
         drives = self.arms.actuation
-        limited = drives is not None and bool(np.isfinite(bearing_limits(drives)[self.arms.motion < FIXED]).any())
-        return torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=limited)
+        return drives is not None and bool(np.isfinite(bearing_limits(drives)[self.arms.motion < FIXED]).any())
 
     @cached_property
     def loads(self) -> CycleLoads:
@@ -92,8 +96,12 @@ class Evaluation(Scene):
     def reserves(self) -> Reserves:
         """Reserves of the actuators along the cycle, else at the targets; SettingsError if a duration is not known."""
         if self.cycle_paths is None:
-            return holding_reserves(self.joint_torques, self.drives)
-        return reserves_of(self.loads, self.drives)
+            found = holding_reserves(self.joint_torques, self.drives)
+        else:
+            found = reserves_of(self.loads, self.drives)
+        if not self.has_bearing_limits:
+            return found
+        return found | bearing_reserves(self.bearing_loads, bearing_limits(self.drives))
 
     def keeping(self, durations: Array | None) -> Self:
         """Return the evaluation with these durations of the motions (N, M) [s]; itself without any."""

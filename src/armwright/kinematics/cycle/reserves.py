@@ -2,7 +2,8 @@
 
 The reserve of a torque is the factor by which all torques could be multiplied, at their speeds, before the torque-speed
 line is reached; that of heat, before the continuous torque is reached by their root mean square; that of a speed is
-the no-load speed over it. Safety factors do not count.
+the no-load speed over it; that of a bearing, the limit of its maker over the load across the axis. Safety factors do
+not count.
 """
 
 from collections.abc import Mapping
@@ -23,6 +24,9 @@ class Reserves:
     """Reserves of N arms of up to D joints along M motions."""
 
     by_cause: Mapping[str, Array]  # (N, M, D) by what is limited; (N, 1, D) over the whole cycle
+
+    def __or__(self, other: "Reserves") -> "Reserves":
+        return Reserves({**self.by_cause, **other.by_cause})
 
     @property
     def least(self) -> Array:
@@ -51,6 +55,12 @@ def reserves_of(loads: CycleLoads, drives: Actuation) -> Reserves:
 def holding_reserves(torques: Array, drives: Actuation) -> Reserves:
     """Return the reserves of drives that hold T postures; torques: (N, T, D) at the joints [N m] or [N]."""
     return Reserves({"torque": _ratio(drives.peak[:, None], torques)})
+
+
+def bearing_reserves(loads: Array, limits: Array) -> Reserves:
+    """Return the reserves of bearings; loads: (N, T, D, 3) at targets.  limits: (N, D, 3), NaN where none is stated."""
+    of_each = np.where(np.isnan(limits), MOST, _ratio(limits, loads.max(axis=1)))
+    return Reserves({"load across the axis": of_each.min(axis=2)[:, None]})
 
 
 def _ratio(limit: Array, value: Array) -> Array:
