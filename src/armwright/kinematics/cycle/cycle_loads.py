@@ -105,7 +105,7 @@ def cycle_bearing_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ..
     largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
     for group, of_motions in zip(paths.groups, terms, strict=True):
         for i, part in enumerate(of_motions):
-            weights, rate, change = _instants(part.gravity.shape[1], paths.instants, _density(group))
+            weights, rate, change = _instants(part.gravity.shape[1], _density(group) * (paths.instants - 1) + 1)
             flat = weights @ part.wrenches.reshape(*part.wrenches.shape[:3], -1)  # (3, n, F, D 6)
             s, ss = rate[:, None] / durations[group.index, i, None, None], change[:, None]
             total = flat[0] + flat[1] * s**2 + flat[2] * ss / durations[group.index, i, None, None] ** 2
