@@ -8,15 +8,15 @@ import pinocchio
 import pytest
 
 from armwright.kinematics.cycle.torque_terms import torque_terms
-from armwright.problem.evaluation import Evaluation, evaluate
-from armwright.problem.objectives import (
+from armwright.problem.compliance_quantities import payload_capacity
+from armwright.problem.drive_quantities import (
     axial_force,
     bearing_utilisation,
-    payload_capacity,
     radial_force,
     tilting_moment,
     torque_utilisation,
 )
+from armwright.problem.evaluation import Evaluation, evaluate
 from armwright.robot.arm import GRAVITY, Actuator, Arm, Joint, uniform_link
 from armwright.tasks.moments import MAX_MASS
 from tests.support.arms import moving_arms

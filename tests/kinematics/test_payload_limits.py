@@ -8,8 +8,8 @@ import pytest
 
 from armwright.kinematics.reach.payload_limits import held_payloads
 from armwright.kinematics.reach.reach_postures import postures_over_reach
+from armwright.problem.compliance_quantities import payload_capacity
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import payload_capacity
 from armwright.robot.arm import GRAVITY, Actuator, Arm, Joint, uniform_link
 from armwright.tasks.moments import MAX_MASS
 from tests.support.arms import moving_arms

@@ -8,15 +8,15 @@ import pytest
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.reach.compliance import Stiffness
-from armwright.problem.conditions import read_condition
-from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import (
+from armwright.problem.compliance_quantities import (
     backlash_error,
     deflection,
     friction_error,
     payload_capacity,
     payload_deflection,
 )
+from armwright.problem.conditions import read_condition
+from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.proof.selection import pick
 from armwright.robot.actuators import named_actuator

@@ -13,19 +13,17 @@ import pytest
 
 import armwright as aw
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.problem.failure import Failure
-from armwright.problem.objectives import (
-    backlash_error,
+from armwright.problem.compliance_quantities import backlash_error, deflection
+from armwright.problem.drive_quantities import (
     bearing_utilisation,
-    deflection,
     dynamic_utilisation,
-    mass,
     speed_utilisation,
     thermal_utilisation,
     tilting_moment,
     torque_utilisation,
-    worst_error,
 )
+from armwright.problem.failure import Failure
+from armwright.problem.objectives import mass, worst_error
 from armwright.proof.design_record import compute_facts
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.mounting import Mounting, mounted

@@ -6,6 +6,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.problem.drive_quantities import price, voltages
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.objectives import (
     OBJECTIVES,
@@ -13,9 +14,7 @@ from armwright.problem.objectives import (
     length,
     mass,
     position_error,
-    price,
     unreached_targets,
-    voltages,
     worst_error,
 )
 from armwright.problem.problem import Outcomes, Problem, joined, worst_case

@@ -47,6 +47,7 @@ class Objective:
     excess: Callable[[Evaluation], Array] | None = None
     needs: tuple[Need, ...] = ()
     ratings: tuple[str, ...] = ()  # of `Actuation` that every actuator has to state
+    bound_only: bool = False  # True if more of it is better, or if it only counts: constraints bound it
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", self.label or self.name.replace("_", " ").capitalize())
@@ -137,6 +138,9 @@ class Objective:
         return self.over != "arm"
 
 
+QUANTITIES: dict[str, Objective] = {}  # all that are built in, by name
+
+
 def quantity(
     unit: str,
     over: Over = "sum",
@@ -146,12 +150,19 @@ def quantity(
     symbol: str = "",
     label: str = "",
     excess: Callable[[Evaluation], Array] | None = None,
+    bound_only: bool = False,
 ) -> Callable[[Callable[[Evaluation], Array]], Objective]:
-    """Make an objective of the function of its values, with the name and the docstring of that function."""
+    """Make an objective of the function of its values, with the name and the docstring of that function.
+
+    It is then one of QUANTITIES.
+    """
 
     def decorated(each: Callable[[Evaluation], Array]) -> Objective:
         text = " ".join((each.__doc__ or "").split()).rstrip(".")
         description = text[:1].lower() + text[1:]
-        return Objective(each.__name__, unit, description, each, over, label, symbol, excess, needs, ratings)
+        name = each.__name__
+        own = Objective(name, unit, description, each, over, label, symbol, excess, needs, ratings, bound_only)
+        QUANTITIES[name] = own
+        return own
 
     return decorated

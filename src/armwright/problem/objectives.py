@@ -8,32 +8,9 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.kinematics.arms.arm_arrays import FIXED
-from armwright.problem.compliance_quantities import (
-    backlash_error,
-    deflection,
-    friction_error,
-    payload_capacity,
-    payload_deflection,
-)
-from armwright.problem.drive_quantities import (
-    axial_force,
-    bearing_utilisation,
-    dynamic_torque,
-    dynamic_utilisation,
-    limit_use,
-    mean_current,
-    peak_current,
-    price,
-    radial_force,
-    reserve,
-    speed_utilisation,
-    thermal_utilisation,
-    tilting_moment,
-    torque_utilisation,
-    voltages,
-)
+from armwright.problem import compliance_quantities, drive_quantities  # noqa: F401  # the first for its quantities
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objective import Objective, quantity
+from armwright.problem.objective import QUANTITIES, Objective, quantity
 from armwright.tasks.targets import REACHED
 
 TORQUE_SCALE = 40.0  # α of the paper
@@ -132,7 +109,7 @@ def anisotropy(e: Evaluation) -> Array:
     return 1.0 - e.dexterity
 
 
-@quantity("m³", over="min", symbol="manipulability")
+@quantity("m³", over="min", symbol="manipulability", bound_only=True)
 def manipulability(e: Evaluation) -> Array:
     """The square root of det(J J^T) in the kept posture, with the position Jacobian J."""
     return e.manipulability
@@ -157,7 +134,7 @@ def clearance_shortfall(e: Evaluation) -> Array:
     return np.maximum(0.0, COMFORTABLE - e.clearance)
 
 
-@quantity("m", over="min", needs=("clearance", "motions"), symbol="clearance")
+@quantity("m", over="min", needs=("clearance", "motions"), symbol="clearance", bound_only=True)
 def clearance(e: Evaluation) -> Array:
     """How far the arm in the kept posture is from obstacles and from itself; below 0 it is in it, and 1 where there is
     nothing near.
@@ -165,13 +142,13 @@ def clearance(e: Evaluation) -> Array:
     return np.minimum(e.clearance, FAR)
 
 
-@quantity("m", over="min", needs=("clearance", "motions"), symbol="self_clearance")
+@quantity("m", over="min", needs=("clearance", "motions"), symbol="self_clearance", bound_only=True)
 def self_clearance(e: Evaluation) -> Array:
     """How far the arm in the kept posture is from itself; below 0 it is in it, and 1 where there is nothing near."""
     return np.minimum(e.self_clearance, FAR)
 
 
-@quantity("m", over="min", needs=("clearance", "motions"), symbol="obstacle_clearance")
+@quantity("m", over="min", needs=("clearance", "motions"), symbol="obstacle_clearance", bound_only=True)
 def obstacle_clearance(e: Evaluation) -> Array:
     """How far the arm in the kept posture is from obstacles; below 0 it is in it, and 1 where there is nothing near."""
     return np.minimum(e.obstacle_clearance, FAR)
@@ -238,7 +215,7 @@ def undexterous_fraction(e: Evaluation) -> Array:
     return 1.0 - e.dexterous_volume
 
 
-@quantity("fraction", over="arm", needs=("directions",), symbol="dexterous_volume")
+@quantity("fraction", over="arm", needs=("directions",), symbol="dexterous_volume", bound_only=True)
 def dexterous_volume(e: Evaluation) -> Array:
     """The share of the workspace's points at which the tool reaches the stated share of the directions asked for."""
     return e.dexterous_volume
@@ -246,23 +223,12 @@ def dexterous_volume(e: Evaluation) -> Array:
 
 PAPER_OBJECTIVES = (position_error, torque)
 OBJECTIVES: Mapping[str, Objective] = {
-    objective.name: objective
-    for objective in (
-        *PAPER_OBJECTIVES, worst_error, unreached_targets, peak_torque, rms_torque, torque_utilisation, mass, length,
-        price, joints, orientation_error, worst_angle, collision, clearance_shortfall, path_error, path_angle, jumps,
-        cycle_time, dynamic_torque, dynamic_utilisation, speed_utilisation, thermal_utilisation, limit_use,
-        peak_current, mean_current, uncovered_fraction, undexterous_fraction, anisotropy, deflection,
-        payload_deflection, backlash_error, friction_error, bearing_utilisation, tilting_moment, axial_force,
-        radial_force,
-    )
-}  # fmt: skip
+    one.name: one for one in (*PAPER_OBJECTIVES, *QUANTITIES.values()) if not one.bound_only
+}
 CLEARANCES = (clearance, self_clearance, obstacle_clearance)
-# More of these is better, so constraints can bound them, but they are no objectives.
-BENEFITS = (*CLEARANCES, manipulability, payload_capacity, dexterous_volume, reserve)
-QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*BENEFITS, voltages)}}
 # Who asks for more of these minimises what is less then.
 MINIMISED: Mapping[str, Objective] = {
-    clearance.name: clearance_shortfall, dexterous_volume.name: undexterous_fraction, reserve.name: limit_use,
+    "clearance": clearance_shortfall, "dexterous_volume": undexterous_fraction, "reserve": drive_quantities.limit_use,
 }  # fmt: skip
 
 

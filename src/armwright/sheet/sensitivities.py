@@ -11,8 +11,9 @@ import numpy as np
 from armwright.arrays import Array, finite_or_none
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.problem.compliance_quantities import backlash_error, deflection
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objectives import backlash_error, deflection, mass, worst_error
+from armwright.problem.objectives import mass, worst_error
 from armwright.problem.problem import Problem
 from armwright.proof.perturbations import ROUNDING
 from armwright.sheet.record import Sensitivity

@@ -15,8 +15,9 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.problem.checks.finding import PROVEN, Finding
 from armwright.problem.constraints import Constraint
+from armwright.problem.drive_quantities import price
 from armwright.problem.estimates import motionless
-from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES, joints, length, mass, price
+from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES, joints, length, mass
 from armwright.problem.problem import Problem
 from armwright.problem.scene import Scene
 from armwright.spaces.arm_builder import stack_designs
