@@ -20,7 +20,6 @@ WRITERS: dict[str, tuple[str, ...]] = {  # commands that write into a finished r
     "optimize": (*STUDY[:-2], "6", "--out"),
     "report": ("report",),
     "datasheet": ("datasheet",),
-    "export": ("export", "--format", "optuna"),
     "reach-map": ("reach-map", "--spacing", "0.3"),
     "compare-arms": ("compare-arms", "target-1", "no-such-arm.urdf", "--run"),
 }

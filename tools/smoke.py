@@ -78,7 +78,6 @@ def base() -> None:
     assert "in MuJoCo" in armwright("simulate", "front").stdout
     armwright("report", "front")
     armwright("check", "target-1")
-    armwright("compare", "--list", ".")
     assert len(json.loads(armwright("tasks", "--json").stdout)) > 30
     armwright("actuators")
     armwright("init", "mine.yaml")
@@ -100,7 +99,6 @@ def studies() -> None:
         assert (Path("run") / made).stat().st_size > 100, made
     assert "is finished" in armwright(*asked).stdout
     armwright("datasheet", "front")
-    armwright("export", "run", "--format", "optuna")
     Path("two-methods.yaml").write_text(EXPERIMENT, encoding="utf-8")
     told = json.loads(armwright("experiment", "two-methods.yaml", "--out", "cells", "--json").stdout)
     assert told

@@ -42,11 +42,8 @@ def redacted_line(fault: object) -> str:
 
 def _whole(key: str) -> re.Pattern[str]:
     """Return the pattern of a key and of words with its beginning or its end, which takes linear time."""
-    found = re.escape(key)
-    if len(key) > PART:
-        start, end = re.escape(key[:PART]), re.escape(key[-PART:])
-        found += rf"|{start}[\w-]*+|(?<![\w-])[\w-]*{end}|{end}"
-    return re.compile(found)
+    whole, start, end = (re.escape(part) for part in (key, key[:PART], key[-PART:]))
+    return re.compile(rf"{whole}|{start}[\w-]*+|(?<![\w-])[\w-]*{end}|{end}" if len(key) > PART else rf"{whole}")
 
 
 def _blot(key: str, blot: str) -> Callable[[re.Match[str]], str]:
