@@ -88,8 +88,7 @@ class Changed:
     perturbation: str
     texts: Sequence[str]  # the change of each, or one of all
     evaluations: Sequence[Evaluation]  # of each case
-    owners: NDArray[np.intp] | None = None
-    """(R,) index of the design that is changed, -1 if the row does not count; None if these are all N designs."""
+    owners: NDArray[np.intp]  # (R,) index of the design that is changed, -1 if the row does not count
 
 
 def survival_of(problem: Problem, designs: Sequence[Design]) -> list[Survival]:
@@ -104,7 +103,7 @@ def survivals(problem: Problem, nominal: Sequence[Evaluation], changes: Iterable
 
     nominal: Their evaluation in each case.
     """
-    everything = chain([Changed(NOMINAL, [NOMINAL], nominal)], changes)
+    everything = chain([Changed(NOMINAL, [NOMINAL], nominal, np.arange(len(nominal[0])))], changes)
     if not problem.constraints:
         deque(everything, maxlen=0)
         return []
@@ -127,7 +126,8 @@ def load_changes(problem: Problem, matrix: Array, nominal: Sequence[Evaluation])
         return
 
     def loaded(name: str, text: str, scenes: Iterable[Scene], drives: Actuation | None = None) -> Changed:
-        return Changed(name, [text], [e.reloaded(one, drives) for e, one in zip(nominal, scenes, strict=True)])
+        changed = [e.reloaded(one, drives) for e, one in zip(nominal, scenes, strict=True)]
+        return Changed(name, [text], changed, np.arange(len(matrix)))
 
     if (drives := nominal[0].arms.actuation) is not None:
         yield loaded(SUPPLY, SUPPLY, problem.scenes, drives.at_voltage(VOLTAGE_SHARE))
@@ -153,19 +153,17 @@ def _judged(problem: Problem, nominal: Sequence[Evaluation], changes: Iterable[C
         geometry.append(Constraint(clearance, ">=", 0.0))
     allowed = np.array([CONTACT if one.quantity == clearance else ROUNDING for one in geometry])
     durations = [kept_durations(evaluation) for evaluation in nominal]
-    everyone = np.arange(len(nominal[0]))
-    found: list[dict[str, Left]] = [{} for _ in range(len(everyone))]
+    found: list[dict[str, Left]] = [{} for _ in range(len(nominal[0]))]
     for changed in changes:
-        owners = everyone if changed.owners is None else changed.owners
         for each, kept in zip(changed.evaluations, durations, strict=True):
-            evaluation = each.keeping(None if kept is None else kept[owners])
-            violations = np.array([constraint(evaluation) for constraint in geometry]).reshape(-1, len(owners))
+            evaluation = each.keeping(None if kept is None else kept[changed.owners])
+            violations = np.array([constraint(evaluation) for constraint in geometry]).reshape(-1, len(changed.owners))
             fails = violations > allowed[:, None]
             reserves = reserve.known(evaluation)[0]
             holds = ~(fails.any(axis=0) | (reserves < 1.0 - ROUNDING))
             distances = clearance.known(evaluation)[0]
-            for row in np.flatnonzero(owners >= 0).tolist():
-                own, least = found[int(owners[row])], finite_or_none(reserves[row])
+            for row in np.flatnonzero(changed.owners >= 0).tolist():
+                own, least = found[int(changed.owners[row])], finite_or_none(reserves[row])
                 worst = own.get(changed.perturbation)
                 if worst is not None and _rank(worst.holds, worst.reserve) <= _rank(bool(holds[row]), least):
                     continue

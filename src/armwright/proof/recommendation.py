@@ -1,6 +1,7 @@
 """The recommended designs of a front: its knee, its ends, the cheapest and the stiffest, verified in the simulator.
 
-They hold (perturbations.py), if the front has such designs. Otherwise the cheapest design that does is the safe one.
+They hold (perturbations.py), if the front has such designs. If these are far from the best ones, the cheapest design
+that does is the safe one.
 """
 
 import math
@@ -130,7 +131,9 @@ def recommend(
     failing = unsafe_roles(history, survival)
     holding = cheapest_first(history, [number for number, one in survival.items() if one.holds])
     if failing and holding:
-        roles = {role: numbers for role, numbers in roles.items() if role not in failing} | {SAFE: holding}
+        cost = price.name if f"least {price.name}" in roles else history.problem.objectives[0].name
+        on_front = {role: [n for n in roles[role] if n in holding and role != f"least {cost}"] for role in failing}
+        roles = {role: numbers for role, numbers in (roles | on_front).items() if numbers} | {SAFE: holding}
     if history.problem.evaluator is not None:
         return [Recommendation(role, numbers[0], BY_EVALUATOR) for role, numbers in roles.items()]
     try:
@@ -138,9 +141,8 @@ def recommend(
         chosen = [_verified(role, numbers, simulator, left) for role, numbers in roles.items()]
     except SettingsError:
         chosen = [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in roles.items()]
-    found = survival
-    if left() >= 0.0:
-        found = evaluate_survival(history, list(dict.fromkeys(one.design for one in chosen)), survival)
+    numbers = list(dict.fromkeys(one.design for one in chosen))
+    found = evaluate_survival(history, numbers, survival) if left() >= 0.0 else survival
     chosen = [replace(one, survival=found.get(one.design)) for one in chosen]
     return [_compared(history, one, failing, survival) if one.role == SAFE else one for one in chosen]
 

@@ -264,6 +264,7 @@ def _recommended(recommended: Sequence[Mapping[str, Any]], records: Mapping[int,
                 "loads": None if record.loads is None else record.loads.model_dump(),
             }
         found[number]["roles"].append(one["role"])
+        found[number]["costs"] = found[number]["costs"] or one["costs"]
     return list(found.values())
 
 

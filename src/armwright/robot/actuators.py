@@ -172,9 +172,8 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             torque, speed = (float(np.interp(near, stated, [point[i] for point in points])) for i in (1, 2))
             record = record._at(near / record.voltage, speed / record.speed, torque / record.peak_torque)
         share, speed = volts / (record.voltage or volts), record.speed or 1.0
-        torque = float(torque_at_voltage(share, speed, speed - (record.corner_speed or 0.0)))
-        if self.kind in VOLTAGE_DRIVEN and not record.corner_speed:
-            torque = share
+        is_servo = self.kind in VOLTAGE_DRIVEN and not record.corner_speed
+        torque = share if is_servo else float(torque_at_voltage(share, speed, speed - (record.corner_speed or 0.0)))
         return record._at(share, share, torque)
 
     def _at(self, share: float, speed: float, torque: float) -> "ActuatorRecord":

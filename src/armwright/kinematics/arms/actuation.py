@@ -77,8 +77,7 @@ class Actuation(PerArm):
 
     def at_voltage(self, share: float) -> Self:
         """Return the actuators at a share of their voltage (`torque_at_voltage`); the voltage stays as stated."""
-        torque = torque_at_voltage(share, self.no_load_speed, self.falling_range)
-        less = share * self.no_load_speed
+        torque, less = torque_at_voltage(share, self.no_load_speed, self.falling_range), share * self.no_load_speed
         corner = np.maximum(0.0, less - self.falling_range)
         return replace(self, peak=torque * self.peak, no_load_speed=less, corner_speed=corner)
 

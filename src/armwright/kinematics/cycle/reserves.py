@@ -59,8 +59,7 @@ def holding_reserves(torques: Array, drives: Actuation) -> Reserves:
 
 def bearing_reserves(loads: Array, limits: Array) -> Reserves:
     """Return the reserves of bearings; loads: (N, M, D, 3) in motions or at targets.  limits: (N, D, 3) or NaN."""
-    of_each = np.where(np.isnan(limits)[:, None], MOST, _ratio(limits[:, None], loads))
-    return Reserves({"load across the axis": of_each.min(axis=3)})
+    return Reserves({"load across the axis": np.nan_to_num(_ratio(limits[:, None], loads), nan=MOST).min(axis=3)})
 
 
 def _ratio(limit: Array, value: Array) -> Array:
