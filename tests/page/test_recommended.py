@@ -75,6 +75,7 @@ def test_designs_to_build_come_first_and_state_what_the_kernels_compute(
             assert f"{perturbation['reserve']:.2f}" in text or perturbation["text"] in text
         assert ("Holds" in text) == one["survival"]["holds"]
         assert one["survival"]["assumed"]["text"] in text
+        assert one["costs"][1:] in text
     number = recommended[0]["design"]
     evaluation, stated = history.evaluation([number]), asked(tab, number)
     price, sag = (float(QUANTITIES[name](evaluation)[0]) for name in ("price", "deflection"))
