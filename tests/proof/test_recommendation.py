@@ -171,7 +171,7 @@ def test_designs_that_hold_are_taken_before_better_ones_nearby(
     assert {one.role: one.design for one in others} == dict.fromkeys(candidates(history), order[-1])
     assert [one.design for one in safe.demoted] == list(dict.fromkeys(replaced.values()))
     assert safe.demoted[0].reason == "does not hold: payload +10 % (reserve 0.96 (torque of joint 2))"
-    assert safe.costs.startswith(f"compared with #{safe.demoted[0].design}: position error ")
+    assert safe.costs.startswith(f"compared with #{safe.demoted[0].design} (does not hold): position error ")
     nothing = recommend(history, survival(history, set()), simulator)
     assert [one.design for one in nothing] == [numbers[0] for numbers in candidates(history).values()]
 

@@ -158,7 +158,7 @@ def _compared(
         if quantity != deflection
     ]
     demoted = (*safe.demoted, *(Demoted(number, survival[number].verdict) for number in replaced))
-    return replace(safe, demoted=demoted, costs=f"compared with #{replaced[0]}: {', '.join(changes)}")
+    return replace(safe, demoted=demoted, costs=f"compared with #{replaced[0]} (does not hold): {', '.join(changes)}")
 
 
 def _verified(role: str, numbers: Sequence[int], simulator: Simulator, left: Callable[[], float]) -> Recommendation:
