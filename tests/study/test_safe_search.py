@@ -75,7 +75,7 @@ def test_run_recommends_the_safe_design(tmp_path: Path, monkeypatch: pytest.Monk
     run = aw.find_front(Problem(Task.model_validate(CONTENT)), evaluations=500, out=tmp_path / "run")
     (one,) = run.summary["recommended"]
     assert (one["role"], one["design"]) == ("safe", len(run.history) - 1)
-    assert one["costs"].startswith(f"compared with #{one['demoted'][0]['design']}: position error ")
+    assert one["costs"].startswith(f"compared with #{one['demoted'][0]['design']} (does not hold): position error ")
     assert run.summary["n_trials"] == len(read_run(tmp_path / "run")[1]) == len(run.history)
     record = json.loads((tmp_path / "run" / "designs" / f"{one['design']:04d}" / "design.json").read_text())
     assert record["survival"]["holds"]
