@@ -43,13 +43,12 @@ def torque_terms(
     """
     found: list[tuple[TorqueTerms, ...]] = []
     for group in paths.groups:
-        states, carried, spans = _along(group)
-        whole = np.empty((3, *states[0].shape, 6)) if wrenches else NO_WRENCHES
-        terms = _terms(group.arms, *states, carried, payload, device, whole)  # (6, n, S, D)
-        parts = (*terms[:3], *states[1:])
+        (q, q_s, q_ss), carried, spans = _along(group)
+        whole = np.empty((3, *q.shape, 6)) if wrenches else NO_WRENCHES
+        terms = _terms(group.arms, q, q_s, q_ss, carried, payload, device, whole)  # (6, n, S, D)
         found.append(
             tuple(
-                TorqueTerms(*(values[:, a:b] for values in parts), terms[3:, :, a:b], whole[:, :, a:b])
+                TorqueTerms(*terms[:3, :, a:b], q_s[:, a:b], q_ss[:, a:b], terms[3:, :, a:b], whole[:, :, a:b])
                 for a, b in spans
             )
         )
