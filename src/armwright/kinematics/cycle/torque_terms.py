@@ -46,9 +46,18 @@ def torque_terms(
         (q, q_s, q_ss), carried, spans = _along(group)
         whole = np.empty((3, *q.shape, 6)) if wrenches else NO_WRENCHES
         terms = _terms(group.arms, q, q_s, q_ss, carried, payload, device, whole)  # (6, n, S, D)
+        gravity, drag, push = terms[:3]
         found.append(
             tuple(
-                TorqueTerms(*terms[:3, :, a:b], q_s[:, a:b], q_ss[:, a:b], terms[3:, :, a:b], whole[:, :, a:b])
+                TorqueTerms(
+                    gravity[:, a:b],
+                    drag[:, a:b],
+                    push[:, a:b],
+                    q_s[:, a:b],
+                    q_ss[:, a:b],
+                    terms[3:, :, a:b],
+                    whole[:, :, a:b],
+                )
                 for a, b in spans
             )
         )
