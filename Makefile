@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-com
 demo: .venv/.run  ## replay a language model's proposals, then design an arm with real motors and drive it in MuJoCo
 	$(BIN)/armwright optimize target-1 --proposer replay:target-1-plus-seed0 --out runs/demo-model
 	$(BIN)/armwright design examples/2-assembly-task.yaml --space examples/2-assembly-space.yaml --out runs/demo-arm
-	$(BIN)/armwright pick runs/demo-arm --robust --by cycle_time
+	$(BIN)/armwright pick runs/demo-arm --holds --by cycle_time
 	$(BIN)/armwright simulate runs/demo-arm
 
 test: .venv/.test  ## the fast tests: three minutes on two cores, without browser and other processes

@@ -58,7 +58,8 @@ def check(folder: Path) -> list[str]:
             now = (s + 0.5) / substeps if rows[i + 1]["payload"] == row["payload"] else 0.0
             data.ctrl[servo], data.ctrl[forward] = ((1.0 - now) * x[i] + now * x[i + 1] for x in (q, tau))
             after = data.qfrc_actuator + data.qfrc_passive + data.qfrc_constraint - model.dof_armature * data.qacc
-            model.dof_frictionloss[:] = coulomb + gear * np.minimum(np.abs(data.qfrc_actuator), np.abs(after))
+            share = np.where(after * data.qvel > 0.0, gear, gear / (1.0 + gear))
+            model.dof_frictionloss[:] = coulomb + share * np.abs(after)
             mujoco.mj_step(model, data)
             saturated += np.abs(data.qfrc_actuator) >= (1.0 - 1e-6) * limit
             steps += 1

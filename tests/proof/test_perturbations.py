@@ -131,6 +131,18 @@ def test_a_design_that_reaches_a_limit_does_not_hold_and_names_it() -> None:
     assert survival_of(Desk()).holds
 
 
+def test_a_load_across_an_axis_beyond_what_the_maker_allows_names_joint_and_motion() -> None:
+    desk = Desk()
+    allowed = 0.9 * float(desk.evaluation.bearing_loads[..., 0].max())
+    motor = stated(factor=1.0)
+    motor["actuators"][0] |= {"tilting_limit": allowed, "axial_limit": None, "radial_limit": None}
+    loaded = Desk(space=motor)
+    joint = int(loaded.evaluation.bearing_loads[0, ..., 0].max(axis=0).argmax()) + 1
+    found = perturbation(survival_of(loaded), NOMINAL)
+    assert (found.holds, found.reserve) == (False, pytest.approx(0.9, rel=STEADY))
+    assert re.fullmatch(rf"reserve 0.90 \(load across the axis of joint {joint}, step \d.*\)", found.text)
+
+
 def torque_and_speed(evaluation: Any) -> Array:
     """(N, M) smallest reserve of torque and speed along each motion."""
     causes = evaluation.reserves.by_cause

@@ -166,6 +166,13 @@ def test_a_feasible_arm_passes_with_the_claimed_torques(desk: Desk) -> None:
     assert all(one.droop > 5.0 * one.tip_error for one in result.targets)
 
 
+def test_gears_brake_as_the_trajectory_says_on_motions_as_fast_as_possible() -> None:
+    """Friction by the lesser of the torques of motor and link, rotor and all, would leave half a millimetre."""
+    steps = [{key: value for key, value in step.items() if key != "time"} for step in DESK["cycle"]["steps"]]
+    result = Desk(cycle=DESK["cycle"] | {"time": "fastest", "steps": steps}).simulate()
+    assert max(one.tip_error for one in result.targets) < 1.5e-4
+
+
 def test_an_arm_with_weak_motors_fails_at_their_limits() -> None:
     result = Desk(SPACE | {"actuators": [WEAK]}).simulate()
     assert result.verdict == FAIL

@@ -55,6 +55,6 @@ def describe_assumed(assumed: Assumed) -> str:
     """Return all assumed values on one line, with units."""
     return "; ".join(
         f"{name}: "
-        + ", ".join(f"{key.replace('_', ' ')} {rounded(value)} {UNITS[key]}" for key, value in values.items())
+        + ", ".join(f"{key.replace('_', ' ')} {rounded(value)} {UNITS[key]}".rstrip() for key, value in values.items())
         for name, values in assumed.items()
     )

@@ -93,7 +93,7 @@ def bearing_utilisation(e: Evaluation) -> Array:
     return np.nan_to_num(e.bearing_loads / bearing_limits(e.drives)[:, None]).max(axis=(-2, -1))
 
 
-@quantity("times", over="arm", needs=("motions", "durations"), ratings=LIMITS, symbol="reserve", bound_only=True)
+@quantity("x load", over="arm", needs=("motions", "durations"), ratings=LIMITS, symbol="reserve", bound_only=True)
 def reserve(e: Evaluation) -> Array:
     """How many times the torque, mean torque, speed or load across the axis that the cycle takes of any actuator its
     maker allows, without safety factor; below 1 it cannot. Without a cycle, what holds the arm at the targets.

@@ -95,13 +95,12 @@ class Evaluation(Scene):
     @cached_property
     def reserves(self) -> Reserves:
         """Reserves of the actuators along the cycle, else at the targets; SettingsError if a duration is not known."""
-        if self.cycle_paths is None:
-            found = holding_reserves(self.joint_torques, self.drives)
-        else:
-            found = reserves_of(self.loads, self.drives)
-        if not self.has_bearing_limits:
-            return found
-        return found | bearing_reserves(self.bearing_loads, bearing_limits(self.drives))
+        along = self.cycle_paths is not None
+        found = reserves_of(self.loads, self.drives) if along else holding_reserves(self.joint_torques, self.drives)
+        if self.has_bearing_limits:
+            across = self.motion_bearing_loads if along else self.bearing_loads
+            found |= bearing_reserves(across, bearing_limits(self.drives))
+        return found
 
     def keeping(self, durations: Array | None) -> Self:
         """Return the evaluation with these durations of the motions (N, M) [s]; itself without any."""
@@ -164,10 +163,15 @@ class Evaluation(Scene):
         at_targets = bearing_loads(own + self.payload[:, None, None, None] * unit)
         if self.cycle_paths is None:
             return at_targets
+        return self.largest_on_motions(self.motion_bearing_loads, at_targets)
+
+    @cached_property
+    def motion_bearing_loads(self) -> Array:
+        """(N, M, J, 3) the same in each motion of the cycle; SettingsError if a duration is not known."""
         terms = self.torque_terms
         if not terms[0][0].wrenches.size:
             terms = torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=True)
-        return self.largest_on_motions(cycle_bearing_loads(self.paths, terms, self.loads.durations), at_targets)
+        return cycle_bearing_loads(self.paths, terms, self.loads.durations)
 
     def largest_on_motions(self, along: Array, at_targets: Array | float = 0.0) -> Array:
         """Return (N, T, ...) the larger of a target's value and those of the motions (N, M, ...) of steps to it."""

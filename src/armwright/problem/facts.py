@@ -27,8 +27,8 @@ REACH, PAYLOAD_AT_FULL_REACH, VOLTAGE = "reach", "payload_at_full_reach", "volta
 # What an engineer asks of an arm, in this order. Views show what is known of it.
 ASKED = (
     REACH, PAYLOAD_AT_FULL_REACH, "price", "mass", "payload_capacity", "cycle_time", "worst_error", "deflection",
-    "backlash_error", "torque_utilisation", "dynamic_utilisation", "thermal_utilisation", "reserve", "tilting_moment",
-    "peak_current", "mean_current",
+    "backlash_error", "torque_utilisation", "dynamic_utilisation", "thermal_utilisation", "reserve", "clearance",
+    "tilting_moment", "peak_current", "mean_current",
 )  # fmt: skip
 FARTHEST = "The largest horizontal distance of the tip from the first joint."
 _RATINGS = sorted({rating for quantity in QUANTITIES.values() for rating in quantity.ratings})

@@ -2,7 +2,7 @@
 
 Each joint is driven by the torque of the trajectory as feed-forward and by its servo, kp (q* - q), with q* from the
 trajectory, interpolated between its rows. What damps is the friction of the joints. That of a gear is a share of the
-lesser of the torques before and after it, by the step before.
+torque that it passes on, or in braking of the torque before it, by the step before.
 """
 
 from dataclasses import dataclass
@@ -149,10 +149,10 @@ class _Driver:
         return Drive(q, qd, tau, speed, tip, tuple(arrivals), tuple(self._contacts.values()), stable)
 
     def _rub(self) -> None:
-        """Set the friction of the joints by the loads of their gears."""
+        """Set the friction of the joints by the torques that their gears pass on."""
         data, model = self._data, self._model
         passed = data.qfrc_actuator + data.qfrc_passive + data.qfrc_constraint - model.dof_armature * data.qacc
-        loads = np.minimum(np.abs(data.qfrc_actuator), np.abs(passed))
+        loads = np.abs(passed) / np.where(passed * data.qvel > 0.0, 1.0, 1.0 + self._gear)
         model.dof_frictionloss[:] = self._coulomb + self._gear * loads
 
     def _commands(self) -> tuple[Array, Array]:

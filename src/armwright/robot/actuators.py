@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
+from armwright.arrays import Array
 from armwright.exceptions import SpaceError, did_you_mean
 from armwright.robot.actuator_defaults import DEFAULTS, ActuatorKind, default_shape, default_values
 from armwright.robot.arm import Actuator
@@ -157,8 +158,9 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     def at_supply(self, volts: float) -> "ActuatorRecord":
         """Return the completed record at a supply [V], which is then the only one that it takes.
 
-        Between the voltages for which torque and speed are stated, both are interpolated. Beyond, `at_voltage` applies.
-        Without a stated voltage, the values are those of any supply.
+        Between the voltages for which torque and speed are stated, both are interpolated. Beyond,
+        `torque_at_voltage` applies. A DC servo whose line starts at rest has no controller that limits the current, so
+        its torque at rest grows with the voltage, too. Without a stated voltage, the values are those of any supply.
         """
         record = self.completed()
         if record.voltage is None or not math.isfinite(volts):
@@ -169,23 +171,10 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             near = min(max(volts, stated[0]), stated[-1])
             torque, speed = (float(np.interp(near, stated, [point[i] for point in points])) for i in (1, 2))
             record = record._at(near / record.voltage, speed / record.speed, torque / record.peak_torque)
-        return record.at_voltage(volts / (record.voltage or volts))
-
-    def at_voltage(self, share: float) -> "ActuatorRecord":
-        """Return the completed record at a share of its supply voltage.
-
-        The falling line of torque over speed shifts in parallel with the voltage, because the back-EMF takes what the
-        winding lacks (Siciliano et al. 2009, section 5.2). So the no-load speed grows with the voltage, and the stall
-        torque of a motor without a corner speed, too. Up to a corner speed, the controller limits the current: the peak
-        torque stays as long as the line allows it, and more voltage raises the corner speed only. A DC servo whose line
-        starts at rest has no such limit. Copper loss at a torque does not change, nor does the continuous torque; the
-        current from the supply follows. Without a known speed, the peak torque grows with the voltage.
-        """
-        record = self.completed()
-        speed, corner = record.speed or 1.0, record.corner_speed or 0.0
-        torque = share * speed / (speed - corner) if corner < speed else math.inf
-        if corner > 0.0 or self.kind not in VOLTAGE_DRIVEN:
-            torque = min(1.0, torque)
+        share, speed = volts / (record.voltage or volts), record.speed or 1.0
+        torque = float(torque_at_voltage(share, speed, speed - (record.corner_speed or 0.0)))
+        if self.kind in VOLTAGE_DRIVEN and not record.corner_speed:
+            torque = share
         return record._at(share, share, torque)
 
     def _at(self, share: float, speed: float, torque: float) -> "ActuatorRecord":
@@ -221,6 +210,21 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         values |= {"continuous_torque": values["rated_torque"], "shape": self.body_shape}
         values["limit_friction"] = values["load_friction"] if DEFAULTS[self.kind].before_friction else 0.0
         return Actuator(**{field.name: values[field.name] for field in fields(Actuator)})
+
+
+def torque_at_voltage(share: float, no_load_speed: Array | float, falling_range: Array | float) -> Array:
+    """Return the factor of the peak torque P of motors at a share s of their voltage.
+
+    The falling line of torque over speed shifts in parallel, because the back-EMF takes what the winding lacks
+    (Siciliano et al. 2009, section 5.2): with the no-load speed ω₀ and the corner speed ω_c,
+
+        ω₀' = s ω₀ ,   ω_c' = max(0, ω_c - (1 - s) ω₀) ,   P' = P min(1, s ω₀ / (ω₀ - ω_c))
+
+    Up to a corner speed, the controller limits the current: the peak torque stays as long as the line allows it.
+    Copper loss at a torque does not change, nor does the continuous torque.
+    """
+    with np.errstate(divide="ignore"):
+        return np.minimum(1.0, share * np.asarray(no_load_speed) / falling_range)
 
 
 UNITS: Mapping[str, str] = {  # of all values that a record may state; empty for a number without a unit

@@ -8,6 +8,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.rigid_bodies import PerArm
+from armwright.robot.actuators import torque_at_voltage
 from armwright.robot.arm import Actuator, Arm
 
 # Of each field of `Actuation` by joint: the field of `Actuator`, the power of the joint's travel that its value is
@@ -75,20 +76,10 @@ class Actuation(PerArm):
         return replace(self, safety_factor=np.ones_like(self.safety_factor))
 
     def at_voltage(self, share: float) -> Self:
-        """Return the actuators at a share s of their voltage.
-
-        The falling line of torque over speed shifts in parallel, because the back-EMF takes what the winding lacks
-        (Siciliano et al. 2009, section 5.2): with the no-load speed ω₀, corner speed ω_c and peak torque P,
-
-            ω₀' = s ω₀ ,   ω_c' = max(0, ω_c - (1 - s) ω₀) ,   P' = P min(1, s ω₀ / (ω₀ - ω_c))
-
-        Up to a corner speed, the controller limits the current: the peak torque stays as long as the line allows it.
-        Copper loss at a torque does not change, nor does the continuous torque. Voltage and current stay as stated.
-        """
-        falling, less = self.falling_range, share * self.no_load_speed
-        falls = falling > 0.0
-        torque = np.where(falls, np.minimum(1.0, np.where(falls, less, 1.0) / np.where(falls, falling, 1.0)), 1.0)
-        corner = np.maximum(0.0, less - falling)
+        """Return the actuators at a share of their voltage (`torque_at_voltage`); the voltage stays as stated."""
+        torque = torque_at_voltage(share, self.no_load_speed, self.falling_range)
+        less = share * self.no_load_speed
+        corner = np.maximum(0.0, less - self.falling_range)
         return replace(self, peak=torque * self.peak, no_load_speed=less, corner_speed=corner)
 
 

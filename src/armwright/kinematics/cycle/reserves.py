@@ -58,9 +58,9 @@ def holding_reserves(torques: Array, drives: Actuation) -> Reserves:
 
 
 def bearing_reserves(loads: Array, limits: Array) -> Reserves:
-    """Return the reserves of bearings; loads: (N, T, D, 3) at targets.  limits: (N, D, 3), NaN where none is stated."""
-    of_each = np.where(np.isnan(limits), MOST, _ratio(limits, loads.max(axis=1)))
-    return Reserves({"load across the axis": of_each.min(axis=2)[:, None]})
+    """Return the reserves of bearings; loads: (N, M, D, 3) in motions or at targets.  limits: (N, D, 3) or NaN."""
+    of_each = np.where(np.isnan(limits)[:, None], MOST, _ratio(limits[:, None], loads))
+    return Reserves({"load across the axis": of_each.min(axis=3)})
 
 
 def _ratio(limit: Array, value: Array) -> Array:

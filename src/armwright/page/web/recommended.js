@@ -89,9 +89,9 @@ function survives(survival) {
   ];
 }
 
-function left({ worst: { reserve, clearance, faults } }) {
+function left({ holds, text, reserve, clearance }) {
   const numbers = [reserve?.toFixed(2), clearance === null ? null : millimetres(clearance)];
-  return faults.length ? faults.join(", ") : numbers.filter((one) => one != null).join("; ") || "holds";
+  return holds ? numbers.filter((one) => one != null).join("; ") || "holds" : text;
 }
 
 function drawPictures() {
