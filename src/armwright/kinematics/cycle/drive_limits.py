@@ -11,6 +11,7 @@ share of limits that makers state at the output is 0 (`Actuation.limit_friction`
 
 from dataclasses import dataclass
 from itertools import cycle
+from typing import Any
 
 import numpy as np
 
@@ -123,7 +124,7 @@ def least_time(*cases: tuple[MotionLoad, Actuation], device: Device = "cpu") -> 
     """
     *of_motions, _, _ = cases[0][0].gravity.shape
     loaded, rate = load_kernels("cycle.drive_kernels", device), np.full(of_motions, MAX_RATE).reshape(of_motions[0], -1)
-    known, given = np.ones(of_motions, dtype=bool), []
+    known, given = np.ones(of_motions, dtype=bool), list[tuple[Any, Any]]()
     for load, drives in cases:
         ratings = np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
         needed = np.isnan(load.coulomb + load.viscous + load.gear + load.inertial).any(axis=(-2, -1))
