@@ -26,7 +26,7 @@ PYDANTIC = re.compile(
 BARE = {
     "joints", "safety_factor", "payload_factors", "restarts", "weight", "axis", "points", "to", "gear_ratio",
     "reference_point", "resolution", "restrict", "grid", "range", "orientation", "count", "share", "at_voltages",
-    "load_friction",
+    "load_friction", "scale",
 }  # fmt: skip
 
 

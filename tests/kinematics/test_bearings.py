@@ -109,7 +109,7 @@ def test_largest_loads_are_those_of_pinocchio_about_the_bearings(dof: int, kind:
                 axial, radial = np.abs(force @ axis).max(), np.linalg.norm(np.cross(axis, force), axis=1).max()
                 largest = np.maximum(largest, (joint.kind == "revolute") * np.array([tilting, axial, radial]))
         ours = [quantity(evaluation)[row] for quantity in (tilting_moment, axial_force, radial_force)]
-        assert ours == pytest.approx(list(largest), rel=5e-2, abs=1e-6)
+        assert ours == pytest.approx(list(largest), rel=8e-2, abs=1e-6)
         shares = evaluation.bearing_loads[row] / (30.0, 90.0, np.inf)
         assert bearing_utilisation(evaluation)[row] == pytest.approx(shares.max())
 
