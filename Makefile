@@ -3,6 +3,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 # Python compiles what is imported; --no-compile leaves out the rest, a third of the time to install.
+# It must keep what it compiled, or each of the hundreds of processes of the tests compiles it again.
+unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-compile --constraint constraints.txt
 
 .PHONY: demo test test-all torture check gp docs docs-serve format bench package fuzz audit clean

@@ -26,6 +26,7 @@ PYDANTIC = re.compile(
 BARE = {
     "joints", "safety_factor", "payload_factors", "restarts", "weight", "axis", "points", "to", "gear_ratio",
     "reference_point", "resolution", "restrict", "grid", "range", "orientation", "count", "share", "at_voltages",
+    "load_friction", "scale",
 }  # fmt: skip
 
 
@@ -52,8 +53,8 @@ def space_fault(text: str) -> str:
          'targets[0].tolerance: expected a number [m], got "1 mm"; try 0.001'),
         ('name: t\ntargets: ["0.3, 0, 0.2"]',
          'targets[0]: expected three numbers [m] or a record with the keys name, position, axis, orientation, '
-         'tolerance, angle_tolerance, weight, got "0.3, 0, 0.2"; try [0.3, 0.0, 0.2]'),
-        ("name: t\ntargets: [0.3, 0, 0.2]", "angle_tolerance, weight, got 0.3; try [[0.3, 0, 0.2]]"),
+         'tolerance, angle_tolerance, weight, on, into, got "0.3, 0, 0.2"; try [0.3, 0.0, 0.2]'),
+        ("name: t\ntargets: [0.3, 0, 0.2]", "angle_tolerance, weight, on, into, got 0.3; try [[0.3, 0, 0.2]]"),
         ("name: t", "targets: expected a list, each entry three numbers [m] or a record with the keys name,"),
         (TARGETS + "payload: 200 g", 'a record with the keys mass, center, size, inertia, got "200 g"; try 0.2'),
         (TARGETS + "tool: {tip: [0, 0, 2000]}", "tip[2]: expected a number of at most 1000 m, got 2000"),

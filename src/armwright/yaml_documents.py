@@ -20,12 +20,12 @@ MAX_NODES = 400_000  # values in a document; 10,000 targets with all their keys 
 
 def read_document(path: Path, schema: type[Schema], error: type[Exception]) -> Schema:
     """Read a YAML file as a value of `schema`; raise `error` with a one-line message if it is not one."""
-    return parse_document(read_text(path, MAX_BYTES, error), schema, error, str(path))
+    return parse_document(read_text(path, MAX_BYTES, error), schema, error, path)
 
 
-def parse_document(text: str, schema: type[Schema], error: type[Exception], where: str) -> Schema:
-    """Parse YAML text as a value of `schema`; `where` names it in messages."""
-    data = load_document(text, error, where)
+def parse_document(text: str, schema: type[Schema], error: type[Exception], where: str | Path) -> Schema:
+    """Parse YAML text as a value of `schema`; `where` names it in messages, and files beside it if it is a path."""
+    data = load_document(text, error, str(where))
     if not isinstance(data, dict):
         raise error(f"{where} must hold keys and values ({', '.join(document_keys(schema))}), one a line")
     return check_document(cast("dict[Any, Any]", data), schema, error, where)
@@ -39,13 +39,13 @@ def load_document(text: str, error: type[Exception], where: str) -> Any:
         raise error(f"{where} is not valid YAML: {_yaml_fault(fault)}") from fault
 
 
-def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str) -> Schema:
-    """Validate `data` as a value of `schema`; `where` names it in messages."""
+def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str | Path) -> Schema:
+    """Validate `data` as a value of `schema`; `where` names it in messages, and files beside it if it is a path."""
     for key in data:
         if key not in document_keys(schema) and schema.model_config.get("extra") != "allow":
             raise error(f"{where}: {describe_unknown_key(str(key), (), schema)}")
     try:
-        return schema.model_validate(data)
+        return schema.model_validate(data, context=where.parent if isinstance(where, Path) else None)
     except ValidationError as fault:
         raise error(f"{where}: {describe_fault(fault, schema, data)}") from fault
 

@@ -15,12 +15,12 @@ from armwright.kinematics.contact.clearance import clearances
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.design_space import paper_space
-from armwright.tasks.obstacles import Box, Cylinder, Ground, Obstacle, Sphere
+from armwright.tasks.obstacles import Box, Cylinder, Ground, Mesh, Obstacle, Sphere
 from tests.support.arms import moving_arms
 
 Array = NDArray[np.float64]
 NEAR = 1e-4  # [m], to which float32 is asked to agree; the oracle's own tolerance is 1e-6
-SHAPES = ("box", "sphere", "cylinder", "ground")
+SHAPES = ("box", "sphere", "cylinder", "ground", "mesh")
 
 
 def random_obstacle(rng: np.random.Generator, kind: str, spread: float = 0.7, size: float = 1.0) -> Obstacle:
@@ -34,6 +34,10 @@ def random_obstacle(rng: np.random.Generator, kind: str, spread: float = 0.7, si
         axis = tuple(rng.normal(size=3).tolist())
         radius, height = (size * rng.uniform(0.02, 0.3, 2)).tolist()
         return Cylinder(kind="cylinder", center=center, radius=radius, height=height, axis=axis)
+    if kind == "mesh":
+        corners = tuple(map(tuple, (size * rng.uniform(0.02, 0.2, 3) * rng.normal(size=(30, 3))).tolist()))
+        rpy = tuple(rng.uniform(-3.0, 3.0, 3).tolist())
+        return Mesh(kind="mesh", mesh="fixture.stl", points=corners, position=center, rpy=rpy)
     return Ground(kind="ground", z=float(rng.uniform(-spread, spread)))
 
 
@@ -50,6 +54,11 @@ def coal_shape(obstacle: Obstacle) -> tuple[Any, coal.Transform3s]:
             return coal.Cylinder(obstacle.radius, obstacle.height), at
         case Ground():
             return coal.Halfspace(np.array([0.0, 0.0, 1.0]), obstacle.z), coal.Transform3s.Identity()
+        case Mesh():
+            corners = coal.StdVec_Vec3s()
+            corners.extend(obstacle.scale * np.array(obstacle.points))
+            at = coal.Transform3s(solid.rotation, np.array(obstacle.position))
+            return coal.Convex.convexHull(corners, False, "Qt"), at
 
 
 def capsule(start: Array, end: Array, radius: float) -> tuple[Any, coal.Transform3s]:

@@ -77,13 +77,15 @@ def test_torque_terms_agree_with_pinocchio(dof: int, kind: str) -> None:
     terms = torque_terms(found.paths, found.task.payloads.max())
     carried = {motion.carries for motion in found.plan.motions}
     assert carried == {True, False}
-    for group, of_motions in zip(found.paths.groups, terms, strict=True):
+    for group, own in zip(found.paths.groups, terms, strict=True):
         for at, row in enumerate(group.index):
-            arm = found.arms[row]
-            for path, part in zip(group.paths, of_motions, strict=True):
+            arm, ends = found.arms[row], np.cumsum(group.counts)
+            for path, last in zip(group.paths, ends, strict=True):
                 peer = loaded_peer(arm, found.task.payload, path.motion.carries)
                 some = np.linspace(0, len(path.share) - 1, 4).astype(int)
-                q, q_s, q_ss = (own_joints(arm, values[at, some]) for values in (path.q, part.q_s, part.q_ss))
+                samples = last - path.q.shape[1] + some
+                q = own_joints(arm, path.q[at, some])
+                q_s, q_ss = (own_joints(arm, values) for values in own.states[at, samples].swapaxes(0, 1))
                 still = np.zeros_like(q)
                 gravity = rnea(peer, q, still, still)
                 push = np.array([peer.mass_matrix(a) @ b for a, b in zip(q, q_s, strict=True)])
@@ -96,9 +98,9 @@ def test_torque_terms_agree_with_pinocchio(dof: int, kind: str) -> None:
                     drag - rnea(bare, q, q_s, q_ss) + resting,
                     push - np.array([bare.mass_matrix(a) @ b for a, b in zip(q, q_s, strict=True)]),
                 )
-                pairs = ((part.gravity, gravity), (part.drag, drag), (part.push, push))
-                for mine, theirs in (*pairs, *zip(part.payload, added, strict=True)):
-                    assert own_joints(arm, mine[at, some]) == pytest.approx(theirs, rel=1e-7, abs=1e-8 * size)
+                ours = own.torques[at, samples].swapaxes(0, 1)
+                for mine, theirs in zip(ours, (gravity, drag, push, *added), strict=True):
+                    assert own_joints(arm, mine) == pytest.approx(theirs, rel=1e-7, abs=1e-8 * size)
 
 
 @pytest.mark.parametrize(("dof", "kind"), CASES)

@@ -92,7 +92,7 @@ class ExportedTip:
 def test_clearance_of_tool_and_payload_agrees_with_coal(tool: Tool) -> None:
     arms = [with_tool(SPACE.arm(design), tool) for design in SPACE.sample(25, 1)]
     rng = np.random.default_rng(2)
-    obstacles = [random_obstacle(rng, kind, 1.0, 0.8) for kind in ("box", "sphere", "cylinder", "box")]
+    obstacles = [random_obstacle(rng, kind, 1.0, 0.8) for kind in ("box", "sphere", "cylinder", "mesh")]
     q = postures(arms, 6, 3)
     allowed = rng.choice([APART, 0.0, 0.01, np.inf], (6, 4), p=[0.6, 0.2, 0.1, 0.1])
     rules = TipRules(rng.random(6) < 0.7, allowed, tip_solids(tool, LOAD))

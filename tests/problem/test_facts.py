@@ -32,7 +32,7 @@ def test_records_state_values_or_reasons(tmp_path: Path) -> None:
     assert all(fact["explanation"].endswith(".") for fact in facts.values())
     assert facts["dexterous_volume"]["reason"] == "the task has no workspace with directions"
     assert 0.0 < mean < peak < 5 * 4.4
-    text = f"{peak:.3g} A peak, {mean:.3g} A mean, at 12 V"
+    text = f"{peak:.3g} A peak, {mean:#.3g} A mean, at 12 V"
     assert f"supply along its cycle: {text}" in armwright("pick", tmp_path).stdout
 
 

@@ -120,3 +120,22 @@ def test_mass_of_a_tool_counts_as_in_pinocchio(arm: Any) -> None:
         assert solved.torque[0, 0, own] == pytest.approx(peer.gravity(q), rel=1e-8, abs=1e-8 * load(held))
         assert peer_of(held).gravity(q) == pytest.approx(peer.gravity(q), rel=1e-8, abs=1e-8 * load(held))
         assert peer_of(held).mass_matrix(q) == pytest.approx(peer.mass_matrix(q), rel=1e-8, abs=1e-8 * load(held))
+
+
+@pytest.mark.parametrize("body", [{"size": (0.06, 0.04, 0.1)}, {"radius": 0.03}], ids=["box", "cylinder"])
+def test_tool_without_stated_inertia_has_that_of_its_body(body: Any) -> None:
+    """Pinocchio has formulas of its own for boxes and cylinders."""
+    tool = Tool(tip=(0.02, -0.03, 0.1), rpy=(0.4, -0.3, 2.0), mass=0.7, center=(0.03, 0.01, 0.06), **body)
+    arm = paper_space().arm(paper_space().sample(1, 0)[0], Tool())
+    found = np.array(with_tool(arm, tool).tool.inertia)
+    # The frame of the tool is that of the bare arm's tip.
+    z, x = np.array(arm.tool.axis), np.array(arm.tool.side)
+    frame = np.column_stack([x, np.cross(z, x), z])
+    if "size" in body:
+        expected, axes = pinocchio.Inertia.FromBox(0.7, *body["size"]).inertia, rotation_from_rpy(*tool.rpy)
+    else:
+        expected = pinocchio.Inertia.FromCylinder(0.7, body["radius"], float(np.linalg.norm(tool.tip))).inertia
+        axes = pinocchio.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(tool.tip)).matrix()
+    assert found == pytest.approx(frame @ axes @ expected @ axes.T @ frame.T, abs=1e-15)
+    stated = with_tool(arm, tool.model_copy(update={"inertia": HELD.inertia})).tool.inertia
+    assert np.array(stated) == pytest.approx(frame @ np.diag(HELD.inertia) @ frame.T, abs=1e-15)

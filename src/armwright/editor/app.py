@@ -151,7 +151,7 @@ class Editor:
     async def design(self, body: DesignBody) -> Response:
         if self._job is not None and self._job.is_running:
             return PlainTextResponse("a search is running; stop it first", status_code=409)
-        name = parse_document(body.task, Task, TaskError, str(self._files.task)).name
+        name = parse_document(body.task, Task, TaskError, self._files.task).name
         await asyncio.to_thread(self._files.save, body.texts, body.overwrite)
         self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
         self._live = Router(LivePage(self._job.folder).routes())

@@ -45,7 +45,7 @@ def assess(texts: Texts, files: EditedFiles) -> Assessment:
         attempt(lambda: load_document(texts.space, SpaceError, names[1])),
     ]
     faults.clear()  # they come again
-    task: Task | None = attempt(lambda: parse_document(texts.task, Task, TaskError, names[0]))
+    task: Task | None = attempt(lambda: parse_document(texts.task, Task, TaskError, files.task))
     space: DesignSpace | None = attempt(lambda: parse_document(texts.space, DesignSpace, SpaceError, names[1]))
     problem: Problem | None = None
     if task is not None and space is not None:

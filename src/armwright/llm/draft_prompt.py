@@ -65,7 +65,10 @@ def draft_schema() -> dict[str, Any]:
     actuators["items"] = {"type": "string", "enum": list(catalogue())}
     schema["$defs"]["LinkSection"]["properties"]["material"] = {"type": "string", "enum": list(MATERIALS)}
     del schema["$defs"]["DesignSpace"]["properties"]["parameters"]  # only evaluators use them
-    for record in ("ActuatorRecord", "Material"):
+    obstacle = schema["$defs"]["Task"]["properties"]["obstacles"]["items"]
+    del obstacle["discriminator"]  # each kind has its own constant
+    obstacle["oneOf"].remove({"$ref": "#/$defs/Mesh"})  # whose file a model does not have
+    for record in ("ActuatorRecord", "Material", "Mesh"):
         del schema["$defs"][record]
     return schema
 

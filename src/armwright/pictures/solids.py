@@ -64,6 +64,8 @@ def _faces(solid: Solid) -> list[tuple[Array, float]]:
     """Return the faces (F, n, 3) of a solid in its own frame, in half sides, and the widths of their outlines [pt]."""
     square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     match solid.shape:
+        case "mesh":
+            return [(solid.hull.triangles / solid.half, 0.0)]
         case "ground":
             return [(np.insert(square, 2, 0.0, axis=1)[None], EDGE)]
         case "box":

@@ -77,7 +77,7 @@ class Evaluation(Scene):
         return None if self.cycle_paths is None else self.cycle_paths.entry
 
     @cached_property
-    def torque_terms(self) -> list[tuple[TorqueTerms, ...]]:
+    def torque_terms(self) -> list[TorqueTerms]:
         """Terms of the torques along the cycle, for each group of arms."""
         return torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=self.has_bearing_limits)
 
@@ -90,7 +90,7 @@ class Evaluation(Scene):
     @cached_property
     def loads(self) -> CycleLoads:
         """Durations, torques and speeds along the cycle; SettingsError if a duration is not known."""
-        return cycle_loads(self.paths, self.torque_terms, self.durations)
+        return cycle_loads(self.paths, self.torque_terms, self.durations, self.device)
 
     @cached_property
     def reserves(self) -> Reserves:
@@ -169,9 +169,9 @@ class Evaluation(Scene):
     def motion_bearing_loads(self) -> Array:
         """(N, M, J, 3) the same in each motion of the cycle; SettingsError if a duration is not known."""
         terms = self.torque_terms
-        if not terms[0][0].wrenches.size:
+        if not terms[0].wrenches.size:
             terms = torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=True)
-        return cycle_bearing_loads(self.paths, terms, self.loads.durations)
+        return cycle_bearing_loads(self.paths, terms, self.loads.durations, self.device)
 
     def largest_on_motions(self, along: Array, at_targets: Array | float = 0.0) -> Array:
         """Return (N, T, ...) the larger of a target's value and those of the motions (N, M, ...) of steps to it."""

@@ -95,7 +95,7 @@ def path_record(evaluation: Evaluation, row: int) -> dict[str, Any]:
     if paths is None:
         return {}
     extremes = {name: asdict(extreme) for name, extreme in path_extremes(paths, row).items()}
-    branches = [] if paths.branches is None else paths.branches[row].tolist()
+    branches: list[int] = [] if paths.branches is None else paths.branches[row].tolist()
     return {"path": {**extremes, "jumps": jumping_steps(paths, row), "branches": branches}}
 
 

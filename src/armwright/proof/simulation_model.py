@@ -81,7 +81,7 @@ def to_simulation_mjcf(
         SubElement(option, "flag", filterparent="disable")
     SubElement(SubElement(root, "default"), "geom", {**TOUCHES_NOTHING, "mass": "0"})
     world = add_scene(root, arm)
-    _add_obstacles(world, scene.obstacles)
+    _add_obstacles(root, world, scene.obstacles)
     _add_targets(world, scene, target_names, arm)
     body = SubElement(world, "body", name="base", pos=numbers(arm.base))
     if arm.column is not None:
@@ -144,13 +144,17 @@ def uncounted_pairs(arm: Arm) -> Iterator[tuple[int, int]]:
                 yield i, j
 
 
-def _add_obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
+def _add_obstacles(root: Element, world: Element, obstacles: Sequence[Obstacle]) -> None:
     names = Counter(obstacle.name for obstacle in obstacles)
     for index, obstacle in enumerate(obstacles, start=1):
         solid = obstacle.solid
         label = obstacle.name if obstacle.name and names[obstacle.name] == 1 else f"{obstacle.name}{index}"
-        bits = {"contype": str(OBSTACLE), "conaffinity": "0"}
-        SubElement(world, "geom", {"name": f"obstacle_{label}", **_geom(solid), **bits, "rgba": COLOURS["obstacle"]})
+        geom = {"name": f"obstacle_{label}", **_geom(solid), "contype": str(OBSTACLE), "conaffinity": "0"}
+        if solid.shape == "mesh":  # MuJoCo takes its convex hull
+            geom |= {"mesh": geom["name"]}
+            vertex = numbers(solid.hull.corners.ravel().tolist())
+            SubElement(SubElement(root, "asset"), "mesh", name=geom["name"], vertex=vertex)
+        SubElement(world, "geom", {**geom, "rgba": COLOURS["obstacle"]})
 
 
 def _geom(solid: Solid) -> dict[str, str]:
@@ -159,6 +163,7 @@ def _geom(solid: Solid) -> dict[str, str]:
         "box": solid.half,
         "sphere": solid.half[:1],
         "cylinder": (solid.half[0], solid.half[2]),
+        "mesh": solid.half,  # ignored
         "ground": (0.0, 0.0, 0.1),  # of a plane without end, and the spacing of its grid
     }[solid.shape]
     place = {"pos": numbers(solid.centre), "xyaxes": numbers(solid.rotation[:, :2].T.ravel().tolist())}

@@ -10,6 +10,7 @@ from armwright.arrays import Array
 from armwright.robot.arm import Arm, MountedTool, Vector
 from armwright.rotations import rotation_from_rpy
 from armwright.spaces.joint_modules import DIRECTIONS, MOUNTS, Mount, mounted_vector
+from armwright.tasks.tip_rules import tip_solids
 from armwright.tasks.tool import NO_TOOL, Tool
 
 
@@ -41,14 +42,17 @@ def _mount_frame(mount: Mount) -> Array:
 
 def _mounted(tool: Tool, frame: Array, start: Array) -> MountedTool:
     """Return a tool whose own frame has these axes (3, 3) and this origin (3,) [m] in the frame of the last link."""
-    tip_frame = frame @ rotation_from_rpy(*tool.rpy)
+    tip_frame, body = frame @ rotation_from_rpy(*tool.rpy), tip_solids(tool, None).get("tool")
+    axes, moments = frame, np.array(tool.inertia)
+    if body is not None and not any(tool.inertia):
+        axes, moments = tip_frame @ body.rotation, tool.mass * body.gyration
     return MountedTool(
         tip=_vector(start + frame @ tool.tip),
         axis=_vector(tip_frame[:, 2]),
         side=_vector(tip_frame[:, 0]),
         mass=tool.mass,
         com=_vector(start + frame @ tool.center),
-        inertia=_tensor(frame @ np.diag(tool.inertia) @ frame.T),
+        inertia=_tensor(axes @ np.diag(moments) @ axes.T),
     )
 
 

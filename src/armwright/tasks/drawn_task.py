@@ -26,4 +26,4 @@ def drawn_task(task: Task) -> dict[str, Any]:
 
 
 def _drawn(solid: Solid) -> dict[str, Any]:
-    return {**asdict(solid), "rotation": solid.rotation.tolist()}
+    return asdict(solid) | {"rotation": solid.rotation.tolist(), "hull": solid.hull.triangles.tolist()}

@@ -1,17 +1,19 @@
 """Solid convex obstacles that the arm should keep away from, as in task files."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self, get_args
+from pathlib import PurePath
+from typing import Annotated, Any, Literal, Self, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, ValidationInfo, model_validator
 
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
+from armwright.tasks.meshes import MAX_CORNERS, NO_HULL, Corners, Hull, read_hull, scaled_hull
 from armwright.tasks.moments import describe_vector
 from armwright.tasks.targets import Angle, Coordinate, Direction, ObstacleName, Point, Position, Size
 
-Shape = Literal["box", "sphere", "cylinder", "ground"]
+Shape = Literal["box", "sphere", "cylinder", "ground", "mesh"]
 
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 MAX_OBSTACLES = 100
@@ -24,18 +26,30 @@ class Solid:
     shape: Shape  # kind of the shape
     centre: Point  # origin of the frame in the world [m]; a point of the surface for the ground
     rotation: NDArray[np.float64]  # (3, 3) the axes of the frame in the world as columns
-    # Half the sides of a box; radius, radius and half the height of a cylinder; three radii of a sphere [m].
-    # Zeros for the ground, which fills everything below its x and y axes.
+    # Half the sides of a box, or of one around a mesh; radius, radius and half the height of a cylinder; three radii of
+    # a sphere [m]. Zeros for the ground, which fills everything below its x and y axes.
     half: Point
+    hull: Hull = NO_HULL  # of a mesh [m]
+
+    @property
+    def gyration(self) -> NDArray[np.float64]:
+        """(3,) moments of inertia of a uniform box or cylinder about its centre, around its axes, per mass [m²]."""
+        squares = np.square(self.half) / (3.0 if self.shape == "box" else (4.0, 4.0, 3.0))  # mean squares along x, y, z
+        return squares.sum() - squares
 
     def contains(self, points: NDArray[np.float64], depth: float = 0.0) -> NDArray[np.bool_]:
         """Return (N,) True for the points (N, 3) [m] that are deeper than `depth` [m] below the surface."""
         return self.signed_distance(points) < -depth
 
     def signed_distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the (N,) distances of points (N, 3) from the surface [m]; inside, minus the depth."""
+        """Return the (N,) distances of points (N, 3) from the surface [m]; inside, minus the depth.
+
+        Outside a mesh, that from the nearest plane of a face, which is at most the distance.
+        """
         local, half = (points - self.centre) @ self.rotation, np.array(self.half)
         match self.shape:
+            case "mesh":
+                return (local @ self.hull.planes[:, :3].T - self.hull.planes[:, 3]).max(axis=1)
             case "ground":
                 return local[:, 2]
             case "sphere":
@@ -140,4 +154,53 @@ class Ground(Record, frozen=True):
         return f"ground, solid everywhere below z = {self.z:g} m"
 
 
-Obstacle = Annotated[Box | Sphere | Cylinder | Ground, Field(discriminator="kind")]
+class Mesh(Record, frozen=True):
+    """The convex hull of a mesh. Its file is read with that of the task, which holds its corners from then on."""
+
+    kind: Literal["mesh"]
+    mesh: str = Field(max_length=200)  # the file, beside that of the task or in a folder there
+    position: Position = (0.0, 0.0, 0.0)  # of the file's origin [m]
+    rpy: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)  # of the file's axes about the fixed x, then y, then z
+    scale: Size = 1.0  # length of the file's unit [m]
+    points: Corners = Field(min_length=4, max_length=MAX_CORNERS)  # corners of the hull, in the file
+    source: str = Field(default="convex hull", max_length=300)  # what it is the hull of
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, given: Any, info: ValidationInfo) -> Any:
+        if not isinstance(given, dict) or "points" in given or not isinstance(given.get("mesh"), str):
+            return cast("Any", given)
+        record = cast("dict[str, Any]", given)
+        file = PurePath(record["mesh"])
+        if info.context is None or file.is_absolute() or ".." in file.parts:
+            raise ValueError(f"mesh: expected a file beside a task file or in a folder there, got {file}")
+        points, source = read_hull(info.context / file)
+        return {**record, "points": points.tolist(), "source": source}
+
+    @model_validator(mode="after")
+    def _check_volume(self) -> Self:
+        scaled_hull(self.points, self.scale)  # raises if it is flat
+        return self
+
+    @property
+    def solid(self) -> Solid:
+        rotation, (middle, hull) = rotation_from_rpy(*self.rpy), scaled_hull(self.points, self.scale)
+        (x, y, z), (a, b, c) = (self.position + rotation @ middle).tolist(), hull.corners.max(axis=0).tolist()
+        return Solid("mesh", (x, y, z), rotation, (a, b, c), hull)
+
+    def _describe(self) -> str:
+        solid = self.solid
+        x, y, z = (2.0 * side for side in solid.half)
+        rotation = f", turned by roll, pitch, yaw {describe_vector(self.rpy)} rad" if any(self.rpy) else ""
+        return f"{self.source}, {x:.3g} x {y:.3g} x {z:.3g} m about {describe_vector(solid.centre)}{rotation}"
+
+
+def _name_kind(record: Any) -> Any:
+    return (
+        {"kind": "mesh", **cast("dict[str, Any]", record)} if isinstance(record, dict) and "mesh" in record else record
+    )
+
+
+Obstacle = Annotated[
+    Annotated[Box | Sphere | Cylinder | Ground | Mesh, Field(discriminator="kind")], BeforeValidator(_name_kind)
+]

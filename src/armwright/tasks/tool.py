@@ -17,7 +17,7 @@ class Tool(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     rpy: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
     mass: Mass = 0.0
     center: Position = (0.0, 0.0, 0.0)  # centre of mass [m]
-    # Moments about the centre of mass, around x, y and z [kg m²]; those of a point mass by default
+    # Moments about the centre of mass, around x, y and z [kg m²]; by default those of its body, uniform, or of a point
     inertia: Moments = (0.0, 0.0, 0.0)
     # Its body, which keeps clear of obstacles and the arm: a box about `center`, with these sides along the axes of the
     # tip frame [m], or a cylinder of this radius from the end of the last link to the tip [m]; none by default

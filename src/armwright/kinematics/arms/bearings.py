@@ -23,9 +23,7 @@ def across_axis(arms: ArmArrays, axis: Array, force: Array, moment: Array) -> Ar
     any frames.
     """
     shape = len(arms), *(1,) * (force.ndim - 3), arms.dof, 1
-    offset = np.zeros(shape)
-    if arms.actuation is not None:
-        offset = np.nan_to_num(arms.actuation.bearing_offset).reshape(shape)
+    offset = bearing_offsets(arms).reshape(shape)
     axial = (force * axis).sum(axis=-1, keepdims=True) * axis
     tilting, lever = moment - (moment * axis).sum(axis=-1, keepdims=True) * axis, offset * np.cross(axis, force)
     turns = (arms.motion < PRISMATIC).reshape(*shape, 1)
@@ -38,21 +36,9 @@ def bearing_loads(across: Array) -> Array:
     return np.concatenate([size[..., :2].max(axis=-1, keepdims=True), size[..., 2:]], axis=-1)
 
 
-def largest_bearing_loads(arms: ArmArrays, wrenches: Array) -> Array:
-    """Return the (N, D, 3) largest `bearing_loads` of (N, F, D, 6) forces and moments in the frames of the links.
-
-    There, the axis is one of the frame's: |M ± d a × F|² = |M|² + d² |F|² ± 2 d M·(a × F), of what is across the axis.
-    """
-    along = np.where((arms.motion < PRISMATIC)[..., None], np.eye(3)[arms.motion % PRISMATIC], 0.0)  # (N, D, 3)
-    across = np.where((arms.motion < PRISMATIC)[..., None], 1.0 - along, 0.0)
-    force, moment = wrenches[..., :3], wrenches[..., 3:]
-    axial, radial = (np.einsum("nfdi,nfdi,ndi->nfd", force, force, part) for part in (along, across))
-    tilting = np.einsum("nfdi,nfdi,ndi->nfd", moment, moment, across)
-    if arms.actuation is not None and np.nan_to_num(arms.actuation.bearing_offset).any():
-        offset = np.nan_to_num(arms.actuation.bearing_offset)[:, None]
-        mixed = np.abs((moment * np.cross(along[:, None], force)).sum(axis=-1))
-        tilting += offset**2 * radial + 2.0 * offset * mixed
-    return np.sqrt(np.stack([each.max(axis=1) for each in (tilting, axial, radial)], axis=-1))
+def bearing_offsets(arms: ArmArrays) -> Array:
+    """Return the (N, D) distances of the bearings from the joints along their axes [m]; 0 where they are unknown."""
+    return np.zeros(arms.motion.shape) if arms.actuation is None else np.nan_to_num(arms.actuation.bearing_offset)
 
 
 def bearing_limits(drives: Actuation) -> Array:

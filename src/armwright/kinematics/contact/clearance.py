@@ -114,4 +114,12 @@ def _stacked(solids: Sequence[Solid]) -> dict[str, NDArray[Any]]:
         "centre": np.array([solid.centre for solid in solids]).reshape(-1, 3),
         "into": np.array([solid.rotation.T for solid in solids]).reshape(-1, 3, 3),
         "half": np.array([solid.half for solid in solids]).reshape(-1, 3),
+        "corners": _padded([solid.hull.corners for solid in solids], 3),
+        "planes": _padded([solid.hull.planes for solid in solids], 4),
     }
+
+
+def _padded(rows: Sequence[Array], width: int) -> Array:
+    """Return rows (n_i, width) as one array (N, n, width), the shorter ones repeated."""
+    n = max((len(row) for row in rows), default=0)
+    return np.array([np.resize(row, (n, width)) for row in rows]).reshape(len(rows), n, width)

@@ -14,7 +14,8 @@ import warp as wp
 from armwright.kinematics.arms.arm_arrays import FIXED, Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
-from armwright.kinematics.contact.solid_math import CYLINDER, solid_math
+from armwright.kinematics.contact.convex_math import SEGMENT, convex_math
+from armwright.kinematics.contact.solid_math import CYLINDER, MESH, solid_math
 
 
 @cache
@@ -22,7 +23,7 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
     """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
     base = frame_math(precision)
     real, Vector3, advance = base.real, base.Vector3, base.advance
-    solid = solid_math(precision)
+    solid, separation = solid_math(precision), convex_math(precision).separation
     Posed, Solids = solid.Posed, solid.Solids
     signed_distance, along_segment, nearer_link = solid.signed_distance, solid.along_segment, solid.nearer_link
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
@@ -100,6 +101,15 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
                 between += other_length
         clearance[arm, target] = nearest
 
+    @wp.func
+    def from_axis(p: Vector3, v: Vector3, solids: Solids, o: int, enough: real):
+        """Return the distance of the segment from p to p + v from an obstacle, in the obstacle's frame."""
+        h, shape, size = half * v, solids.shape[o], solids.half[o]
+        if shape == wp.static(MESH):
+            unturned = wp.identity(n=3, dtype=real)
+            return separation(-(p + h), wp.static(SEGMENT), h, unturned, shape, size, solids, o, enough)
+        return along_segment(shape, p, v, size)
+
     @kernel
     def obstacle_clearance(arms: Posed, solids: Solids, clearance: wp.array2d(dtype=real)):
         """Lower (N, T) clearances to the distance of a link from an obstacle."""
@@ -122,8 +132,8 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
                         # No point of the link is nearer than this: distance changes by no more than the path length.
                         bound = signed_distance(solids.shape[o], p + half * v, solids.half[o]) - half * wp.length(v)
                         if bound - r < nearest:
-                            distance = along_segment(solids.shape[o], p, v, solids.half[o]) - r
-                            mounted = j == 0 and signed_distance(solids.shape[o], base, solids.half[o]) <= r
+                            distance = from_axis(p, v, solids, o, nearest + r) - r
+                            mounted = j == 0 and from_axis(base, Vector3(), solids, o, two * r) <= r
                             # The first link is always close to what the arm is mounted on: only overlaps count.
                             if not mounted or distance < zero:
                                 nearest = wp.min(nearest, distance)

@@ -1,4 +1,4 @@
-"""Warp functions of the signed distance between two bodies, each a box or a cylinder.
+"""Warp functions of the signed distance of a body, a box or a cylinder, from another one or from an obstacle.
 
 The separation of two convex bodies along a unit vector n is the least n·b - n·a of their points a and b. Its maximum
 over all n is the signed distance: the distance of bodies that are apart, minus the depth of bodies that overlap
@@ -7,7 +7,7 @@ over all n is the signed distance: the distance of bodies that are apart, minus 
 The candidates are those of separating axes: three axes of each body and their nine cross products, where the axes of a
 cylinder are its own and those towards and across the other body. For boxes that overlap, one of them gives the depth
 (Gottschalk et al., SIGGRAPH 1996). If bodies are apart, the algorithm of Gilbert, Johnson & Keerthi (IEEE J. Robotics
-and Automation 4, 1988) finds the maximum.
+and Automation 4, 1988) finds the maximum. For the convex hull of a mesh, the candidates are the normals of its faces.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -20,20 +20,18 @@ import warp as wp
 from armwright.kinematics.arms.arm_arrays import Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.contact.simplex_math import simplex_math
-from armwright.kinematics.contact.solid_math import CYLINDER, GROUND, SPHERE, solid_math
+from armwright.kinematics.contact.solid_math import BOX, CYLINDER, GROUND, MESH, SPHERE, solid_math
 
 ITERATIONS = 40  # of the search for the nearest points; boxes take about 5, cylinders about 15
 ACCURACY = 1e-5  # [m] below the distance at most
+SEGMENT = -2  # shape of the axis of a link; its `half` is half the way from its start to its end
 
 
 @cache
 def convex_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
-    base, simplex, signed_distance = (
-        frame_math(precision),
-        simplex_math(precision),
-        solid_math(precision).signed_distance,
-    )
+    base, simplex, solid = frame_math(precision), simplex_math(precision), solid_math(precision)
+    Solids, signed_distance = solid.Solids, solid.signed_distance
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
     Simplex, nearest_point = simplex.Simplex, simplex.nearest_point
     zero, one = real(0.0), real(1.0)
@@ -41,19 +39,28 @@ def convex_math(precision: Precision) -> SimpleNamespace:
     accuracy = real(ACCURACY)
 
     @wp.func
-    def support(shape: int, half: Vector3, n: Vector3):
-        """Return the point of a body that is farthest along n, in the body's frame."""
+    def support(shape: int, half: Vector3, solids: Solids, o: int, n: Vector3):
+        """Return the point of a body, or of mesh o, that is farthest along n, in its frame."""
         p = Vector3(wp.where(n[0] >= zero, half[0], -half[0]), wp.where(n[1] >= zero, half[1], -half[1]), zero)
         if shape == wp.static(CYLINDER):
             across = wp.sqrt(n[0] * n[0] + n[1] * n[1])
             scale = half[0] / wp.max(across, tiny)
             p = Vector3(scale * n[0], scale * n[1], zero)
         p[2] = wp.where(n[2] >= zero, half[2], -half[2])
+        if shape == wp.static(SEGMENT):
+            p = wp.where(wp.dot(n, half) >= zero, half, -half)
+        if shape == wp.static(MESH):
+            p = solids.corners[o, 0]
+            for i in range(1, solids.corners.shape[1]):
+                if wp.dot(solids.corners[o, i] - p, n) > zero:
+                    p = solids.corners[o, i]
         return p
 
     @wp.func
     def extent(shape: int, half: Vector3, n: Vector3):
         """Return how far a body reaches from its middle along n."""
+        if shape == wp.static(SEGMENT):
+            return wp.abs(wp.dot(n, half))
         x, y = wp.abs(n[0]) * half[0], wp.abs(n[1]) * half[1]
         if shape == wp.static(CYLINDER):
             x = half[0] * wp.sqrt(n[0] * n[0] + n[1] * n[1])
@@ -103,19 +110,38 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         return n, best
 
     @wp.func
-    def separation(d: Vector3, shape: int, half: Vector3, into: Matrix3, other: int, other_half: Vector3, enough: real):
+    def best_face(d: Vector3, shape: int, half: Vector3, into: Matrix3, solids: Solids, o: int):
+        """Return `best_axis` of a body and the convex hull of mesh o."""
+        n, best = Vector3(), real(-1.0e30)
+        for i in range(solids.planes.shape[1]):
+            plane = solids.planes[o, i]
+            m = wp.transpose(into) * Vector3(plane[0], plane[1], plane[2])
+            found = -wp.dot(m, d) - plane[3] - extent(shape, half, m)
+            if found > best:
+                n, best = -m, found
+        return n, best
+
+    @wp.func
+    def separation(
+        d: Vector3, shape: int, half: Vector3, into: Matrix3, other: int, other_half: Vector3, solids: Solids, o: int,
+        enough: real,
+    ):  # fmt: skip
         """Return the signed distance of two bodies, in the frame of the first one.
 
-        d: middle of the other body.  into: rotation into the other body's frame.  enough: a lower bound of this size
-        ends the search.
+        d: middle of the other body.  into: rotation into the other body's frame.  o: index of the other body if it is a
+        mesh.  enough: a lower bound of this size ends the search.
         """
-        n, bound = best_axis(d, shape, half, into, other, other_half)
-        # If one is a cylinder, no candidate may separate bodies that are apart.
-        boxes = shape != wp.static(CYLINDER) and other != wp.static(CYLINDER)
+        n, bound = Vector3(), real(0.0)
+        if other == wp.static(MESH):
+            n, bound = best_face(d, shape, half, into, solids, o)
+        else:
+            n, bound = best_axis(d, shape, half, into, other, other_half)
+        # If one is no box, no candidate may separate bodies that are apart.
+        boxes = shape == wp.static(BOX) and other == wp.static(BOX)
         if bound >= enough or (boxes and bound <= zero):
             return bound
         back = wp.transpose(into)
-        v = d + back * support(other, other_half, into * -n) - support(shape, half, n)
+        v = d + back * support(other, other_half, solids, o, into * -n) - support(shape, half, solids, o, n)
         s = Simplex()
         s[0] = v
         size = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
@@ -123,7 +149,7 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         for _ in range(wp.static(ITERATIONS)):
             if distance < accuracy:
                 break
-            w = d + back * support(other, other_half, into * -v) - support(shape, half, v)
+            w = d + back * support(other, other_half, solids, o, into * -v) - support(shape, half, solids, o, v)
             bound = wp.max(bound, wp.dot(v, w) / distance)
             if bound > distance - accuracy or bound >= enough:
                 break
@@ -137,15 +163,15 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         return bound
 
     @wp.func
-    def from_obstacle(
-        kind: int, half: Vector3, into: Matrix3, d: Vector3, shape: int, size: Vector3, frame: Matrix3, enough: real
-    ):
-        """Return the distance of a body from an obstacle whose middle is at d from the body's, in the world."""
+    def from_obstacle(place: Vector3, kind: int, half: Vector3, into: Matrix3, solids: Solids, o: int, enough: real):
+        """Return the distance of a body from obstacle o; its middle in the world, and the rotation into its frame."""
+        d, shape, frame = solids.centre[o] - place, solids.shape[o], solids.into[o]
         if shape == wp.static(GROUND):
             up = wp.transpose(frame) * Vector3(zero, zero, one)
             return -wp.dot(d, up) - extent(kind, half, into * up)
         if shape == wp.static(SPHERE):
-            return signed_distance(kind, into * d, half) - size[0]
-        return separation(into * d, kind, half, frame * wp.transpose(into), shape, size, enough)
+            return signed_distance(kind, into * d, half) - solids.half[o][0]
+        turn = frame * wp.transpose(into)
+        return separation(into * d, kind, half, turn, shape, solids.half[o], solids, o, enough)
 
     return SimpleNamespace(separation=separation, from_obstacle=from_obstacle)

@@ -66,13 +66,6 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
             return -1
         return motors.shape[arm, body]
 
-    @wp.func
-    def from_link(
-        nearest: real, shape: int, half: Vector3, middle: Vector3, into: Matrix3, a: Vector3, b: Vector3, radius: real
-    ):
-        """Return the smaller of a distance and that of a body from a link with the axis from a to b."""
-        return nearer_link(nearest, shape, half, into * (a - middle), into * (b - a), radius)
-
     @kernel
     def self_clearance(arms: Posed, motors: Motors, clearance: wp.array2d(dtype=real)):
         """Lower (N, T) clearances to the distance of a body from other bodies and from links that it does not join.
@@ -92,7 +85,9 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                     if r > zero:
                         if links_between > 0:
                             start, end = arms.starts[arm, target, k], arms.ends[arm, target, k]
-                            nearest = from_link(nearest, kind, size, place, frame, start, end, r)
+                            nearest = nearer_link(
+                                nearest, kind, size, frame * (start - place), frame * (end - start), r
+                            )
                         links_between += 1
                 for j in range(i + 1, motors.shape.shape[1]):
                     other = kind_of(motors, arm, target, j)
@@ -101,7 +96,8 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                         other_size = motors.half[arm, j]
                         if wp.length(d) - wp.length(size) - wp.length(other_size) < nearest:
                             between = motors.into[arm, target, j] * wp.transpose(frame)
-                            found = separation(frame * d, kind, size, between, other, other_size, nearest)
+                            d = frame * d
+                            found = separation(d, kind, size, between, other, other_size, Solids(), 0, nearest)
                             nearest = wp.min(nearest, found)
                 links_before = int(0)  # noqa: RUF046, UP018
                 n_joints = int(0)  # noqa: RUF046, UP018
@@ -113,7 +109,8 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                         first, last = arms.starts[arm, target, k], arms.ends[arm, target, k]
                         # A link whose round end reaches up to the tool always touches it.
                         if links_before > 0 and n_joints > 0 and (i < dof or reach > r):
-                            nearest = from_link(nearest, kind, size, place, frame, first, last, r)
+                            d = frame * (first - place)
+                            nearest = nearer_link(nearest, kind, size, d, frame * (last - first), r)
                         reach += wp.length(last - first)
                         links_before += 1
                     if arms.motion[arm, k] < wp.static(FIXED):
@@ -135,10 +132,9 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                     allowed = real(-1.0)
                     if j >= dof:
                         allowed = motors.allowed[target, o]
-                    d, turn = solids.centre[o] - place, solids.into[o]
-                    bound = signed_distance(solids.shape[o], -(turn * d), solids.half[o]) - wp.length(box)
-                    if bound < nearest:
-                        found = from_obstacle(kind, box, frame, d, solids.shape[o], solids.half[o], turn, nearest)
+                    at = -(solids.into[o] * (solids.centre[o] - place))
+                    if signed_distance(solids.shape[o], at, solids.half[o]) - wp.length(box) < nearest:
+                        found = from_obstacle(place, kind, box, frame, solids, o, nearest)
                         found += wp.max(allowed, zero)
                         # A body at rest is always close to what the arm is mounted on, tool and payload to what they
                         # may touch: only overlaps count, and only what is deeper than allowed.
@@ -165,9 +161,8 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                     d = motors.middle[arm, target, j] - centre
                     box = motors.half[arm, j]
                     if signed_distance(wp.static(CYLINDER), d, size) - wp.length(box) < nearest:
-                        found = separation(
-                            d, wp.static(CYLINDER), size, motors.into[arm, target, j], kind, box, nearest
-                        )
+                        frame = motors.into[arm, target, j]
+                        found = separation(d, wp.static(CYLINDER), size, frame, kind, box, Solids(), 0, nearest)
                         nearest = wp.min(nearest, found)
                 if j < arms.motion.shape[1] and arms.motion[arm, j] < wp.static(FIXED):
                     is_at_rest = 0

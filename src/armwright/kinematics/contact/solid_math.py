@@ -15,7 +15,7 @@ from armwright.kinematics.arms.frame_math import frame_math
 from armwright.tasks.obstacles import SHAPES
 
 HALVINGS = 20  # of a link, in the search for its point nearest to a solid: to 1e-6 of its length
-BOX, SPHERE, CYLINDER, GROUND = map(SHAPES.index, ("box", "sphere", "cylinder", "ground"))
+BOX, SPHERE, CYLINDER, GROUND, MESH = map(SHAPES.index, ("box", "sphere", "cylinder", "ground", "mesh"))
 
 
 @cache
@@ -23,6 +23,7 @@ def solid_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
     base = frame_math(precision)
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
+    Vector4 = wp.types.vector(length=4, dtype=real)
     zero, half = real(0.0), real(0.5)
     tiny = real(1e-30)
 
@@ -58,10 +59,12 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         centre: wp.array(dtype=Vector3)  # (O,) [m]
         into: wp.array(dtype=Matrix3)  # (O,) rotation into the solid's frame
         half: wp.array(dtype=Vector3)  # (O,) half sides or radii [m]
+        corners: wp.array2d(dtype=Vector3)  # (O, P) of the hull of a mesh, in its frame [m]; some repeatedly
+        planes: wp.array2d(dtype=Vector4)  # (O, F) likewise of its faces, as of `Hull`
 
     @wp.func
     def signed_distance(shape: int, p: Vector3, size: Vector3):
-        """Return the distance from an obstacle's surface, in the obstacle's frame; inside, minus the depth."""
+        """Return the distance from a surface in its own frame; inside, minus the depth. A mesh counts as its box."""
         if shape == wp.static(GROUND):
             return p[2]
         if shape == wp.static(SPHERE):

@@ -10,15 +10,18 @@ from functools import cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import UnknownQuantityError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.arms.bearings import largest_bearing_loads
+from armwright.kinematics.arms.bearings import bearing_offsets
+from armwright.kinematics.chunks import SAMPLES
 from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
 from armwright.kinematics.cycle.drive_limits import MotionLoad, least_time, motion_load
 from armwright.kinematics.cycle.torque_terms import TorqueTerms
+from armwright.kinematics.devices import Device, load_kernels
 from armwright.tasks.motions import CyclePlan
 
 ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite of rounding
@@ -60,18 +63,19 @@ class CycleLoads:
         return (total.T / self.cycle_time).T
 
 
-def holding_torques(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> Array:
+def holding_torques(paths: CyclePaths, terms: Sequence[TorqueTerms]) -> Array:
     """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
     torques = np.empty((len(paths.jumps), len(paths.plan.motions), paths.instants, paths.groups[0].arms.dof))
-    for group, of_motions in zip(paths.groups, terms, strict=True):
+    for group, own in zip(paths.groups, terms, strict=True):
         density = _density(group)
-        for i, part in enumerate(of_motions):
-            weights, _, _ = _instants(part.gravity.shape[1], density * (paths.instants - 1) + 1)
-            torques[group.index, i] = _thinned(weights @ part.gravity, density)
+        gravity = _at_instants(own.torques[:, :, 0], group.counts, density * (paths.instants - 1) + 1)
+        torques[group.index] = _thinned(gravity, density)
     return torques
 
 
-def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]], kept: Array | None = None) -> CycleLoads:
+def cycle_loads(
+    paths: CyclePaths, terms: Sequence[TorqueTerms], kept: Array | None = None, device: Device = "cpu"
+) -> CycleLoads:
     """Return the loads of N arms along a cycle, by their torque terms from `torque_terms`.
 
     kept: (N, M) durations of the motions [s]; None for those of the cycle and of the drives.
@@ -83,33 +87,38 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]], kep
     m, dof = len(plan.motions), paths.groups[0].arms.dof
     durations, holding = np.empty((n, m)), np.empty((n, m, dof))
     torques, speeds = np.empty((2, n, m, paths.instants, dof))
-    for group, of_motions in zip(paths.groups, terms, strict=True):
-        density = _density(group)
-        loads = [_load(part, group.arms, density * (paths.instants - 1) + 1) for part in of_motions]
-        times = _durations(group.arms, plan, loads, of_motions) if kept is None else kept[group.index]
-        durations[group.index] = times
-        for i, load in enumerate(loads):
-            torques[group.index, i] = _thinned(load.torque(times[:, i]), density)
-            speeds[group.index, i] = _thinned(load.velocity / times[:, i, None, None], density)
-            holding[group.index, i - 1] = of_motions[i].gravity[:, 0]
+    for group, own in zip(paths.groups, terms, strict=True):
+        density, gravity = _density(group), own.torques[:, :, 0]
+        instants = density * (paths.instants - 1) + 1
+        size = max(1, SAMPLES[device] // (m * instants))
+        for rows in (slice(at, at + size) for at in range(0, len(group.index), size)):
+            index, arms = group.index[rows], group.arms[rows]
+            load, heavier = _loads(own[rows], arms, group.counts, instants)
+            times = _durations(arms, plan, load, heavier, device) if kept is None else kept[index]
+            durations[index] = times
+            torques[index] = _thinned(load.torque(times), density)
+            speeds[index] = _thinned(load.velocity / times[:, :, None, None], density)
+        holding[group.index] = gravity[:, np.cumsum(group.counts) % gravity.shape[1]]  # as the next motion begins
         if not plan.cycle.closed:
-            holding[group.index, -1] = of_motions[-1].gravity[:, -1]
+            holding[group.index, -1] = gravity[:, -1]
     return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding)
 
 
-def cycle_bearing_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]], durations: Array) -> Array:
+def cycle_bearing_loads(
+    paths: CyclePaths, terms: Sequence[TorqueTerms], durations: Array, device: Device = "cpu"
+) -> Array:
     """Return the (N, M, D, 3) largest tilting moment [N m], axial and radial force [N] of the joints in each motion.
 
     terms: with wrenches.  durations: (N, M) of the motions [s].
     """
+    loaded = load_kernels("cycle.dynamics_kernels", device)
     largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
-    for group, of_motions in zip(paths.groups, terms, strict=True):
-        for i, part in enumerate(of_motions):
-            weights, rate, change = _instants(part.gravity.shape[1], _density(group) * (paths.instants - 1) + 1)
-            flat = weights @ part.wrenches.reshape(*part.wrenches.shape[:3], -1)  # (3, n, F, D 6)
-            s, ss = rate[:, None] / durations[group.index, i, None, None], change[:, None]
-            total = flat[0] + flat[1] * s**2 + flat[2] * ss / durations[group.index, i, None, None] ** 2
-            largest[group.index, i] = largest_bearing_loads(group.arms, total.reshape(*total.shape[:2], -1, 6))
+    for group, own in zip(paths.groups, terms, strict=True):
+        moments = _instants(group.counts, _density(group) * (paths.instants - 1) + 1)
+        joints, found = (group.arms.motion, bearing_offsets(group.arms)), np.empty_like(largest[group.index])
+        given = (*moments, durations[group.index], *joints, own.wrenches)
+        loaded.launch("bearing_loads", found.shape[:2], *given, outputs=[found])
+        largest[group.index] = found
     return largest
 
 
@@ -119,30 +128,42 @@ def _density(group: CycleGroup) -> int:
 
 
 def _thinned(values: Array, density: int) -> Array:
-    """Return (n, F, D) of values (n, density (F - 1) + 1, D): the largest in magnitude from instant to instant.
+    """Return (..., F, D) of values (..., density (F - 1) + 1, D): the largest in magnitude from instant to instant.
 
     The first and the last one, at rest, stay as they are.
     """
     if density == 1:
         return values
-    nearby = sliding_window_view(values, 2 * density + 1, axis=1)[:, ::density]  # (n, F - 2, D, 2 density + 1)
+    windows = sliding_window_view(values, 2 * density + 1, axis=-2)
+    nearby = windows[..., ::density, :, :]  # (..., F - 2, D, 2 density + 1)
     largest = np.abs(nearby).argmax(axis=-1)[..., None]
-    return np.concatenate([values[:, :1], np.take_along_axis(nearby, largest, axis=-1)[..., 0], values[:, -1:]], axis=1)
+    between = np.take_along_axis(nearby, largest, axis=-1)[..., 0]
+    return np.concatenate([values[..., :1, :], between, values[..., -1:, :]], axis=-2)
 
 
-def _load(terms: TorqueTerms, arms: ArmArrays, instants: int) -> MotionLoad:
-    """Return the load of a motion; the drives' own inertia and friction count where they are known."""
-    weights, s_t, s_tt = _instants(terms.gravity.shape[1], instants)
-    q_s, q_ss, drag, push = (weights @ values for values in (terms.q_s, terms.q_ss, terms.drag, terms.push))
+def _loads(
+    terms: TorqueTerms, arms: ArmArrays, counts: tuple[int, ...], instants: int
+) -> tuple[MotionLoad, MotionLoad]:
+    """Return the loads of all motions as they are and with a heavier payload.
+
+    The drives' own inertia and friction count where they are known.
+    """
+    _, _, s_t, s_tt = _instants(counts, instants)
     rate, change = s_t[:, None], s_tt[:, None]
-    gravity, inertial, velocity = weights @ terms.gravity, drag * rate**2 + push * change, q_s * rate
+    gravity, drag, push, *payload = np.moveaxis(_at_instants(terms.torques, counts, instants), 3, 0)
+    q_s, q_ss = np.moveaxis(_at_instants(terms.states, counts, instants), 3, 0)
+    inertial, velocity = drag * rate**2 + push * change, q_s * rate
     if arms.actuation is None:
         nothing = np.zeros(gravity.shape)
-        return MotionLoad(gravity, nothing, nothing, inertial, velocity, nothing)
-    drives = arms.actuation
-    names = ("rotor_inertia", "coulomb", "viscous", "limit_friction")
-    known = {name: np.nan_to_num(getattr(drives, name)) for name in names}
-    return motion_load(gravity, inertial, velocity, q_ss * rate**2 + q_s * change, replace(drives, **known))
+        load = MotionLoad(gravity, nothing, nothing, inertial, velocity, nothing)
+    else:
+        names = ("rotor_inertia", "coulomb", "viscous", "limit_friction")
+        known = {name: np.nan_to_num(getattr(arms.actuation, name)) for name in names}
+        acceleration = q_ss * rate**2 + q_s * change
+        load = motion_load(gravity, inertial, velocity, acceleration, replace(arms.actuation, **known))
+    more_gravity, more_drag, more_push = (MORE_PAYLOAD * part for part in payload)
+    more_inertial = more_drag * rate**2 + more_push * change
+    return load, replace(load, gravity=gravity + more_gravity, inertial=load.inertial + more_inertial)
 
 
 def quintic(t: Array) -> tuple[Array, Array, Array]:
@@ -151,17 +172,23 @@ def quintic(t: Array) -> tuple[Array, Array, Array]:
     return s, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
 
 
+def _at_instants(values: Array, counts: tuple[int, ...], instants: int) -> Array:
+    """Return (N, M, F, ...) of values at the samples of all motions (N, R, ...), interpolated at F instants of each."""
+    before, share, _, _ = _instants(counts, instants)
+    share = share.reshape(*share.shape, *(1,) * (values.ndim - 2))
+    return (1.0 - share) * values[:, before] + share * values[:, before + 1]
+
+
 @cache
-def _instants(samples: int, instants: int) -> tuple[Array, Array, Array]:
-    """Return (F, R) weights that interpolate between R samples at F instants, and s_τ and s_ττ there (F,)."""
+def _instants(counts: tuple[int, ...], instants: int) -> tuple[NDArray[np.int32], Array, Array, Array]:
+    """Return the sample before each of F instants of M motions, the share of the way to the next (M, F), s_τ and s_ττ.
+
+    counts: Samples of each motion, equally spaced in s.
+    """
     s, rate, change = quintic(np.linspace(0.0, 1.0, instants))
-    at = s * (samples - 1)
-    before = np.minimum(at.astype(np.intp), samples - 2)
-    weights = np.zeros((len(s), samples))
-    rows = np.arange(len(s))
-    weights[rows, before] = 1.0 - (at - before)
-    weights[rows, before + 1] += at - before
-    return weights, rate, change
+    steps = np.array(counts)[:, None] - 1
+    before = np.minimum((s * steps).astype(np.int32), steps - 1)
+    return before + np.cumsum([[0], *steps[:-1] + 1], axis=0, dtype=np.int32), s * steps - before, rate, change
 
 
 def check_durations(drives: Actuation | None, plan: CyclePlan) -> Actuation | None:
@@ -181,33 +208,18 @@ def check_durations(drives: Actuation | None, plan: CyclePlan) -> Actuation | No
     return None
 
 
-def _heavier(load: MotionLoad, terms: TorqueTerms) -> MotionLoad:
-    """Return the load of a motion with a heavier payload."""
-    weights, rate, change = _instants(terms.gravity.shape[1], load.gravity.shape[1])
-    gravity, drag, push = (MORE_PAYLOAD * (weights @ part) for part in terms.payload)
-    inertial = drag * rate[:, None] ** 2 + push * change[:, None]
-    return replace(load, gravity=load.gravity + gravity, inertial=load.inertial + inertial)
-
-
-def _durations(arms: ArmArrays, plan: CyclePlan, loads: Sequence[MotionLoad], terms: Sequence[TorqueTerms]) -> Array:
+def _durations(arms: ArmArrays, plan: CyclePlan, load: MotionLoad, heavier: MotionLoad, device: Device) -> Array:
     """Return the (N, M) durations: the least for torques and speeds, scaled to a step's own time if it states one.
 
     The least ones keep the safety factor, and the makers' limits with less voltage and with a heavier payload. Without
     known torques and speeds, the motions of a step share its time by the largest travel of a joint.
     """
     drives = check_durations(arms.actuation, plan)
-    travel = np.stack([np.abs(load.velocity).max(axis=(1, 2)) for load in loads], axis=1)  # (N, M)
-    durations = travel + 1e-9
+    durations = np.abs(load.velocity).max(axis=(2, 3)) + 1e-9  # (N, M), in proportion to the travel
     if drives is not None:
         bare = drives.at_makers_limits
-        weak = bare.at_voltage(VOLTAGE_SHARE)
-        least = np.stack(
-            [
-                least_time((load, drives), (load, weak), *([(_heavier(load, part), bare)] if motion.carries else []))
-                for motion, load, part in zip(plan.motions, loads, terms, strict=True)
-            ],
-            axis=1,
-        )
+        cases = (load, drives), (load, bare.at_voltage(VOLTAGE_SHARE)), (heavier, bare)
+        least = least_time(*cases[: 3 if any(motion.carries for motion in plan.motions) else 2], device=device)
         durations = np.clip(np.where(np.isfinite(least), ROUNDING * least, MAX_TIME), MIN_TIME, MAX_TIME)
     for step in {motion.step for motion in plan.motions}:
         own = [i for i, motion in enumerate(plan.motions) if motion.step == step]

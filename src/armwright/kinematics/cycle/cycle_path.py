@@ -44,6 +44,11 @@ class CycleGroup:
     paths: tuple[MotionPath, ...]  # their path along each of the M motions
     is_sharp: bool  # whether joints move several times as fast in a short part of a line as on average
 
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Number of samples along each motion."""
+        return tuple(path.q.shape[1] for path in self.paths)
+
 
 @dataclass(frozen=True)
 class CyclePaths:

@@ -10,39 +10,39 @@ share of limits that makers state at the output is 0 (`Actuation.limit_friction`
 """
 
 from dataclasses import dataclass
-from typing import Self
+from itertools import cycle
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.actuation import Actuation
+from armwright.kinematics.devices import Device, load_kernels
 
 MAX_RATE = 1e9  # [1/s] of motions without any limit, which take no time
-ALLOWED = 1.0 + 1e-10  # of a limit relative to the peak torque
+LIMITS = ("safety_factor", "peak", "no_load_speed", "falling_range")  # of `Actuation`, that bound rates
 STILL = 1e-6  # [rad] or [m] in a duration of 1 s; a joint that rests moves by less, from rounding
-ROUNDING = 1e-13  # of a sum relative to its terms
 
 
 @dataclass(frozen=True)
 class MotionLoad:
-    """What a motion of N arms requires of D joints at S samples, for any duration T.
+    """What motions of N arms, such as M of each, require of D joints at S samples, for any duration T.
 
     The torque at a sample is gravity + coulomb + viscous / T + inertial / T², with the friction of the gear if it is in
     the direction of the velocity. The speed is velocity / T. Sliding joints have N, m/s and m instead of N m, rad/s and
     rad.
     """
 
-    gravity: Array  # (N, S, D) [N m]
-    coulomb: Array  # (N, S, D) friction in the direction of the velocity, 0 at rest [N m]
-    viscous: Array  # (N, S, D) friction at T = 1 s [N m s]
-    inertial: Array  # (N, S, D) of links and rotors, with Coriolis terms, at T = 1 s [N m s²]
-    velocity: Array  # (N, S, D) at T = 1 s [rad]
-    gear: Array  # (N, S, D) share of the torque that the gear takes, with the sign of the velocity, 0 at rest
+    gravity: Array  # (N, ..., S, D) [N m]
+    coulomb: Array  # (N, ..., S, D) friction in the direction of the velocity, 0 at rest [N m]
+    viscous: Array  # (N, ..., S, D) friction at T = 1 s [N m s]
+    inertial: Array  # (N, ..., S, D) of links and rotors, with Coriolis terms, at T = 1 s [N m s²]
+    velocity: Array  # (N, ..., S, D) at T = 1 s [rad]
+    gear: Array  # (N, ..., S, D) share of the torque that the gear takes, with the sign of the velocity, 0 at rest
 
     def torque(self, time: Array) -> Array:
-        """Return the (N, S, D) torques [N m] for durations (N,) [s]."""
-        duration = time[:, None, None]
+        """Return the (N, ..., S, D) torques [N m] for durations (N, ...) [s]."""
+        duration = time[..., None, None]
         torque = self.gravity + self.coulomb + self.viscous / duration + self.inertial / duration**2
         return torque * (1.0 + np.maximum(self.gear * np.sign(torque), 0.0))
 
@@ -50,10 +50,12 @@ class MotionLoad:
 def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: Array, drives: Actuation) -> MotionLoad:
     """Return the load of a motion of N arms, with friction and rotor inertia of the drives.
 
-    gravity: (N, S, D) torques that hold the arm [N m].  inertial: (N, S, D) torques that move its links in T = 1 s,
-    without gravity [N m s²].  velocity, acceleration: (N, S, D) of the joints, for T = 1 s [rad].
+    gravity: (N, ..., S, D) torques that hold the arm [N m].  inertial: (N, ..., S, D) torques that move its links in
+    T = 1 s, without gravity [N m s²].  velocity, acceleration: (N, ..., S, D) of the joints, for T = 1 s [rad].
     """
-    coulomb, viscous, rotor = (each[:, None] for each in (drives.coulomb, drives.viscous, drives.rotor_inertia))
+    along = tuple(range(1, gravity.ndim - 1))
+    ratings = (drives.coulomb, drives.viscous, drives.rotor_inertia, drives.limit_friction)
+    coulomb, viscous, rotor, gear = (np.expand_dims(each, along) for each in ratings)
     direction = np.sign(np.where(np.abs(velocity) > STILL, velocity, 0.0))
     return MotionLoad(
         gravity=gravity,
@@ -61,7 +63,7 @@ def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: 
         viscous=viscous * velocity,
         inertial=inertial + rotor * acceleration,
         velocity=velocity,
-        gear=drives.limit_friction[:, None] * direction,
+        gear=gear * direction,
     )
 
 
@@ -89,8 +91,8 @@ def available_torque(torque: Array, velocity: Array, drives: Actuation) -> Array
     return np.where(torque * velocity > 0.0, np.clip(line, 0.0, 1.0), 1.0) * peak
 
 
-def least_time(*cases: tuple[MotionLoad, Actuation]) -> Array:
-    """Return the least durations (N,) of motions of N arms that drives can follow [s]; infinite if there is none.
+def least_time(*cases: tuple[MotionLoad, Actuation], device: Device = "cpu") -> Array:
+    """Return the least durations (N, ...) of motions of N arms that drives can follow [s]; infinite if there is none.
 
     cases: Loads of the motions and their drives, such as with a heavier payload or less voltage; all of them hold.
 
@@ -120,108 +122,23 @@ def least_time(*cases: tuple[MotionLoad, Actuation]) -> Array:
         >>> float(least_time((motion_load(still, still, turn, still, drives), drives))[0])
         0.1
     """
-    first, *others = [_Limits.of(load, drives) for load, drives in cases]
-    holds = np.all([one.hold for one in (first, *others)], axis=0)
-    rate = np.where(holds, np.min([one.fastest for one in (first, *others)], axis=0), -np.inf)
-    rows = np.flatnonzero(holds)
-    while len(rows):
-        first.lower(rate, rows)
-        allowed = rate.copy()
-        for one in others:
-            one.lower(rate, rows)
-        rows = np.flatnonzero((rate < allowed) & (rate > 0.0))
+    *of_motions, _, _ = cases[0][0].gravity.shape
+    loaded, rate = load_kernels("cycle.drive_kernels", device), np.full(of_motions, MAX_RATE).reshape(of_motions[0], -1)
+    known, given = np.ones(of_motions, dtype=bool), list[tuple[Any, Any]]()
+    for load, drives in cases:
+        ratings = np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
+        needed = np.isnan(load.coulomb + load.viscous + load.gear + load.inertial).any(axis=(-2, -1))
+        known &= ~(ratings.reshape(-1, *(1,) * (needed.ndim - 1)) | needed)
+        fields = {name: each.reshape(*rate.shape, *each.shape[-2:]) for name, each in vars(load).items()}
+        limits = {name: getattr(drives, name) for name in LIMITS}
+        given.append((loaded.struct("Load", fields), loaded.struct("Limits", limits)))
+    left = len(given)
+    for case in cycle(given):  # until all others leave what one of them allows
+        before = rate.copy()
+        loaded.launch("lower_rates", rate.shape, *case, outputs=[rate])
+        left = len(given) - 1 if (rate < before).any() else left - 1
+        if not left:
+            break
     with np.errstate(divide="ignore", over="ignore"):
-        time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0))
-    return np.where(np.all([one.known for one in (first, *others)], axis=0), time, np.nan)
-
-
-@dataclass(frozen=True)
-class _Limits:
-    """Limits of N motions: a + b u + c u² within ±1, plus d u at most the level, for M joints and samples.
-
-    Attributes:
-        a, b, c: (N, M) torque of a motor that pushes, with the safety factor, relative to the peak torque.
-        braking: (N, M) η, the largest of the same terms of a motor that brakes.
-        d: (N, M) speed relative to the range of falling torque [s].
-        level: (N, M) no-load speed relative to that range; infinite without one.
-        fastest: (N,) largest u by the no-load speeds, at most MAX_RATE [1/s].
-        hold: (N,) True if the drives hold the arm at rest on the way.
-        known: (N,) True if all ratings are known.
-    """
-
-    a: Array
-    b: Array
-    c: Array
-    braking: Array
-    d: Array
-    level: Array
-    fastest: Array
-    hold: NDArray[np.bool_]
-    known: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, load: MotionLoad, drives: Actuation) -> Self:
-        """Return the limits of a load."""
-        n, samples, _ = load.gravity.shape
-        pushing = 1.0 + np.abs(load.gear)
-        scale = np.where(load.velocity < 0.0, -1.0, 1.0) * (drives.safety_factor[:, None] / drives.peak)[:, None]
-        torques = (load.gravity + load.coulomb, load.viscous, load.inertial)
-        speed, gap = np.abs(load.velocity), drives.falling_range
-        falls = gap > 0.0
-        width = np.where(falls, gap, 1.0)
-        level = np.where(falls, np.where(falls, drives.no_load_speed, 1.0) / width, np.inf)
-        held = drives.safety_factor[:, None, None] * np.abs(load.gravity) <= drives.peak[:, None]
-        ratings = drives.peak + drives.corner_speed + drives.no_load_speed
-        needed = load.coulomb + load.viscous + load.gear + load.inertial
-        with np.errstate(divide="ignore", over="ignore"):
-            fastest = (drives.no_load_speed / speed.max(axis=1)).min(axis=1)
-        return cls(
-            *((pushing * scale * torque).reshape(n, -1) for torque in torques),
-            braking=pushing.reshape(n, -1),
-            d=(speed * np.where(falls, 1.0 / width, 0.0)[:, None]).reshape(n, -1),
-            level=np.repeat(level[:, None], samples, axis=1).reshape(n, -1),
-            fastest=np.minimum(fastest, MAX_RATE),
-            hold=np.all(held, axis=(1, 2)),
-            known=~np.any(np.isnan(ratings)[:, None] | np.isnan(needed), axis=(1, 2)),
-        )
-
-    def lower(self, rate: Array, rows: NDArray[np.intp]) -> None:
-        """Lower the rates (N,) of these rows, in place, until the limits allow them; -infinite if they allow none."""
-        while len(rows := rows[rate[rows] > 0.0]):  # each step passes at least one root for good
-            lower = self.largest_root_below(rate, rows)
-            rows, lower = rows[lower < np.inf], lower[lower < np.inf]
-            rate[rows] = lower
-
-    def largest_root_below(self, rate: Array, rows: NDArray[np.intp]) -> Array:
-        """Return, for each row, the least over the limits that its rate exceeds of their largest smaller roots.
-
-        No u between is allowed. It is infinite if no limit is exceeded, and -infinite if one has no smaller root.
-        """
-        u = rate[rows, None]
-        a, b, c, d, level = (each[rows] for each in (self.a, self.b, self.c, self.d, self.level))
-        braking = self.braking[rows]
-        torque = a + (b + c * u) * u
-        lower = np.full(len(rows), np.inf)
-        for sign, most in ((1.0, np.ones_like(braking)), (-1.0, braking)):
-            i, j = np.nonzero(sign * torque > ALLOWED * most)
-            roots = _largest_root_below(sign * c[i, j], sign * b[i, j], sign * a[i, j] - most[i, j], u[i, 0])
-            np.minimum.at(lower, i, roots)
-        i, j = np.nonzero(torque + d * u > level + (ALLOWED - 1.0))
-        roots = _largest_root_below(c[i, j], b[i, j] + d[i, j], a[i, j] - level[i, j], u[i, 0])
-        np.minimum.at(lower, i, roots)
-        return lower
-
-
-def _largest_root_below(alpha: Array, beta: Array, gamma: Array, u: Array) -> Array:
-    """Return the largest root of α x² + β x + γ below u, where it is positive; infinite where it is 0 but for rounding.
-
-    -infinite without such a root. Roots are free of cancellation (Press et al. 2007, section 5.6).
-    """
-    terms = np.stack([alpha * u**2, beta * u, gamma])
-    discriminant = beta**2 - 4.0 * alpha * gamma
-    q = -0.5 * (beta + np.copysign(np.sqrt(np.maximum(discriminant, 0.0)), beta))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        roots = np.stack([q / alpha, gamma / q])
-    below = np.where(roots < u, roots, -np.inf).max(axis=0)  # NaN is not below
-    positive = terms.sum(axis=0) > ROUNDING * np.abs(terms).sum(axis=0)
-    return np.where(positive, np.where(discriminant >= 0.0, below, -np.inf), np.inf)
+        time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0)).reshape(of_motions)
+    return np.where(known, time, np.nan)

@@ -80,8 +80,8 @@ def dynamics_kernels() -> SimpleNamespace:
         """Compute the terms of the torque along a motion.
 
         q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  carried: (S,) share of
-        the payload that is carried.  terms: (6, N, S, D) gravity, drag and push, and what the payload adds to each
-        [N m] or [N].  wrenches: (3, N, S, D) of gravity, drag and push, the force on each link and the moment about
+        the payload that is carried.  terms: (N, S, 6, D) gravity, drag and push, and what the payload adds to each
+        [N m] or [N].  wrenches: (N, S, 3, D) of gravity, drag and push, the force on each link and the moment about
         its joint, in its frame [N], [N m]; empty if they are not wanted.
         """
         arm, sample = wp.tid()
@@ -153,15 +153,60 @@ def dynamics_kernels() -> SimpleNamespace:
                     load, added = wp.dot(row(axis, j), total_moment), wp.dot(row(axis, j), carried_moment)
                 elif bodies.motion[arm, j] < wp.static(FIXED):
                     load, added = wp.dot(row(axis, j), total_force), wp.dot(row(axis, j), carried_force)
-                terms[term, arm, sample, j] = load
-                terms[3 + term, arm, sample, j] = added
-                if wrenches.shape[0] > 0:
+                terms[arm, sample, term, j] = load
+                terms[arm, sample, 3 + term, j] = added
+                if wrenches.shape[1] > 0:
                     lx = row(along_x, j)
                     ly = row(along_y, j)
                     local = wp.transpose(wp.matrix_from_cols(lx, ly, wp.cross(lx, ly)))
                     f = local * total_force
                     n = local * total_moment
-                    wrenches[term, arm, sample, j] = Wrench(f[0], f[1], f[2], n[0], n[1], n[2])
+                    wrenches[arm, sample, term, j] = Wrench(f[0], f[1], f[2], n[0], n[1], n[2])
                 after = here
 
-    return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms)
+    @wp.func
+    def total_wrench(terms: wp.array4d(dtype=Wrench), arm: int, sample: int, j: int, s: real, ss: real):
+        """Return the wrench of a joint at s' and s''."""
+        return terms[arm, sample, 0, j] + s * s * terms[arm, sample, 1, j] + ss * terms[arm, sample, 2, j]
+
+    @kernel
+    def bearing_loads(
+        before: wp.array2d(dtype=int),
+        share: wp.array2d(dtype=real),
+        rate: wp.array(dtype=real),
+        change: wp.array(dtype=real),
+        durations: wp.array2d(dtype=real),
+        motion: wp.array2d(dtype=int),
+        offset: wp.array2d(dtype=real),
+        wrenches: wp.array4d(dtype=Wrench),
+        largest: wp.array4d(dtype=real),
+    ):
+        """Find the largest loads across the axes of joints that turn, as of `bearings.py`.
+
+        before, share: (M, F) sample before each instant of each motion, and share of the way to the next.  rate,
+        change: (F,) s_τ and s_ττ.  durations: (N, M) [s].  offset: (N, D) of the bearings [m].  wrenches: (N, S, 3, D)
+        as above.  largest: (N, M, D, 3) tilting moment [N m], axial and radial force [N].
+        """
+        arm, path = wp.tid()
+        for j in range(motion.shape[1]):
+            tilting, axial, radial = real(0.0), real(0.0), real(0.0)
+            if motion[arm, j] < wp.static(PRISMATIC):
+                x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
+                a = axis_of(motion[arm, j], x, y, z)
+                for f in range(rate.shape[0]):
+                    sample, after = before[path, f], share[path, f]
+                    s, ss = rate[f] / durations[arm, path], change[f] / (durations[arm, path] * durations[arm, path])
+                    total = (one - after) * total_wrench(wrenches, arm, sample, j, s, ss)
+                    total += after * total_wrench(wrenches, arm, sample + 1, j, s, ss)
+                    force, moment = Vector3(total[0], total[1], total[2]), Vector3(total[3], total[4], total[5])
+                    along = wp.dot(force, a)
+                    force -= along * a
+                    moment -= wp.dot(moment, a) * a
+                    lever = offset[arm, j] * wp.cross(a, force)
+                    axial, radial = wp.max(axial, wp.abs(along)), wp.max(radial, wp.length(force))
+                    tilting = wp.max(tilting, wp.max(wp.length(moment - lever), wp.length(moment + lever)))
+            largest[arm, path, j, 0] = tilting
+            largest[arm, path, j, 1] = axial
+            largest[arm, path, j, 2] = radial
+
+    return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms, bearing_loads=bearing_loads)

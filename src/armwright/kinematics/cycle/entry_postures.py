@@ -73,7 +73,7 @@ def _solve(arms: ArmArrays, poses: Poses, start: Array, updates: int, device: De
     Those that start from NaN are infinitely far off.
     """
     n, b, s, dof = start.shape
-    each = poses[np.repeat(np.arange(b), s)]
+    each = poses[np.arange(b * s) // s]
     solved = solve_postures(
         arms,
         each.position,

@@ -1,67 +1,48 @@
 """Terms of the joint torques along the motions of a cycle, independent of their durations."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.arms.rigid_bodies import PerArm
 from armwright.kinematics.chunks import SAMPLES, in_chunks
-from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
+from armwright.kinematics.cycle.cycle_path import CyclePaths
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device, load_kernels
 
-NO_WRENCHES = np.empty((0, 0, 0, 0, 6))
-
 
 @dataclass(frozen=True)
-class TorqueTerms:
-    """Terms of N arms at the R samples of a motion, with s the share of the motion.
+class TorqueTerms(PerArm):
+    """Terms of N arms at the R samples of all motions, one motion after another, with s the share of a motion.
 
     The torque is gravity + drag s'² + push s'' [N m], or a force [N].
     """
 
-    gravity: Array  # (N, R, D)
-    drag: Array  # (N, R, D)
-    push: Array  # (N, R, D)
-    q_s: Array  # (N, R, D) derivative of the joint values by s [rad] or [m]
-    q_ss: Array  # (N, R, D) second derivative
-    payload: Array  # (3, N, R, D) what the payload adds to gravity, drag and push, in proportion to its mass
+    torques: Array  # (N, R, 6, D) gravity, drag, push, and what the payload adds to each, in proportion to its mass
+    states: Array  # (N, R, 2, D) first and second derivative of the joint values by s [rad] or [m]
     wrenches: Array
-    """(3, N, R, D, 6) terms of the forces on the links and moments about their joints, in the frames of the links [N],
-    [N m]; empty if they were not wanted."""
+    """(N, R, 3, D, 6) terms of the forces on the links and moments about their joints, in the frames of the links [N],
+    [N m]; R = 0 if they were not wanted."""
 
 
 def torque_terms(
     paths: CyclePaths, payload: float, device: Device = "cpu", wrenches: bool = False
-) -> list[tuple[TorqueTerms, ...]]:
-    """Return, for each group of arms, the terms along each motion.
+) -> list[TorqueTerms]:
+    """Return the terms of each group of arms.
 
     payload: its mass when carried [kg].  wrenches: compute those of the joints, too.
     """
-    found: list[tuple[TorqueTerms, ...]] = []
+    found: list[TorqueTerms] = []
     for group in paths.groups:
-        states, carried, spans = _along(group)
-        whole = np.empty((3, *states[0].shape, 6)) if wrenches else NO_WRENCHES
-        terms = _terms(group.arms, *states, carried, payload, device, whole)  # (6, n, S, D)
-        parts = (*terms[:3], *states[1:])
-        found.append(
-            tuple(
-                TorqueTerms(*(values[:, a:b] for values in parts), terms[3:, :, a:b], whole[:, :, a:b])
-                for a, b in spans
-            )
-        )
+        q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
+        carried = np.repeat([float(path.motion.carries) for path in group.paths], group.counts)
+        whole = np.empty((len(q), q.shape[1] if wrenches else 0, 3, q.shape[2], 6))
+        torques = _terms(group.arms, q, q_s, q_ss, carried, payload, device, whole)
+        found.append(TorqueTerms(torques, np.stack([q_s, q_ss], axis=2), whole))
     return found
-
-
-def _along(group: CycleGroup) -> tuple[tuple[Array, Array, Array], Array, list[tuple[int, int]]]:
-    """Return (n, S, D) q, q_s and q_ss along all motions, (S,) carried shares of the payload, ends of motions."""
-    q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
-    counts = [path.q.shape[1] for path in group.paths]
-    carried = np.repeat([float(path.motion.carries) for path in group.paths], counts)
-    return (q, q_s, q_ss), carried, list(pairwise(np.cumsum([0, *counts]).tolist()))
 
 
 def inverse_dynamics_torques(
@@ -73,7 +54,7 @@ def inverse_dynamics_torques(
     carried: (S,) share of the payload that is carried.  payload: its mass [kg].
     """
     terms = _terms(arms, q, qd, qdd, carried, payload, device)
-    return terms[0] + terms[1]  # gravity, and M q_ss + C q_s with the time as share
+    return terms[:, :, 0] + terms[:, :, 1]  # gravity, and M q_ss + C q_s with the time as share
 
 
 def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, device: Device = "cpu") -> Array:
@@ -83,7 +64,7 @@ def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, 
     """
     rest = np.zeros_like(q)
     units = (np.broadcast_to(unit, q.shape) for unit in np.eye(arms.dof))
-    return np.stack([_terms(arms, q, unit, rest, carried, payload, device)[2] for unit in units], axis=-1)
+    return np.stack([_terms(arms, q, unit, rest, carried, payload, device)[:, :, 2] for unit in units], axis=-1)
 
 
 def _values(path: MotionPath, order: int) -> Array:
@@ -95,24 +76,25 @@ def _values(path: MotionPath, order: int) -> Array:
 
 def _terms(
     arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device,
-    wrenches: Array = NO_WRENCHES,
+    wrenches: Array | None = None,
 ) -> Array:  # fmt: skip
-    """Return (6, N, S, D) gravity, drag and push of N arms at S samples, and what the payload adds to each.
+    """Return (N, S, 6, D) gravity, drag and push of N arms at S samples, and what the payload adds to each.
 
-    wrenches: (3, N, S, D, 6) to be filled, if any.
+    wrenches: (N, S, 3, D, 6) to be filled, if any.
     """
     loaded = load_kernels("cycle.dynamics_kernels", device)
-    terms = np.empty((6, *q.shape))
+    terms = np.empty((*q.shape[:2], 6, q.shape[2]))
+    full = np.empty((len(q), 0, 3, q.shape[2], 6)) if wrenches is None else wrenches
 
     def solve(chunk: slice) -> None:
         part = arms[chunk]
         values: dict[str, Any] = {name: getattr(part, name) for name in ("dof", "base", "motion", "offset")}
         values |= vars(part.rigid_bodies) | {"payload_mass": loaded.warp.float64(payload)}
         values |= {"payload_com": part.payload_center, "payload_inertia": payload * part.payload_gyration}
-        bodies, found = loaded.struct("Bodies", values), np.empty((6, *q[chunk].shape))
-        states, full = (q[chunk], q_s[chunk], q_ss[chunk]), np.empty_like(wrenches[:, chunk])
-        loaded.launch("torque_terms", found.shape[1:3], bodies, *states, carried, outputs=[found, full])
-        terms[:, chunk], wrenches[:, chunk] = found, full
+        bodies, states, outputs = loaded.struct("Bodies", values), (q, q_s, q_ss), (terms[chunk], full[chunk])
+        loaded.launch(
+            "torque_terms", q[chunk].shape[:2], bodies, *(each[chunk] for each in states), carried, outputs=outputs
+        )
 
     in_chunks(solve, len(arms), max(1, SAMPLES[device] // q.shape[1]), device)
     return terms

@@ -24,6 +24,12 @@ export function solidParts(solid, frame, { face, edge }) {
     const corners = [[x - r, y - r], [x + r, y - r], [x + r, y + r], [x - r, y + r]].map((p) => [...p, centre[2]]);
     return [mesh, segments(corners.flatMap((p, k) => [p, corners[(k + 1) % 4]]).flat(), edge)];
   }
+  if (shape === "mesh") {
+    const corners = solid.hull.flat().flatMap((p) => placed(solid, p)), geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
+    geometry.computeVertexNormals();
+    return [new THREE.Mesh(geometry, Object.assign(face.clone(), { side: 2 }))]; // its triangles face in or out
+  }
   const geometry = shape === "sphere" ? new THREE.SphereGeometry(1, 32, 20)
     : shape === "box" ? prism() : new THREE.CylinderGeometry(1, 1, 1, RIM);
   // Shapes of three.js are upright along y, obstacles along z: swap the axes.
