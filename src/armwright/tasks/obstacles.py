@@ -197,7 +197,7 @@ class Mesh(Record, frozen=True):
 
 def _name_kind(record: Any) -> Any:
     return (
-        {"kind": "mesh", **cast("dict[str, Any]", record)} if isinstance(record, dict) and "mesh" in record else record
+        {"kind": "mesh"} | cast("Any", record) if isinstance(record, dict) and "mesh" in record else cast("Any", record)
     )
 
 
