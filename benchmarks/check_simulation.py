@@ -1,27 +1,34 @@
-"""Drive exported designs in MuJoCo, independent of armwright: `check_simulation.py RUN/designs/NNNN ...`.
+"""Drive exported designs in MuJoCo, and measure them in Coal: `check_simulation.py RUN/designs/NNNN ...`.
 
 Reads arm.xml and trajectory.csv of each folder, and prints its verdict by the rules of docs/method.md: every dwell ends
 within the target's tolerance, nothing touches, and no joint is at its torque limit for more than 2 % of the cycle. Tool
-and payload are bodies, which may be as deep in obstacles as the trajectory allows.
+and payload are bodies, which may be as deep in obstacles as the trajectory allows. Coal measures how far they keep from
+all obstacles along the trajectory, beyond these depths. Nothing here is from armwright.
 """
 
 import csv
 import sys
 from pathlib import Path
+from typing import Any
 
+import coal
 import mujoco
 import numpy as np
 
 SHARE, NOTHING = 0.02, 1e-9
 
 
+def read_rows(folder: Path) -> list[dict[str, str]]:
+    """Return the rows of trajectory.csv."""
+    with (folder / "trajectory.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
 def check(folder: Path) -> list[str]:
     """Return why a design fails; nothing if it passes."""
     model = mujoco.MjModel.from_xml_path(str(folder / "arm.xml"))
     data = mujoco.MjData(model)
-    with (folder / "trajectory.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    n = model.nu // 2
+    rows, n = read_rows(folder), model.nu // 2
     q, tau = (np.array([[float(r[f"{x}_{k + 1}"]) for k in range(n)] for r in rows]) for x in ("q", "tau"))
     servo = np.array([model.actuator(f"servo_{k + 1}").id for k in range(n)])
     forward = np.array([model.actuator(f"ff_{k + 1}").id for k in range(n)])
@@ -75,7 +82,46 @@ def check(folder: Path) -> list[str]:
     return faults + [f"joint {k + 1} is at its limit" for k in np.flatnonzero(saturated > SHARE * steps)]
 
 
+def solid(model: Any, data: Any, g: int) -> tuple[Any, coal.Transform3s]:
+    """Return a geom in Coal, with its pose."""
+    size, at = model.geom_size[g], coal.Transform3s(data.geom_xmat[g].reshape(3, 3), data.geom_xpos[g])
+    match mujoco.mjtGeom(int(model.geom_type[g])):
+        case mujoco.mjtGeom.mjGEOM_PLANE:
+            return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), at
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            return coal.Sphere(size[0]), at
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return coal.Cylinder(size[0], 2.0 * size[1]), at
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return coal.Box(*(2.0 * size)), at
+        case _:  # a mesh
+            mesh, corners = model.mesh(model.geom_dataid[g]), coal.StdVec_Vec3s()
+            corners.extend(model.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]].astype(np.float64))
+            return coal.Convex.convexHull(corners, False, "Qt"), at
+
+
+def distance_by_coal(folder: Path) -> float:
+    """Return the least distance of tool and payload from obstacles along the trajectory, and beyond its depths [m]."""
+    model = mujoco.MjModel.from_xml_path(str(folder / "arm.xml"))
+    data, least = mujoco.MjData(model), np.inf
+    tips = [g for g in range(model.ngeom) if model.geom(g).name in ("tool", "payload")]
+    obstacles = [g for g in range(model.ngeom) if model.geom(g).name.startswith("obstacle_")]
+    for row in read_rows(folder):
+        data.qpos[:] = [float(row[f"q_{k + 1}"]) for k in range(model.nq)]
+        mujoco.mj_kinematics(model, data)
+        for tip in tips:
+            if model.geom(tip).name == "payload" and float(row["payload"]) == 0.0:
+                continue
+            for k, obstacle in enumerate(obstacles):
+                allowed = float(row[f"allowed_{k + 1}"])
+                pair = (*solid(model, data, tip), *solid(model, data, obstacle))
+                found = coal.distance(*pair, coal.DistanceRequest(), coal.DistanceResult()) + max(0.0, allowed)
+                least = min(least, found if allowed < 0.0 or found < 0.0 else np.inf)
+    return least
+
+
 if __name__ == "__main__":
     for name in sys.argv[1:]:
         found = check(Path(name))
-        print(f"{name}: {'fail: ' + '; '.join(found) if found else 'pass'}")
+        distance = 1e3 * distance_by_coal(Path(name))
+        print(f"{name}: {'fail: ' + '; '.join(found) if found else 'pass'}; tool and payload {distance:.2f} mm apart")

@@ -46,7 +46,7 @@ def test_findings_and_meaning_are_those_of_check(files: EditedFiles, task: str, 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("payload: 0.2 ", "payload: two ", "payload"),
+        ("payload: {mass: 0.2", "payload: {mass: two", "payload.mass"),
         ("[0.33, -0.15, 0.12]", "[5, 0, 0.1]", "reach"),
         ("targets:", "targets: [", "not valid YAML"),
     ],

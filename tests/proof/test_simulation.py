@@ -51,6 +51,14 @@ SPACE: dict[str, Any] = {
 }
 LINKS = (0.12, 0.26, 0.22, 0.08, 0.06)
 WEAK = {"name": "weak", "mass": 0.165, "stall_torque": 1.2, "speed": 4.0, "width": 0.04, "height": 0.06, "depth": 0.04}
+WEDGE = [
+    [-0.06, -0.06, 0],
+    [0.06, -0.06, 0],
+    [0.06, 0.06, 0],
+    [-0.06, 0.06, 0],
+    [-0.06, -0.06, 0.4],
+    [0.06, 0.06, 0.4],
+]  # m
 
 
 class Desk:
@@ -195,6 +203,7 @@ def test_an_arm_with_weak_motors_fails_at_their_limits() -> None:
         {"kind": "sphere", "center": [0.25, 0.11, 0.1], "radius": 0.08},
         {"kind": "box", "center": [0.28, 0.13, 0.2], "size": [0.16, 0.02, 0.4], "yaw": 0.4},
         {"kind": "cylinder", "center": [0.25, 0.11, 0.2], "radius": 0.06, "height": 0.4},
+        {"kind": "mesh", "mesh": "lamp.stl", "position": [0.25, 0.11, 0.0], "points": WEDGE},
     ],
     ids=lambda shape: shape["kind"],
 )
@@ -208,8 +217,10 @@ def test_an_arm_with_an_obstacle_in_its_way_fails(shape: Mapping[str, Any]) -> N
 
 
 def test_contacts_are_the_overlaps_of_our_clearance() -> None:
-    """In random postures, with the base on the ground and a box nearby."""
-    ground = [{"kind": "ground", "z": 0.02}, {"kind": "box", "center": [0.3, 0.1, 0.1], "size": [0.1, 0.1, 0.2]}]
+    """In random postures, with the base on the ground, and a box and a turned mesh nearby."""
+    mesh = {"kind": "mesh", "mesh": "x.stl", "points": WEDGE, "position": [0.3, -0.2, 0.1], "rpy": [0.3, -0.5, 1.0]}
+    box = {"kind": "box", "center": [0.3, 0.1, 0.1], "size": [0.1, 0.1, 0.2]}
+    ground = [{"kind": "ground", "z": 0.02}, box, mesh]
     blocked = Desk(SPACE | {"motor_bodies": False}, obstacles=ground)  # tests/kinematics/test_motor_bodies.py has them
     model = mujoco.MjModel.from_xml_string(blocked.files[MODEL])
     data = mujoco.MjData(model)
@@ -217,7 +228,7 @@ def test_contacts_are_the_overlaps_of_our_clearance() -> None:
     q = rng.uniform(model.jnt_range[:, 0], model.jnt_range[:, 1], (400, 5))
     arms = blocked.evaluation.arms
     solids = blocked.problem.task.tip_solids
-    rules = TipRules(np.ones(len(q), dtype=np.bool_), np.full((len(q), 2), APART), solids)
+    rules = TipRules(np.ones(len(q), dtype=np.bool_), np.full((len(q), 3), APART), solids)
     own, clear = (values[0] for values in clearances(arms, q[None], blocked.problem.task.obstacles, rules=rules))
     touching = np.zeros((2, len(q)), dtype=bool)
     for i, values in enumerate(q):

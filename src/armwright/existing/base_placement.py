@@ -104,8 +104,9 @@ def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
     def losses_of(units: Array) -> Array:
         return evaluate(encoding.from_units(units.T))
 
+    settings |= {"init": first, "maxiter": GENERATIONS - 1, "rng": rng}
     ranges = [(0.0, 1.0)] * len(parameters)
-    found: Any = differential_evolution(losses_of, ranges, init=first, maxiter=GENERATIONS - 1, rng=rng, **settings)
+    found: Any = differential_evolution(losses_of, ranges, **settings)
     chosen = encoding.from_units(found.x)
     if len(chosen) > 3:
         unturned = np.array([[*chosen[:3], 0.0]])

@@ -225,12 +225,7 @@ def _check_prices(prices: Mapping[str, float], names: Sequence[str]) -> Mapping[
 
 
 def _compared(
-    problem: Problem,
-    history: History | None,
-    name: str,
-    place: Placement,
-    notes: Sequence[str],
-    price: float | None,
+    problem: Problem, history: History | None, name: str, place: Placement, notes: Sequence[str], price: float | None
 ) -> ComparedArm:
     """Evaluate an existing arm in its place; price: as stated [USD], in place of that of its parts."""
     arm = place.described.arm

@@ -45,9 +45,8 @@ def text_of(response: ModelResponse) -> str:
     """Return all text of the model, tool-call arguments included, so that a refused answer can be inspected."""
     if response.metadata and _WRITTEN in response.metadata:
         return response.metadata[_WRITTEN]
-    written = [
-        str(part.content or "") for part in response.parts if isinstance(part, TextPart)
-    ]  # some servers send null
+    # Some servers send null.
+    written = [str(part.content or "") for part in response.parts if isinstance(part, TextPart)]
     calls = [part for part in response.parts if isinstance(part, ToolCallPart)]
     written += [call.args if isinstance(call.args, str) else call.args_as_json_str() for call in calls]
     return redacted(replace_surrogates("\n".join(written)))

@@ -13,14 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from armwright.experiments.compare_runs import Comparison
 from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.pictures.arm_figures import draw_arm, frame
-from armwright.pictures.drawing import (
-    draw_dominated,
-    frame_plane,
-    legend_below,
-    one_panel,
-    several_panels,
-    write_drawn,
-)
+from armwright.pictures.drawing import draw_dominated, frame_plane, legend_below, one_panel, several_panels, write_drawn
 from armwright.pictures.figures import draw_samples
 from armwright.pictures.reason_figures import draw_reasons
 from armwright.pictures.solids import extent_of

@@ -161,9 +161,8 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
         if np.all(np.array(member.values[:2]) <= limits[:, 1])
     ]
     arms = [arm for arm in existing if None not in arm.values[:2]]
-    arms.sort(
-        key=lambda arm: np.minimum(arm.values[0] or 0.0, limits[0, 1]), reverse=True
-    )  # marks on both sides keep apart
+    # Marks on both sides keep apart.
+    arms.sort(key=lambda arm: np.minimum(arm.values[0] or 0.0, limits[0, 1]), reverse=True)
     figure, axes = one_panel(5.2, 4.2 + LINE * (len(marked) + len(arms)), MARK_PAD if arms else None)
     _scatter(axes, history, reference, limits, alpha=0.25)
     for member in history.front:

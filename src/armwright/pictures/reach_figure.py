@@ -110,11 +110,7 @@ def _draw_slice(axes: Any, found: ReachMap, coverage: PoseCoverage, plane: _Slic
     low, high = found.points.min(axis=0) - half, found.points.max(axis=0) + half
     extent = (low[plane.right], high[plane.right], low[plane.up], high[plane.up])
     options: Any = {"origin": "lower", "extent": extent, "interpolation": "nearest"}
-    axes.imshow(
-        np.where(covered, 1.0, np.nan),
-        cmap=ListedColormap([POSITION_ONLY]),
-        **options,
-    )
+    axes.imshow(np.where(covered, 1.0, np.nan), cmap=ListedColormap([POSITION_ONLY]), **options)
     image = axes.imshow(np.where(shares > 0.0, 100.0 * shares, np.nan), cmap=COLOURS, vmin=0.0, vmax=100.0, **options)
     _draw_obstacles(axes, found, plane, around.obstacles, extent)
     base = around.body.base

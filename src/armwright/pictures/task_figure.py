@@ -21,11 +21,8 @@ ARROW = 0.12  # length of a tool direction, as a share of the picture's side
 MAX_NAMED = 40  # targets
 FORMATS = (".png", ".pdf", ".svg")
 BASES: Any = {"color": FRONT, "linewidth": 0.9, "linestyle": (0, (2, 2))}  # edges of the box of allowed bases
-PATH: Any = {
-    "color": TARGET,
-    "linewidth": 0.8,
-    "linestyle": (0, (1, 2)),
-}  # a joint motion, whose way depends on the arm
+# A joint motion, whose way depends on the arm
+PATH: Any = {"color": TARGET, "linewidth": 0.8, "linestyle": (0, (1, 2))}
 
 
 def write_task_figure(problem: Problem, file: Path) -> None:

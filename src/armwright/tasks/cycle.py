@@ -98,10 +98,8 @@ class Cycle(Strict, frozen=True):
 
         route = [stop(0), *(f"by {_BY[self.steps[i].by]} to {stop(i)}" for i in range(1, len(self.steps)))]
         route += [f"by {_BY[self.steps[0].by]} back to {names[0]}"] if self.closed else []
-        approach = (
-            "" if self.approach is None else f"; lines of {1e3 * self.approach:g} mm before and after pick and place"
-        )
-        return f"{', '.join(route)}{approach}"
+        lines = f"; lines of {1e3 * (self.approach or 0.0):g} mm before and after pick and place"
+        return ", ".join(route) + (lines if self.approach else "")
 
     def describe_times(self) -> str:
         """Return a description of the durations."""

@@ -189,16 +189,14 @@ class Mesh(Record, frozen=True):
         return Solid("mesh", (x, y, z), rotation, (a, b, c), hull)
 
     def _describe(self) -> str:
-        solid = self.solid
-        x, y, z = (2.0 * side for side in solid.half)
+        x, y, z = (2.0 * side for side in self.solid.half)
         rotation = f", turned by roll, pitch, yaw {describe_vector(self.rpy)} rad" if any(self.rpy) else ""
-        return f"{self.source}, {x:.3g} x {y:.3g} x {z:.3g} m about {describe_vector(solid.centre)}{rotation}"
+        return f"{self.source}, {x:.3g} x {y:.3g} x {z:.3g} m about {describe_vector(self.solid.centre)}{rotation}"
 
 
 def _name_kind(record: Any) -> Any:
-    return (
-        {"kind": "mesh", **cast("dict[str, Any]", record)} if isinstance(record, dict) and "mesh" in record else record
-    )
+    is_mesh = isinstance(record, dict) and "mesh" in record
+    return {"kind": "mesh"} | cast("Any", record) if is_mesh else cast("Any", record)
 
 
 Obstacle = Annotated[

@@ -44,7 +44,7 @@ export function drawObstacles() {
 }
 
 function row(obstacle, o) {
-  const one = record(obstacle), path = ["obstacles", o];
+  const one = record(obstacle), path = ["obstacles", o], kind = one.kind ?? (one.mesh && "mesh");
   const field = (name, keys, value, kind = length) => numberField({ id: `obstacle-${o}-${keys.join("-")}`, value, kind, label: `${name} of obstacle ${o + 1}`, size: 5, edit: (v) => ({ task: [set([...path, ...keys], v)] }) });
   const triple = (name, key) => element("td", {}, `${name} `, ...[0, 1, 2].map((k) => field(`${"xyz"[k]} of the ${name}`, [key, k], list(one[key])[k])));
   const single = (name, key, kind = length) => element("td", {}, `${name} `, field(name, [key], one[key] ?? 0, kind), kind === angle ? " °" : "");
@@ -53,9 +53,10 @@ function row(obstacle, o) {
     sphere: () => [triple("centre", "center"), single("radius", "radius")],
     cylinder: () => [triple("centre", "center"), single("radius", "radius"), single("height", "height")],
     ground: () => [single("solid below z =", "z")],
-  }[one.kind] ?? (() => []);
+    mesh: () => [element("td", {}, String(one.mesh))],
+  }[kind] ?? (() => []);
   return element("tr", {},
-    element("td", {}, String(one.kind ?? "?")),
+    element("td", {}, String(kind ?? "?")),
     element("td", {}, textField({ id: `obstacle-${o}-name`, value: one.name, label: `Name of obstacle ${o + 1}`, size: 9, edit: (text) => ({ task: [set([...path, "name"], text || null)] }) })),
     element("td", {}, element("span", { class: "row" }, ...cells().flatMap((cell) => [...cell.childNodes]))),
     element("td", {}, removal(`obstacle ${o + 1}`, () => ({ task: [list(task().obstacles).length > 1 ? set(path, null) : set(["obstacles"], null)] }))));

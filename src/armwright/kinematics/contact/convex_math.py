@@ -39,8 +39,8 @@ def convex_math(precision: Precision) -> SimpleNamespace:
     accuracy = real(ACCURACY)
 
     @wp.func
-    def support(shape: int, half: Vector3, solids: Solids, o: int, n: Vector3):
-        """Return the point of a body, or of mesh o, that is farthest along n, in its frame."""
+    def support(shape: int, half: Vector3, n: Vector3):
+        """Return the point of a body that is farthest along n, in the body's frame."""
         p = Vector3(wp.where(n[0] >= zero, half[0], -half[0]), wp.where(n[1] >= zero, half[1], -half[1]), zero)
         if shape == wp.static(CYLINDER):
             across = wp.sqrt(n[0] * n[0] + n[1] * n[1])
@@ -49,11 +49,17 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         p[2] = wp.where(n[2] >= zero, half[2], -half[2])
         if shape == wp.static(SEGMENT):
             p = wp.where(wp.dot(n, half) >= zero, half, -half)
-        if shape == wp.static(MESH):
-            p = solids.corners[o, 0]
-            for i in range(1, solids.corners.shape[1]):
-                if wp.dot(solids.corners[o, i] - p, n) > zero:
-                    p = solids.corners[o, i]
+        return p
+
+    @wp.func
+    def farthest(shape: int, half: Vector3, corners: wp.array2d(dtype=Vector3), o: int, n: Vector3):
+        """Return the point of a body, or the corner of mesh o, that is farthest along n, in its frame."""
+        if shape != wp.static(MESH):
+            return support(shape, half, n)
+        p = corners[o, 0]
+        for i in range(1, corners.shape[1]):
+            if wp.dot(corners[o, i] - p, n) > zero:
+                p = corners[o, i]
         return p
 
     @wp.func
@@ -141,7 +147,7 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         if bound >= enough or (boxes and bound <= zero):
             return bound
         back = wp.transpose(into)
-        v = d + back * support(other, other_half, solids, o, into * -n) - support(shape, half, solids, o, n)
+        v = d + back * farthest(other, other_half, solids.corners, o, into * -n) - support(shape, half, n)
         s = Simplex()
         s[0] = v
         size = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
@@ -149,7 +155,7 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         for _ in range(wp.static(ITERATIONS)):
             if distance < accuracy:
                 break
-            w = d + back * support(other, other_half, solids, o, into * -v) - support(shape, half, solids, o, v)
+            w = d + back * farthest(other, other_half, solids.corners, o, into * -v) - support(shape, half, v)
             bound = wp.max(bound, wp.dot(v, w) / distance)
             if bound > distance - accuracy or bound >= enough:
                 break

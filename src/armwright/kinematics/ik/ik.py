@@ -157,13 +157,7 @@ def _parts(n: int, t: int, lanes: int) -> list[tuple[slice, int]]:
 
 
 def _solve(
-    arms: ArmArrays,
-    columns: Array,
-    updates: int,
-    initial_q: Array | None,
-    kind: TargetKind,
-    lanes: int,
-    device: Device,
+    arms: ArmArrays, columns: Array, updates: int, initial_q: Array | None, kind: TargetKind, lanes: int, device: Device
 ) -> list[NDArray[Any]]:
     """Return joint angles, tip positions, torques and angle errors of a chunk of arms, (N, T, ...)."""
     grouped = _in_lanes(columns[None], lanes)[0]

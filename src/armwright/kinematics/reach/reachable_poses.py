@@ -161,12 +161,7 @@ class PoseSearch:
         return reached.reshape(-1, m), q.reshape(-1, m, self.arm.dof)
 
     def _solve(
-        self,
-        points: Array,
-        directions: Array | None,
-        start: Array,
-        updates: int,
-        conditions: PostureConditions | None,
+        self, points: Array, directions: Array | None, start: Array, updates: int, conditions: PostureConditions | None
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Return (K, D) postures at K poses [rad] or [m], and whether each is reached and satisfies the conditions."""
         arm, k = self.arm, len(points)
