@@ -17,6 +17,7 @@ from armwright.runs.history import source_label
 from armwright.text import decimals, percent
 
 WIDE = 4  # up to this many tasks, each has a column, as in the paper
+BIASES = "lengths_5_cm lengths_1_cm base_on_symmetry_plane equal_neighbours"
 INTERVALS = ("e_hv", "final", "share_of_best_known", "difference", "ratio")  # fields, each with its two ends
 HEADS = {  # if they are not the keys in words
     "final": "hypervolume at the end",
@@ -25,6 +26,9 @@ HEADS = {  # if they are not the keys in words
     "n": "pairs",
     "p_holm": "p (Holm)",
     "gained": "hypervolume",
+    "lengths_5_cm": "5 cm",
+    "lengths_1_cm": "1 cm",
+    "base_on_symmetry_plane": "in plane",
     "cost_usd": "USD",
 }
 Record = dict[str, Any]
@@ -37,7 +41,7 @@ def _p(p: float | None) -> str:
 WRITE: Mapping[str, Callable[[Any], str]] = {  # texts of values, by key
     **dict.fromkeys(("final", "best_known"), decimals),
     **dict.fromkeys(("trials", "proposals", "calls"), partial(decimals, places=0)),
-    **dict.fromkeys(("front", "gained", "in_plane", "black_box_in_plane"), percent),
+    **dict.fromkeys(("front", "gained", *BIASES.split()), percent),
     **dict.fromkeys(("difference", "effect"), "{:+.2f}".format),
     **dict.fromkeys(("p", "p_holm"), _p),
     "share_of_best_known": partial(percent, places=1),
@@ -103,7 +107,7 @@ def tables(comparison: Comparison) -> list[Table]:
         _table("overall", "Over all tasks", OVERALL, overall, f"method baseline ratio {TESTED}"),
         _table("contrasts", "Differences", differences, contrasts, f"task method baseline difference {TESTED}"),
         _table("sources", "Front by source", SOURCES, sources, "task method source trials front gained"),
-        _table("proposers", "Proposals", PROPOSALS, proposals, "task method proposals in_plane calls cost_usd"),
+        _table("proposers", "Proposals", PROPOSALS, proposals, f"task method proposals {BIASES} calls cost_usd"),
         Table("runs", [_run_record(comparison, run) for run in (*comparison.runs, *comparison.excluded)]),
     ]
 
@@ -159,7 +163,11 @@ SOURCES = (
     "Share of the final front that was found by each source, and share of the final hypervolume that its designs "
     "added when they were evaluated. Means over the runs."
 )
-PROPOSALS = "Means over the runs. In plane: bases on a symmetry plane of the targets. In brackets: the black box."
+PROPOSALS = (
+    "Means over the runs. 5 cm, 1 cm: designs whose link lengths are all multiples of it. In plane: bases on a "
+    "symmetry plane of the targets. Equal neighbours: pairs of consecutive joints with one type. In brackets: the "
+    "black box."
+)
 
 
 def _contrast_caption(comparison: Comparison) -> str:
@@ -266,16 +274,17 @@ def _proposer_records(comparison: Comparison) -> Iterator[Record]:
 
 
 def _proposals(run: RunSummary) -> Record:
-    proposer, bias = run.proposer, run.summary["proposer_bias"]
-    return {
+    proposer = run.proposer
+    found: Record = {
         "proposals": run.summary["attribution"].get(proposer["name"], {"trials": 0})["trials"],
         "calls": proposer["calls"],
         "failures": sum(proposer["failures"].values()),
         "tokens": proposer["tokens"],
         "cost_usd": proposer["cost_usd"],
-        "in_plane": bias["proposer"],
-        "black_box_in_plane": bias["black_box"],
     }
+    for prefix, who in (("", "proposer"), ("black_box_", "black_box")):
+        found |= {f"{prefix}{bias}": (run.summary["proposer_bias"][who] or {}).get(bias) for bias in BIASES.split()}
+    return found
 
 
 def _run_record(comparison: Comparison, run: RunSummary) -> Record:
