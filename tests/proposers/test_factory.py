@@ -20,11 +20,6 @@ OPTIONS: dict[str, Any] = {
     "in_flight": 1,
     "max_calls": 1,
     "max_cost": 1.0,
-<<<<<<< HEAD
-=======
-    "on_failure": "stop",
-    "wait": True,
->>>>>>> parent of b8cfb7bc (Drop the option that ends a run at an open manual question)
 }
 
 
@@ -33,7 +28,7 @@ OPTIONS: dict[str, Any] = {
 def test_option_without_effect_is_refused(tmp_path: Path, name: str, option: str) -> None:
     """This holds even if it states the default."""
     chosen, options = name.replace("x", str(tmp_path / "x")), ModelOptions(**{option: OPTIONS[option]})
-    if name == "manual:x" and option in ("prompt", "memory", "wait"):
+    if name == "manual:x" and option in ("prompt", "memory"):
         assert choose_proposer(chosen, options).proposer is not None
     elif name == "replay:x" and option == "in_flight":
         with pytest.raises(ReplayError, match="to replay"):
