@@ -1,8 +1,6 @@
-"""The drawings of a data sheet: side view, top view, and what changes over the reach. They are readable in grey."""
+"""The drawings of a data sheet, side view and top view. They are readable in grey."""
 
 import math
-import textwrap
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +9,8 @@ from armwright.arrays import Array
 from armwright.kinematics.reach.reach_outline import Outline
 from armwright.pictures.style import FRONT, LINK, TARGET
 from armwright.sheet.record import DataSheet
-from armwright.tasks.moments import MAX_MASS
 
 REACHED = "#EDEDED"
-LETTERS = 40  # of a line in a panel
 SHORT = 1e-6  # [m]; links without length are not drawn
 MARGIN = 0.06  # around a view, as a share of its size
 MOST_NUMBERS = 12  # of targets; more are not numbered
@@ -69,54 +65,6 @@ def draw_top(axes: Any, sheet: DataSheet) -> None:
     _frame(axes, low, high, "x [mm]", "y [mm]")
     starred = "; stars: targets" if len(targets) else ""
     axes.set_title(f"Top view, tip within R = {MM * (sheet.facts['reach'].value or 0.0):.0f} mm{starred}")
-
-
-def draw_payload(axes: Any, sheet: DataSheet) -> None:
-    """Draw the payload over the reach, and that of the task."""
-    held = [(line.distance, line.payload) for line in sheet.over_reach if (line.payload or 0.0) < MAX_MASS]
-    reason = sheet.facts["payload_at_full_reach"].reason or "no motor feels it"
-    curves = {"payload held": held}
-    if sheet.payload is not None and any(payload is not None for _, payload in held):
-        curves["payload of the task"] = [(distance, sheet.payload) for distance in (0.0, sheet.reach)]
-    _draw_over_reach(axes, sheet, "Payload held over the reach", "payload [kg]", curves, f"payload held: {reason}")
-
-
-def draw_errors(axes: Any, sheet: DataSheet) -> None:
-    """Draw deflection and backlash error over the reach."""
-    curves = {
-        "deflection": [(line.distance, line.deflection) for line in sheet.over_reach],
-        "backlash error": [(line.distance, line.backlash_error) for line in sheet.over_reach],
-    }
-    in_mm = {name: [(x, None if y is None else MM * y) for x, y in points] for name, points in curves.items()}
-    reason = f"deflection and backlash: {sheet.facts['deflection'].reason or 'not known'}"
-    _draw_over_reach(axes, sheet, "Deflection and backlash over the reach", "tip moves by [mm]", in_mm, reason)
-
-
-def _draw_over_reach(
-    axes: Any,
-    sheet: DataSheet,
-    title: str,
-    label: str,
-    curves: Mapping[str, Sequence[tuple[float, float | None]]],
-    reason: str,
-) -> None:
-    """Draw curves by their names over the distance from the base [m]; reason: why the first has no points."""
-    axes.set_title(title)
-    known = {name: [(x, y) for x, y in points if y is not None] for name, points in curves.items()}
-    most = 0.0
-    for (name, points), (style, colour) in zip(known.items(), (("o-", FRONT), ("s--", LINK)), strict=False):
-        if points:
-            x, y = np.array(points).T
-            most = max(most, float(y.max()))
-            axes.plot(MM * x, y, style, color=colour, markersize=4, label=name)
-    if not axes.lines:
-        shown = "\n".join(textwrap.wrap(f"({reason})", LETTERS))
-        axes.text(0.5, 0.5, f"not stated\n{shown}", ha="center", va="center", transform=axes.transAxes, fontsize=7)
-        axes.set(xticks=[], yticks=[])
-        return
-    axes.set(xlabel="distance from the base axis [mm]", ylabel=label, xlim=(0.0, 1.05e3 * sheet.reach))
-    axes.set_ylim(0.0, 1.4 * most or 1.0)
-    axes.legend()
 
 
 def _points(outline: Outline) -> Array:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from armwright.pictures.style import RC
 from armwright.sheet import tables as tables
-from armwright.sheet.drawings import draw_errors, draw_payload, draw_side, draw_top
+from armwright.sheet.drawings import draw_side, draw_top
 from armwright.sheet.record import DataSheet
 from armwright.sheet.tables import Table
 
@@ -38,7 +38,7 @@ th { border-bottom-color: #111; } .left { text-align: left; } p, li { font-size:
 SIZES = (9.5, 9.0, 8.5, 8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0, 4.5, 4.0)  # of printed text [pt]; the largest that fits
 PAGE = 560.0  # lines of 1 pt on a page of A4
 WIDTH = 1150.0  # letters of 1 pt in a line
-DRAWN = 330.0  # lines of 1 pt that the drawings take
+DRAWN = 220.0  # lines of 1 pt that the drawings take
 
 
 def to_html(sheet: DataSheet) -> str:
@@ -51,8 +51,7 @@ def to_html(sheet: DataSheet) -> str:
         f"<h1>{title}</h1>",
         f"<p>{html.escape(verdict)}</p>" if verdict else "",
         _beside(*("".join(map(_table, column)) for column in columns)),
-        _beside(_picture(sheet, draw_side, 4.0, "side view"), _picture(sheet, draw_top, 4.0, "top view")),
-        _beside(_picture(sheet, draw_payload, 2.5, "payload"), _picture(sheet, draw_errors, 2.5, "errors")),
+        _beside(_picture(sheet, draw_side, "side view"), _picture(sheet, draw_top, "top view")),
     ]
     joints, parts, changes = tables.joint_table(sheet), tables.parts_table(sheet), tables.sensitivity_table(sheet)
     assumed = tuple(f"{about}: {text}." for about, text in sheet.assumptions.items())
@@ -92,10 +91,10 @@ def _beside(*parts: str) -> str:
     return '<div class="pair">' + "".join(f"<div>{part}</div>" for part in parts) + "</div>"
 
 
-def _picture(sheet: DataSheet, draw: Callable[[Any, DataSheet], None], height: float, caption: str) -> str:
-    """Return a drawing of this height [inch] as an image."""
+def _picture(sheet: DataSheet, draw: Callable[[Any, DataSheet], None], caption: str) -> str:
+    """Return a drawing as an image."""
     with matplotlib.rc_context(RC):
-        figure, buffer = Figure(figsize=(4.6, height), layout="constrained"), io.BytesIO()
+        figure, buffer = Figure(figsize=(4.6, 4.0), layout="constrained"), io.BytesIO()
         draw(figure.subplots(), sheet)
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     data = base64.b64encode(buffer.getvalue()).decode()
