@@ -35,7 +35,7 @@ from armwright.sheet.design_sheet import design_sheet, sheet_of
 from armwright.sheet.record import DataSheet
 from armwright.sheet.sensitivities import variations, varied
 from armwright.sheet.tables import verdict_of
-from armwright.sheet.urdf_sheet import Job, driven, read_actuators, urdf_sheet
+from armwright.sheet.urdf_sheet import Job, urdf_sheet
 from armwright.sheet.writer import sheet_record
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
@@ -223,16 +223,11 @@ def test_sheet_of_a_urdf_is_that_of_the_design_that_it_was_written_from(
     arm = history.member(NUMBER).arm
     file = tmp_path / "arm.urdf"
     file.write_text(to_urdf(arm), encoding="utf-8")
-    described = read_urdf(file, tip="tip")
-    motors = [joint.actuator.name for joint in arm.joints if joint.actuator is not None]
-    named = read_actuators(",".join(f"{n}={name}" for n, name in enumerate(motors, start=1)), described.joints)
-    existing = urdf_sheet(driven(described, named), named)
+    existing = urdf_sheet(read_urdf(file, tip="tip"))
     assert existing.reach == pytest.approx(sheet.reach, rel=1e-3)
     assert existing.facts["payload_at_full_reach"].value == pytest.approx(
         sheet.facts["payload_at_full_reach"].value, rel=1e-2
     )
-    ours, theirs = sheet.over_reach[-1].backlash_error, existing.over_reach[-1].backlash_error
-    assert theirs == pytest.approx(ours, rel=1e-2)
     assert existing.facts["price"].value is None
     assert existing.facts["price"].reason == "a URDF states no price; try --price"
 
@@ -316,9 +311,6 @@ def test_command_writes_html_and_json(run: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--actuators", "shoulder_pan_joint"), "expected JOINT=NAME; try shoulder_pan_joint=XM430-W350"),
-        (("--actuators", "1=XM430-W35"), 'unknown actuator "XM430-W35". Did you mean "XM430-W350"?'),
-        (("--actuators", "1=XM430-W350,1=XM430-W350"), "expected one actuator"),
         (("--base", "0,0,0"), "--base 0,0,0: expected a task, too; try --task TASK"),
         (("--space", "desk"), "--space desk: expected a task, too; try --task TASK"),
         (("--price", "-3"), "price: expected a finite number of at least 0 USD, got -3"),
@@ -332,4 +324,4 @@ def test_wrong_options_of_an_existing_arm_get_one_line(options: tuple[str, str],
 
 def test_wrong_options_of_a_run_get_one_line(run: Path) -> None:
     assert "has the designs 0 to 6" in refused(2, "datasheet", run, "--design", 99)
-    assert "expected a URDF, got the run" in refused(2, "datasheet", run, "--actuators", "1=XM430-W350")
+    assert "expected a URDF, got the run" in refused(2, "datasheet", run, "--tip", "tool0")

@@ -12,7 +12,6 @@ def datasheet(
     source: str,
     *,
     design: int | None = None,
-    actuators: str | None = None,
     task: str | None = None,
     space: Path | None = None,
     base: str | None = None,
@@ -28,8 +27,6 @@ def datasheet(
     Parameters:
         source (RUN|ARM): A run folder, a URDF file, or a name such as ur5e (robot_descriptions; extra arms).
         design: Number of the design of the run. Default: the first recommended one.
-        actuators (JOINT=NAME,...): Actuators of the catalogue at joints of the URDF, by name or number. Default: the
-            efforts of the URDF.
         price (USD): Price of an arm that exists.
         seed: Seed of the base search. Default: 0.
         out: Output folder. Default: designs/NNNN of the run, or NAME-datasheet.
@@ -42,7 +39,7 @@ def datasheet(
     from armwright.sheet.writer import sheet_record, write_datasheet
 
     if Path(source).is_dir():
-        of_urdf = {"--actuators": actuators, "--task": task, "--space": space, "--base": base, "--price": price,
+        of_urdf = {"--task": task, "--space": space, "--base": base, "--price": price,
                    "--tip": tip, "--base-link": base_link, "--seed": seed}  # fmt: skip
         for name, value in of_urdf.items():
             if value is not None:
@@ -54,7 +51,7 @@ def datasheet(
         from armwright.existing.base_placement import placed
         from armwright.robot.robot_descriptions import find_urdf
         from armwright.robot.urdf_reader import read_urdf
-        from armwright.sheet.urdf_sheet import Job, driven, read_actuators, urdf_sheet
+        from armwright.sheet.urdf_sheet import Job, urdf_sheet
 
         if design is not None:
             raise SettingsError(f"--design {design}: expected a run folder, got {source}")
@@ -63,13 +60,11 @@ def datasheet(
                 raise SettingsError(f"{name} {value}: expected a task, too; try --task TASK")
         with activity("placing the arm" if task and base is None else "writing the data sheet"):
             described, job = read_urdf(find_urdf(source), tip, base_link), None
-            named = {} if actuators is None else read_actuators(actuators, described.joints)
-            described = driven(described, named)
             if task is not None:
                 problem = load_problem(task, space)
                 placement = placed(problem, described, seed or 0, parse_base(base))
                 described, job = placement.described, Job(problem, placement.mounting, placement.description)
-            sheet = urdf_sheet(described, named, job, price)
+            sheet = urdf_sheet(described, job, price)
         folder = Path(f"{Path(source).stem}-datasheet")
     files = write_datasheet(sheet, folder if out is None else out)
     if json_:

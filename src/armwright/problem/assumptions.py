@@ -1,9 +1,9 @@
 """Assumed values of actuators that enter the results of designs: estimates and defaults (`ActuatorRecord.assumed`)."""
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 
 from armwright.problem.problem import Problem
-from armwright.robot.actuators import UNITS, ActuatorRecord, value_of
+from armwright.robot.actuators import UNITS, value_of
 from armwright.robot.arm import Arm
 from armwright.text import rounded
 
@@ -32,11 +32,6 @@ def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None, also: It
     entering |= {"bracket_mass"} if problem.space.bracket_mass is None else set()
     if problem.space.has_motor_bodies:
         entering.add("shaft_offset")
-    return assumed_of(records, entering)
-
-
-def assumed_of(records: Iterable[ActuatorRecord], entering: Container[str]) -> Assumed:
-    """Return the assumed values of actuators, of these names; actuators without any are left out."""
     found: dict[str, dict[str, float]] = {}
     for record in records:
         completed = record.completed()

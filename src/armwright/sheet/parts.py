@@ -36,10 +36,10 @@ def parts_list(arm: Arm, space: DesignSpace) -> tuple[Part, ...]:
     records = {record.name: record for record in space.actuators}
     motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
     used = [records[motor.name].at_supply(motor.voltage or math.nan) for motor in motors]
-    return (*actuator_parts(used), *_tubes(arm, space), *_others(arm, space))
+    return (*_actuators(used), *_tubes(arm, space), *_others(arm, space))
 
 
-def actuator_parts(records: Sequence[ActuatorRecord]) -> Iterator[Part]:
+def _actuators(records: Sequence[ActuatorRecord]) -> Iterator[Part]:
     """Yield a line for each kind of actuator among those of an arm."""
     for record in dict.fromkeys(records):
         count, motor = records.count(record), record.actuator()

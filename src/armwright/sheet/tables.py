@@ -119,7 +119,7 @@ def parts_table(sheet: DataSheet) -> Table:
     )
     notes = [f"Neither mass nor price include {sheet.not_modelled}."] if sheet.not_modelled else []
     if not rows:
-        notes.append("A URDF names no parts; try --actuators.")
+        notes.append("A URDF names no parts.")
     return Table("Parts", ("n", "part", "each [USD]", "price [USD]", "detail"), rows, (1, 4), " ".join(notes))
 
 
