@@ -10,7 +10,6 @@
     │   │   └── UnknownQuantityError  a quantity that task and arms leave open
     │   ├── RunConflictError    the run folder holds a run with other settings
     │   └── MissingExtraError   an optional dependency that is not installed
-    ├── AnswerPendingError      a question waits for an answer (manual:DIR, wait: false)        (exit code 0)
     ├── StoppedError            a study ended on request                    (exit code 130, as after Ctrl-C)
     └── FailureError            something failed during the work            (exit code 1)
         ├── RunFolderError      a run folder that cannot be written, or whose content is damaged
@@ -131,24 +130,6 @@ class EvaluatorError(FailureError):
 
 class ClusterError(FailureError):
     """A Dask cluster does not answer, was lost, or has other versions than this process."""
-
-
-class AnswerPendingError(ArmwrightError):
-    """A question that waits for an answer; the run continues from there.
-
-    Attributes:
-        question: The path of the question file.
-        answer: The path where the answer is expected.
-        refusal: Why the previous answer was refused; empty if there was none.
-    """
-
-    exit_code = 0
-
-    def __init__(self, question: Path, answer: Path, refusal: str = "") -> None:
-        super().__init__(f"{question} waits for {answer}" + (f"; refused: {refusal}" if refusal else ""))
-        self.question = question
-        self.answer = answer
-        self.refusal = refusal
 
 
 class StoppedError(ArmwrightError):

@@ -11,13 +11,11 @@ import pytest
 
 from armwright import (
     LlmProposer,
-    ManualProposer,
     ProposalCallback,
     ReplayProposer,
     StudyLlmProposer,
     optimize,
 )
-from armwright.exceptions import AnswerPendingError
 from armwright.llm.backend import CallError, Question, Turn
 from armwright.llm.conversation import RESULTS, conversation, new_part
 from armwright.llm.model_options import ModelOptions, PromptOptions
@@ -27,6 +25,7 @@ from armwright.study.progress import Progress, StudyResult
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, is_check, wants_design
 from tests.support.controlled_runs import PROBLEM, cut
 from tests.support.controlled_runs import run as short_run
+from tests.support.manual_answers import impatient
 from tests.support.model_faults import FAULTS, openai_error
 from tests.support.wire_formats import llm_proposer, proposer
 
@@ -222,9 +221,8 @@ def test_failed_proposals_are_no_turns(server: ChatServer) -> None:
 def test_manual_questions_of_a_chat_contain_what_is_new(tmp_path: Path) -> None:
     line = "ORIGIN: (0, 0.01, {0})\nJOINTS: (Y, P, R, P)\nLINKS: (0.2, 0.2, 0.2, 0.2)\n"
     for number in (4, 7):
-        asked = ManualProposer(tmp_path / "ask", PromptOptions(memory="chat"), wait=False)
-        with pytest.raises(AnswerPendingError):
-            run(asked, tmp_path / "run")
+        with pytest.raises(KeyboardInterrupt):
+            run(impatient(tmp_path / "ask", memory="chat"), tmp_path / "run")
         (tmp_path / "ask" / f"{number:03d}-answer.md").write_text(line.format(number / 100), encoding="utf-8")
     first, second = ((tmp_path / "ask" / f"{number:03d}-prompt.md").read_text(encoding="utf-8") for number in (4, 7))
     assert "# Task" in first

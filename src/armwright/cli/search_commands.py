@@ -15,13 +15,11 @@ from armwright.cli.streams import (
     activity,
     exit_interrupted,
     open_console,
-    print_command,
     print_error,
     print_json,
     print_text,
-    repeat_command,
 )  # fmt: skip
-from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
+from armwright.exceptions import SettingsError, StoppedError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -217,15 +215,6 @@ def optimize(
         drawn = _draw(folder, drawing) if figures else []
     except (KeyboardInterrupt, StoppedError):
         exit_interrupted(console, f"every finished trial is in {folder}/" if folder.exists() else "nothing was started")
-    except AnswerPendingError as pending:
-        if pending.refusal:
-            console.print(f"answer rejected: {pending.refusal}")
-        console.print(f"{pending.question} waits for your answer in {pending.answer}; then resume with:")
-        print_command(console, repeat_command())
-        if json_:
-            files = {"folder": folder, "question": pending.question, "answer": pending.answer}
-            print_json({**files, "refusal": pending.refusal})
-        return
     if json_:
         print_json({"folder": folder, **run.summary})
     else:

@@ -43,7 +43,6 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
     max_calls: int | None = Field(default=None, ge=1)  # limit of requests in the whole run
     max_cost: float | None = Field(default=None, gt=0.0)  # limit of the cost of the whole run [USD]
     origin: Literal["model", "scripted"] = "model"  # recorded with every call; "scripted" for a stand-in
-    wait: bool = True  # with manual:DIR, wait for each answer; if false, exit at the first open question
     _named_in: str = PrivateAttr(default="")  # the file that names base_url, if it may be somebody else's
 
     @property

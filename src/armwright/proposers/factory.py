@@ -18,9 +18,9 @@ WITH_PLACE = ("replay", "manual")  # written replay:RUN and manual:DIR
 _USED: dict[str, Collection[str]] = {
     "none": (),
     "rules": (),
-    "manual": ("prompt", "memory", "wait"),  # answers are text and cost nothing
+    "manual": ("prompt", "memory"),  # answers are text and cost nothing
     "replay": ("in_flight",),
-    "llm": [name for name in ModelOptions.model_fields if name != "wait"],
+    "llm": list(ModelOptions.model_fields),
 }
 
 
@@ -109,6 +109,6 @@ def _proposer(
         from armwright.proposers.manual import ManualProposer
 
         description = f"manual (questions and answers in {place}/; prompt {options.prompt})"
-        return ManualProposer(Path(place), options, wait=options.wait), description
+        return ManualProposer(Path(place), options), description
     reason = "as requested" if kind == "rules" else "no language model is configured; --model names one"
     return RulesProposer(), f"rules ({reason})"

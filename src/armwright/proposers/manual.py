@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from armwright.exceptions import AnswerPendingError, FailureError, SettingsError, UsageError
+from armwright.exceptions import FailureError, SettingsError, UsageError
 from armwright.files import naming_write_errors, read_text, replace_file
 from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply, Turn
 from armwright.llm.model_options import PromptOptions
@@ -18,15 +18,11 @@ MAX_FILE = 10_000_000  # [bytes]
 
 
 class ManualBackend(LlmBackend):
-    """Write DIR/NNN-prompt.md and read DIR/NNN-answer.md (or .json), where NNN is the trial's number.
+    """Write DIR/NNN-prompt.md and wait for DIR/NNN-answer.md (or .json), where NNN is the trial's number."""
 
-    It waits for a missing answer; if `wait` is false, it raises AnswerPendingError.
-    """
-
-    def __init__(self, folder: Path, wait: bool = True) -> None:
+    def __init__(self, folder: Path) -> None:
         super().__init__("people", "manual")
         self.folder = folder
-        self.wait = wait
         self._cancelled = threading.Event()
         self._seen: dict[Path, tuple[int, int]] = {}  # sizes and times of files at the last look
 
@@ -59,7 +55,6 @@ class ManualBackend(LlmBackend):
         prompt_file, _ = self.files(number)
         answers = self._answers(number)
         self._ask(prompt_file, answers, question.prompt)
-        refused = ""
         while True:
             answer = next(filter(self._is_ready, answers), None)
             if answer is not None:
@@ -68,11 +63,8 @@ class ManualBackend(LlmBackend):
                     accepted = text if output is None else output.read(text)
                     return Reply(accepted, requests=1, seconds=round(time.perf_counter() - started, 3))
                 except UsageError as refusal:
-                    refused = str(refusal)
-                    self._refuse(number, answer, refused)
+                    self._refuse(number, answer, str(refusal))
                     continue  # another file may hold a valid answer
-            if not self.wait:
-                raise AnswerPendingError(prompt_file, answers[0], refused)
             if self._cancelled.wait(LOOK_EVERY):
                 raise CallError("cancelled", "waiting for the answer was cancelled", Reply())
 
@@ -93,13 +85,13 @@ class ManualBackend(LlmBackend):
         self._write(file, prompt)
 
     def _is_ready(self, answer: Path) -> bool:
-        """Return whether the answer is not empty and, if `wait`, did not change since the last look."""
+        """Return whether the answer is not empty and did not change since the last look."""
         if not os.path.isfile(answer):
             return False
         found = answer.stat()
         now = found.st_size, found.st_mtime_ns
         before, self._seen[answer] = self._seen.get(answer), now
-        return now[0] > 0 and (before == now or not self.wait)
+        return now[0] > 0 and before == now
 
     def _refuse(self, number: int, answer: Path, reason: str) -> None:
         before = len(list(self.folder.glob(f"{number:03d}-refused-*")))
@@ -123,15 +115,14 @@ class ManualProposer(PromptedProposer):
     Args:
         folder: Folder of questions and answers.
         options: Prompt and memory; answers are always text.
-        wait: Wait for an answer; if false, raise AnswerPendingError. The same call continues once it is there.
     """
 
     overlaps = False  # a person answers one question at a time, and may take days
 
-    def __init__(self, folder: str | Path, options: PromptOptions | None = None, *, wait: bool = True) -> None:
+    def __init__(self, folder: str | Path, options: PromptOptions | None = None) -> None:
         if Path(folder).exists() and not Path(folder).is_dir():
             raise SettingsError(f"{folder} is a file; manual needs a folder for its questions")
-        self.manual = ManualBackend(Path(folder), wait)
+        self.manual = ManualBackend(Path(folder))
         answers = (options or PromptOptions()).model_copy(update={"answer": "text"})
         super().__init__(self.manual, "manual", answers)
 
