@@ -186,15 +186,6 @@ def test_unreachable_server_exits_with_1(in_folder: Path) -> None:
     assert "--proposer rules needs none" in message
 
 
-def test_run_can_continue_without_an_unreachable_server(in_folder: Path) -> None:
-    where = ("--model", "m", *model_options(base_url="http://127.0.0.1:9/v1", on_failure="continue"))
-    done = armwright("optimize", "target-1", *SHORT, *where)
-    assert done.returncode == 0, done.stderr
-    assert "m: Connection error" in done.stdout
-    assert "2 proposals failed and became black-box trials (2 connection)" in done.stdout
-    assert "FLAGGED: 100%" in done.stdout
-
-
 def test_doctor_shows_the_configuration_without_keys(chat_server: ChatServer, in_folder: Path) -> None:
     done = armwright("doctor", OPENAI_API_KEY="sk-planted-in-the-environment")
     assert done.returncode == 0, done.stderr

@@ -10,7 +10,7 @@ from pydantic_ai.messages import ModelResponse
 from pydantic_ai.usage import RequestUsage
 
 from armwright import LlmProposer, ModelOptions, PromptOptions
-from armwright.exceptions import ProposalError
+from armwright.exceptions import ModelError, ProposalError
 from armwright.llm.backend import LlmBackend, OutputFormat, Question, Reply, Turn
 from armwright.llm.budget import CallBudget
 from armwright.llm.prices import describe_cost
@@ -159,12 +159,9 @@ def test_max_cost_bounds_the_requests_of_a_run(
 
 
 def test_max_cost_without_a_price_stops_after_the_check(chat_server: ChatServer) -> None:
-    """This holds with on_model_failure="continue" too."""
-    seen: list[Progress] = []
-    result = run(llm_proposer(chat_server.url, model="m", max_cost=1.0), seen=seen, on_model_failure="continue")
+    with pytest.raises(ModelError, match="max_cost cannot hold"):
+        run(llm_proposer(chat_server.url, model="m", max_cost=1.0))
     assert len(chat_server.requests) == 1  # the check, which showed that there is no price
-    assert result.summary["proposer"]["failures"] == {"budget": 4}
-    assert sum("max_cost cannot hold" in note for note in notes(seen)) == 1
 
 
 @pytest.mark.parametrize("most", [4, 9])

@@ -20,7 +20,6 @@ OPTIONS: dict[str, Any] = {
     "in_flight": 1,
     "max_calls": 1,
     "max_cost": 1.0,
-    "on_failure": "stop",
 }
 
 

@@ -202,7 +202,6 @@ def optimize(
                 in_flight=choice.options.in_flight,
                 initial_designs=initial_designs,
                 screen=screen,
-                on_model_failure=choice.options.on_failure,
                 workers=select_workers(workers, scheduler),
                 evaluation_timeout=evaluation_timeout,
                 allow_failures=allow_failures,

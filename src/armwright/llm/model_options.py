@@ -42,7 +42,6 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
     in_flight: int | None = Field(default=None, ge=1)  # calls while black-box trials run; None to wait for each answer
     max_calls: int | None = Field(default=None, ge=1)  # limit of requests in the whole run
     max_cost: float | None = Field(default=None, gt=0.0)  # limit of the cost of the whole run [USD]
-    on_failure: Literal["stop", "continue"] = "stop"  # if the model fails before the first trial
     origin: Literal["model", "scripted"] = "model"  # recorded with every call; "scripted" for a stand-in
     _named_in: str = PrivateAttr(default="")  # the file that names base_url, if it may be somebody else's
 

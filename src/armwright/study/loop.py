@@ -86,14 +86,14 @@ class Study:
         self._pending: dict[int, PendingTrial] = {}  # by number; a trial is recorded when all before it are
         self._is_paused = False
 
-    def run(self, on_model_failure: str, verify: bool) -> StudyResult:
+    def run(self, verify: bool) -> StudyResult:
         """Run the trials that are left, and write the results."""
         resumed = self._n_finished
         try:
             if self._proposer is not None:
                 self._proposer.open(None if self._folder is None else self._folder.path)
             if resumed < self._method.n_trials:
-                self._search(on_model_failure)
+                self._search()
             result = self._finish(resumed, verify)
         except BaseException as end:
             is_deliberate = isinstance(end, (KeyboardInterrupt, StoppedError))
@@ -104,10 +104,10 @@ class Study:
         self._channel.finish(self._n_finished)
         return result
 
-    def _search(self, on_model_failure: str) -> None:
+    def _search(self) -> None:
         first = self._n_finished
         self._channel.begin(first)
-        self._check_model(on_model_failure)
+        self._check_model()
         if self._folder is not None:
             discard_results(self._folder.path)  # those of fewer trials
             self._record.config = self._folder.note_versions(self._record.config, self._problem.evaluator)
@@ -126,8 +126,8 @@ class Study:
             return LocalBackend(self._problem, timeout)
         return DaskBackend(self._problem, workers, timeout, self._report_beginning)
 
-    def _check_model(self, on_model_failure: str) -> None:
-        """Report what the proposals will cost, and check that the proposer works."""
+    def _check_model(self) -> None:
+        """Report what the proposals will cost, and check that the proposer works; a run that has begun continues."""
         if self._proposer is None or self._requests is None:
             return
         n_due = self._method.n_proposals - len(self._requests.past_slots())
@@ -141,7 +141,7 @@ class Study:
             if note := self._proposer.check():
                 self._report_beginning(note)
         except ModelError as fault:
-            if on_model_failure == "stop" and not self._n_finished:
+            if not self._n_finished:
                 raise
             consequence = "the run continues"
             if fault.final is not None:

@@ -16,8 +16,6 @@ from armwright.spaces.parameters import Design
 from armwright.study.run_settings import check_integer
 from armwright.study.workers.cluster import Workers
 
-ON_MODEL_FAILURE = ("stop", "continue")
-
 
 @dataclass(frozen=True)
 class EvaluationOptions:
@@ -71,10 +69,8 @@ def check_proposer(proposer: str | Proposer | None) -> Proposer | None:
     return proposer
 
 
-def check_settings(problem: Problem, method: Method, evaluation: EvaluationOptions, on_model_failure: str) -> None:
+def check_settings(problem: Problem, method: Method, evaluation: EvaluationOptions) -> None:
     """Raise a SettingsError for settings that exclude each other, or for an initial design outside the space."""
-    if on_model_failure not in ON_MODEL_FAILURE:
-        raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
     for design in method.initial_designs:
         problem.space.design(design)
     if evaluation.timeout is not None:

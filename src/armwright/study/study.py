@@ -35,7 +35,6 @@ def optimize(
     in_flight: int | None = None,
     initial_designs: Sequence[Design] = (),
     screen: bool = True,
-    on_model_failure: str = "stop",
     verify: bool = True,
     workers: Workers | None = None,
     evaluation_timeout: float | None = None,
@@ -58,8 +57,6 @@ def optimize(
         in_flight: requests to the proposer that run while black-box trials go on; None: the study waits for each.
         initial_designs: designs of the first of the n_init trials, such as an existing arm.
         screen: whether the surrogate decides which proposals are evaluated; the sampler replaces the others.
-        on_model_failure: if the model fails before the first trial, "stop" raises ModelError, and "continue" runs
-            black-box trials only. A run that has started always continues.
         verify: whether the final front is verified (`proof/verification.py`); never with an evaluator.
         workers: processes that evaluate the designs; None: this process.
         evaluation_timeout: ends a call of the custom evaluator after so many seconds; the design is infeasible then.
@@ -70,6 +67,7 @@ def optimize(
 
     Raises:
         TaskError: it is proven that no design of the space can serve the task.
+        ModelError: the model fails before the first trial. A run that has started continues without it.
         EvaluatorError: the first five evaluations all failed with the same exception.
 
     Examples:
@@ -88,7 +86,7 @@ def optimize(
     sampler = sampler_for(problem, sampler, features)
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, initial_designs, screen)
     evaluation = EvaluationOptions(workers, evaluation_timeout, allow_failures)
-    check_settings(problem, method, evaluation, on_model_failure)
+    check_settings(problem, method, evaluation)
     refuse_unread_parameters(problem)
     stop_if_proven(check_instantly(problem))
     config = run_config(problem, method, seed)
@@ -96,4 +94,4 @@ def optimize(
         if folder is not None:
             config = folder.adopt(config)
         study = Study(problem, config, proposer, sampler, folder, watch, evaluation)
-        return study.run(on_model_failure, verify and problem.evaluator is None)
+        return study.run(verify and problem.evaluator is None)

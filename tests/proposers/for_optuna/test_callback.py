@@ -11,7 +11,7 @@ from optuna.samplers import NSGAIIISampler, NSGAIISampler, TPESampler
 from optuna.trial import TrialState
 
 from armwright import ProposalCallback, RulesProposer
-from armwright.exceptions import ModelError, ProposalError, SettingsError
+from armwright.exceptions import ProposalError, SettingsError
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
 
 
@@ -170,24 +170,6 @@ def test_permanent_fault_is_logged_once(log: list[str]) -> None:
     assert log == ["wrong key; no more proposals are requested"]
 
 
-@pytest.mark.parametrize("n_jobs", [1, 2])
-def test_on_failure_stop_raises_before_the_first_trial(n_jobs: int) -> None:
-    def callback(*faults: ProposalError) -> ProposalCallback:
-        return ProposalCallback(Failing(*faults), 5, on_model_failure="stop")
-
-    study = tpe()
-    with pytest.raises(ModelError, match="too slow"):
-        study.optimize(
-            objective, n_trials=40, n_jobs=n_jobs, callbacks=[callback(ProposalError("timeout", "too slow"))]
-        )
-    assert len(study.trials) < 40
-    study.optimize(objective, n_trials=20, n_jobs=n_jobs, callbacks=[callback()])
-    n = len(proposals(study))
-    study.optimize(objective, n_trials=10, n_jobs=n_jobs, callbacks=[callback(ProposalError("timeout", "too slow"))])
-    assert n >= 3
-    assert len(proposals(study)) > n  # once there was a proposal, nothing stops
-
-
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
@@ -196,7 +178,6 @@ def test_on_failure_stop_raises_before_the_first_trial(n_jobs: int) -> None:
         ({"proposer": Told(), "every": 0}, "every = 0: expected a whole number"),
         ({"proposer": Told(), "every": 2.5}, "every = 2.5: expected a whole number"),
         ({"proposer": Told(), "first": 0}, "first = 0: expected a whole number"),
-        ({"proposer": Told(), "on_model_failure": "ignore"}, 'on_model_failure "ignore" is not one of'),
     ],
 )
 def test_invalid_settings_are_refused(settings: dict[str, Any], words: str) -> None:

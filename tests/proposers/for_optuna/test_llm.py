@@ -135,8 +135,6 @@ def test_invalid_key_is_found_before_the_first_trial(chat_server: ChatServer) ->
     chat_server.answer = lambda request: (401, '{"error": {"message": "no such key"}}')
     with pytest.raises(ModelError, match="no such key"):
         proposer(chat_server).check()
-    with pytest.raises(ModelError, match="no such key"):
-        study_of(5, ProposalCallback(proposer(chat_server), every=5, on_model_failure="stop"))
 
 
 def test_given_space_needs_no_trial_and_narrows_the_observed_one(chat_server: ChatServer) -> None:

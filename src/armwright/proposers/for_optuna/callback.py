@@ -11,13 +11,11 @@ from optuna.samplers import BaseSampler, GridSampler
 from optuna.storages import InMemoryStorage
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
-from armwright.exceptions import DesignError, ModelError, ProposalError, SettingsError
+from armwright.exceptions import DesignError, ProposalError, SettingsError
 from armwright.proposers.for_optuna.parameters import checked_params, observed_space
 from armwright.proposers.for_optuna.proposer import StudyProposer
 from armwright.search.samplers import quiet_study
 from armwright.seeding import PROPOSING, derived_seed
-
-ON_MODEL_FAILURE = ("continue", "stop")
 
 # A child of Optuna's logger, for its verbosity and handlers. `warnings` would end a study that runs with warnings as
 # errors, and would hide repeated messages.
@@ -35,8 +33,6 @@ class ProposalCallback:
         every: trials per block.
         first: trials before the first proposal; by default every - 1, so that each block ends with a proposal.
         seed: of the proposer's random draws.
-        on_model_failure: "continue" goes on without proposals; "stop" raises ModelError from `study.optimize` if a
-            proposal fails before the first has succeeded.
 
     Attributes:
         proposed: number of enqueued proposals.
@@ -50,17 +46,13 @@ class ProposalCallback:
         *,
         first: int | None = None,
         seed: int = 0,
-        on_model_failure: str = "continue",
     ) -> None:
-        if on_model_failure not in ON_MODEL_FAILURE:
-            raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
         if StudyProposer not in type(proposer).__mro__:
             raise SettingsError(f"expected an instance of StudyProposer, got {proposer!r}")
         self.proposer = proposer
         self.every = _whole("every", every)
         self.first = max(1, self.every - 1) if first is None else _whole("first", first)
         self.seed = seed
-        self.on_model_failure = on_model_failure
         self.proposed = 0
         self.faults: Counter[str] = Counter()
         self._given_up: str | None = None  # kind of the final error, after which no proposals are requested
@@ -81,23 +73,20 @@ class ProposalCallback:
             proposal = self.proposer.propose(study, derived_seed(self.seed, PROPOSING, number), number)
             params = checked_params(proposal.params, self.proposer.space(study), observed_space(study))
         except ProposalError as error:
-            self._fail(study, error)
+            self._fail(error)
         except DesignError as error:
-            self._fail(study, ProposalError("design", f"{self.proposer.name}: {error}"))
+            self._fail(ProposalError("design", f"{self.proposer.name}: {error}"))
         else:
             enqueue(study, params, {"source": self.proposer.name, "proposal": proposal.id, "reason": proposal.reason})
             with self._lock:
                 self.proposed += 1
 
-    def _fail(self, study: optuna.Study, error: ProposalError) -> None:
+    def _fail(self, error: ProposalError) -> None:
         with self._lock:
             self.faults[error.kind] += 1
             reported = self._given_up is not None  # by another thread in the meantime
             if error.final:
                 self._given_up = error.kind
-        has_proposals = any("proposal" in trial.user_attrs for trial in study.get_trials(deepcopy=False))
-        if self.on_model_failure == "stop" and not has_proposals:
-            raise ModelError(str(error)) from error
         if not reported:
             outcome = "no more proposals are requested" if error.final else "the study continues without this proposal"
             _logger.warning(f"{error}; {outcome}")
