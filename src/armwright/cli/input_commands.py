@@ -93,7 +93,8 @@ def tasks(names: list[str] | None = None, *, json_: bool = False, csv_: bool = F
     Parameters:
         names: Describe these tasks (built-in, random-N, files).
     """
-    from armwright.cli.show_inputs import results_of, show_task, show_tasks, task_record, task_rows
+    from armwright.cli.show_inputs import show_task, show_tasks, task_record, task_rows
+    from armwright.proof.front_gap import best_known_hypervolume
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
     console = open_console(check_formats(json_, csv_))
@@ -104,7 +105,7 @@ def tasks(names: list[str] | None = None, *, json_: bool = False, csv_: bool = F
     if not names:
         show_tasks(console, listed)
     for task in listed if names else ():
-        show_task(console, task, *results_of(task))
+        show_task(console, task, best_known_hypervolume(task))
 
 
 def actuators(names: list[str] | None = None, *, json_: bool = False, csv_: bool = False) -> None:

@@ -4,7 +4,6 @@ import math
 import shlex
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,6 @@ from rich.console import Console
 from armwright.arrays import Array
 from armwright.cli.streams import format_point, print_command, print_named
 from armwright.cli.tables import NO_BREAK, Column, number, print_table, text
-from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.problem.checks.reach import distance_to_bases
 from armwright.problem.constraints import implied_constraints
 from armwright.problem.problem import Problem
@@ -24,7 +22,7 @@ from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, Target, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
-from armwright.text import percent, rounded
+from armwright.text import decimals, rounded
 
 if TYPE_CHECKING:
     from armwright.llm.draft import Draft
@@ -32,39 +30,27 @@ if TYPE_CHECKING:
 MAX_ROWS = 40  # of a table of targets
 
 
-def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
-    """Yield tasks as rows of tables, with the share of the best known hypervolume that each method reached."""
-    methods = dict.fromkeys(baseline.method for baseline in baselines())
-    for task in tasks:
-        shares = {baseline.method: baseline.share for baseline in baselines_of(task.name)}
-        shown = {method: shares.get(method) for method in methods}
-        yield {"name": task.name, "targets": len(task.targets), **shown, "description": task.description}
-
-
 def task_record(task: DesignTask) -> dict[str, Any]:
-    """Return a task for JSON, with the best known hypervolume and its baselines."""
-    best, stored = results_of(task)
-    return task.model_dump(mode="json") | {"best_known_hypervolume": best, "baselines": list(map(asdict, stored))}
+    """Return a task for JSON, with the best known hypervolume."""
+    return task.model_dump(mode="json") | {"best_known_hypervolume": best_known_hypervolume(task)}
 
 
-def results_of(task: DesignTask) -> tuple[float | None, list[Baseline]]:
-    """Return the best known hypervolume of a built-in task and its baselines; None and no baselines for another."""
-    best = best_known_hypervolume(task)
-    return best, [] if best is None else baselines_of(task.name)
+def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
+    """Yield tasks as rows of tables."""
+    for task in tasks:
+        best = best_known_hypervolume(task)
+        yield {"name": task.name, "targets": len(task.targets), "best_known": best, "description": task.description}
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     """Print a table with a line per task."""
-    methods = list(dict.fromkeys(baseline.method for baseline in baselines()))
     columns = (
-        text("task", "name"), number("targets", "targets", str), *(number(name, name, percent) for name in methods),
+        text("task", "name"), number("targets", "targets", str), number("best known", "best_known", decimals),
         text("", "description", rank=1, least=24),
     )  # fmt: skip
     print_table(console, columns, task_rows(tasks))
-    console.print(
-        f"\n{' and '.join(methods)}: share of the best known hypervolume after 200 counted trials (mean of "
-        f"{baselines()[0].runs} runs).\narmwright tasks NAME describes one task; random-N is one of a seeded family."
-    )
+    console.print("\nbest known: the hypervolume of the best known front. armwright tasks NAME describes one task;")
+    console.print("random-N is one of a seeded family.")
 
 
 def actuator_rows(records: Sequence[ActuatorRecord]) -> Iterator[dict[str, Any]]:
@@ -124,7 +110,6 @@ def show_task(
     console: Console,
     task: DesignTask,
     best_known: float | None = None,
-    stored: Sequence[Baseline] = (),
     has_drives: bool = False,
     has_bodies: bool = False,
     is_brief: bool = False,
@@ -135,7 +120,6 @@ def show_task(
         console: The console.
         task: The task.
         best_known: Its best known hypervolume, if any.
-        stored: Its baselines.
         has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
         has_bodies: Whether motors or a column are solid bodies, which may not collide.
         is_brief: Leave out the targets.
@@ -169,11 +153,6 @@ def show_task(
     ):
         if value:
             console.print(f"  {name}: {value}")
-    for baseline in stored:
-        console.print(
-            f"  {baseline.method}, {baseline.runs} runs of 200 counted trials: E_hv {baseline.e_hv:.2f} (σ_hv "
-            f"{baseline.sigma_hv:.2f}), final {baseline.final:.2f}, {baseline.share:.1%} of the best known"
-        )
 
 
 def show_target_table(console: Console, problem: Problem) -> None:

@@ -155,7 +155,7 @@ def _listed(seeds: int | tuple[int, ...]) -> tuple[int, ...]:
 
 
 def suite_tasks() -> tuple[str, ...]:
-    """Return the names of the built-in tasks in the paper's space, which have stored baselines."""
+    """Return the names of the built-in tasks in the paper's space."""
     return tuple(name for name in builtin_names() if name not in builtin_spaces())
 
 
