@@ -144,15 +144,6 @@ def test_overall_contrast_counts_every_task_once(runs: Path) -> None:
     assert compare_summaries(five).overall == []
 
 
-def test_times_count_the_runs_that_reached_the_target(comparison: Comparison) -> None:
-    assert comparison.times
-    for time in comparison.times:
-        curves = comparison.curves(time.method, time.task)
-        there = [next((i + 1 for i, v in enumerate(curve) if v >= time.hypervolume), None) for curve in curves]
-        assert time.reached == sum(t is not None for t in there)
-        assert (time.median_trials is None) == (time.reached < 2)
-
-
 def test_flagged_runs_are_excluded_and_scripted_ones_marked(runs: Path, tmp_path: Path) -> None:
     place = shutil.copytree(runs, tmp_path / "runs")
     for seed in SEEDS:
@@ -230,7 +221,7 @@ def test_front_search_is_compared_with_studies(runs: Path, tmp_path: Path) -> No
 def test_markdown_and_csv_tables_agree(comparison: Comparison, tmp_path: Path) -> None:
     comparison.published, comparison.published_in = {("BBO (12 trials)", "target-1"): (6.7, 2.03)}, "The Paper"
     files = write_tables(tmp_path, comparison, "All", ["one cell is missing"])
-    assert {path.name for path in files} >= {"table.md", "table.csv", "contrasts.csv", "time-to.csv"}
+    assert {path.name for path in files} >= {"table.md", "table.csv", "contrasts.csv"}
     text = (tmp_path / "table.md").read_text(encoding="utf-8")
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(comparison.rows) == 4

@@ -1,6 +1,5 @@
-"""Compare finished runs by method, task and seed: means, intervals, paired tests and times to target."""
+"""Compare finished runs by method, task and seed: means, intervals and paired tests."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -8,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from armwright.arrays import Array, finite_or_none
+from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.experiments.run_list import read_finished_runs
 from armwright.experiments.run_record import RunSummary
 from armwright.experiments.statistics import Interval, PairedTest, can_reject, holm, interval, paired_test
 from armwright.proof.front_gap import known_front
-
-LEVELS = (0.5, 0.75, 0.9, 0.95)  # shares of the best known hypervolume, for times to target
 
 
 @dataclass(frozen=True)
@@ -41,19 +38,6 @@ class Contrast:
     test: PairedTest  # paired by seed; over all tasks, of the logarithms by task (Demsar, JMLR 7:1, 2006)
     p_holm: float | None  # corrected for the number of contrasts; None with too few pairs for a test
     ratio: Interval | None = None  # over all tasks: mean E_hv divided by the baseline's
-
-
-@dataclass(frozen=True)
-class TimeToTarget:
-    """Counted trials needed to reach a share of the best known hypervolume."""
-
-    task: str
-    method: str
-    level: float
-    hypervolume: float
-    reached: int  # runs that did
-    runs: int
-    median_trials: float | None  # over the runs; None if fewer than half of them did
 
 
 class Comparison:
@@ -167,23 +151,6 @@ class Comparison:
                 test = paired_test(np.log(own), np.log(baseline))
                 tests.append(Contrast("", method, other, test, None, interval(own / baseline)))
         return _corrected(tests)
-
-    @cached_property
-    def times(self) -> list[TimeToTarget]:
-        """Times to shares of the best known hypervolume, or of the best of these runs if none is known."""
-        times: list[TimeToTarget] = []
-        for task in self.tasks:
-            best = self.best_known(task) or max(run.final for run in self.runs if run.task == task)
-            for method in self.methods:
-                curves = self.curves(method, task)
-                for level in LEVELS if len(curves) else ():
-                    trials = [
-                        float(np.argmax(curve >= level * best)) + 1 if curve[-1] >= level * best else math.inf
-                        for curve in curves
-                    ]
-                    reached, median = sum(map(math.isfinite, trials)), finite_or_none(np.median(trials))
-                    times.append(TimeToTarget(task, method, level, level * best, reached, len(trials), median))
-        return times
 
     def _e_hv_by_seed(self, method: str, task: str) -> dict[int, float]:
         return {run.seed: float(run.curve.mean()) for run in self.runs_of(method, task) if len(run.curve)}

@@ -25,7 +25,6 @@ HEADS = {  # if they are not the keys in words
     "baseline": "against",
     "n": "pairs",
     "p_holm": "p (Holm)",
-    "level": "share",
     "gained": "hypervolume",
     "lengths_5_cm": "5 cm",
     "lengths_1_cm": "1 cm",
@@ -40,9 +39,9 @@ def _p(p: float | None) -> str:
 
 
 WRITE: Mapping[str, Callable[[Any], str]] = {  # texts of values, by key
-    **dict.fromkeys(("final", "best_known", "hypervolume"), decimals),
-    **dict.fromkeys(("trials", "median_trials", "proposals", "calls"), partial(decimals, places=0)),
-    **dict.fromkeys(("level", "front", "gained", *BIASES.split()), percent),
+    **dict.fromkeys(("final", "best_known"), decimals),
+    **dict.fromkeys(("trials", "proposals", "calls"), partial(decimals, places=0)),
+    **dict.fromkeys(("front", "gained", *BIASES.split()), percent),
     **dict.fromkeys(("difference", "effect"), "{:+.2f}".format),
     **dict.fromkeys(("p", "p_holm"), _p),
     "share_of_best_known": partial(percent, places=1),
@@ -100,7 +99,6 @@ def tables(comparison: Comparison) -> list[Table]:
     """Return the tables of a comparison."""
     results = [_result_record(comparison, row) for row in comparison.rows]
     overall, contrasts = (_contrast_records(comparison, of) for of in (comparison.overall, comparison.contrasts))
-    times = [asdict(time) | {"method": comparison.label(time.method)} for time in comparison.times]
     sources, proposals = list(_source_records(comparison)), list(_proposer_records(comparison))
     differences = _contrast_caption(comparison)
     return [
@@ -108,7 +106,6 @@ def tables(comparison: Comparison) -> list[Table]:
         _table("", "At the end", FINAL, results, "task method runs final share_of_best_known best_known"),
         _table("overall", "Over all tasks", OVERALL, overall, f"method baseline ratio {TESTED}"),
         _table("contrasts", "Differences", differences, contrasts, f"task method baseline difference {TESTED}"),
-        _table("time-to", TO_LEVELS, TIMES, times, "task method level hypervolume median_trials reached runs"),
         _table("sources", "Front by source", SOURCES, sources, "task method source trials front gained"),
         _table("proposers", "Proposals", PROPOSALS, proposals, f"task method proposals {BIASES} calls cost_usd"),
         Table("runs", [_run_record(comparison, run) for run in (*comparison.runs, *comparison.excluded)]),
@@ -161,11 +158,6 @@ OVERALL = (
     "Ratio of a method's E_hv to that of another one; every task counts once. Mean with its 95 % bootstrap "
     "interval over the tasks. Two-sided Wilcoxon signed-rank test of the logarithms over the tasks, corrected for "
     "the number of comparisons (Holm)."
-)
-TO_LEVELS = "Trials to a hypervolume"
-TIMES = (
-    "Counted trials needed to reach a share of the best known hypervolume (if none is known, of the best of these "
-    "runs): median over the runs."
 )
 SOURCES = (
     "Share of the final front that was found by each source, and share of the final hypervolume that its designs "
