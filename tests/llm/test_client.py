@@ -31,7 +31,7 @@ def test_first_trial_of_each_block_is_from_the_model(chat_server: ChatServer, tm
     assert (proposer["name"], proposer["model"], proposer["origin"]) == ("llm", "test-model", "model")
     assert (proposer["calls"], proposer["failures"], proposer["call_failures"]) == (5, {}, {})
     assert (proposer["tokens"], proposer["input_tokens"], proposer["output_tokens"]) == (5 * 120, 5 * 100, 5 * 20)
-    assert (proposer["cost_usd"], proposer["flagged"], proposer["overlap"]) == (None, False, None)
+    assert (proposer["cost_usd"], proposer["flagged"]) == (None, False)
 
 
 def test_invalid_transcript_answer_is_requested_again(chat_server: ChatServer, tmp_path: Path) -> None:

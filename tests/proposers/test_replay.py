@@ -89,9 +89,8 @@ def test_late_answers_are_replayed_when_they_arrived(chat_server: ChatServer, tm
     assert proposals[0].number - (proposals[0].feedback or 0) >= 5
     assert len({trial.asked or trial.number for trial in proposals}) == 8
     chat_server.requests.clear()
-    again = replayed(tmp_path / "first", tmp_path / "again", **settings)
+    replayed(tmp_path / "first", tmp_path / "again", **settings)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
-    assert again.summary["proposer"]["overlap"] == run.summary["proposer"]["overlap"]
     assert not chat_server.requests
 
 

@@ -44,7 +44,8 @@ def test_no_reported_design_is_worse_than_itself_without_an_idle_joint() -> None
     values = plane.evaluate(matrix).penalised
     kept = front_mask(values) & np.all(values < (1.0, 1000.0), axis=1)
     front = reported_front(plane, matrix[kept], values[kept], (1.0, 1000.0), 300)
-    assert 0 < front.reduced <= front.evaluations
+    fewer = {row.tobytes() for row in front.matrix} - {row.tobytes() for row in matrix}
+    assert fewer, "some reduced designs are reported"
     assert front_mask(front.values).all()
     assert np.array_equal(plane.evaluate(front.matrix).penalised, front.values)
     candidates = plane.evaluate(reduced(plane, front.matrix)).penalised

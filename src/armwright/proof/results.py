@@ -8,7 +8,7 @@ shown.npz                 what the page shows (shown_run.py)
 
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -146,7 +146,7 @@ def summarize(
         **({"screened_out": dict(screened)} if config.study.screen else {}),
         **({} if surrogate is None else {"surrogate": surrogate}),
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
-        "proposer": None if proposer is None else _proposer_record(history, config, proposer),
+        "proposer": None if proposer is None else _proposer_record(history, proposer),
         "proposer_bias": None if proposer is None else asdict(proposer_bias(history, proposer.name)),
         "seconds": {part: round(seconds[part], 6) for part in PARTS},
         "versions": dict(config.versions),
@@ -255,7 +255,7 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
     }
 
 
-def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:
+def _proposer_record(history: History, proposer: ProposerSummary) -> dict[str, Any]:
     reserved = [trial for trial in history if trial.request is not None]
     fallbacks = sum(trial.fault is not None for trial in reserved)
     record = asdict(proposer)
@@ -267,26 +267,6 @@ def _proposer_record(history: History, config: RunConfig, proposer: ProposerSumm
         "flagged": fallbacks > MAX_FALLBACK_SHARE * len(reserved),
         "tokens": proposer.input_tokens + proposer.output_tokens,
         **notes,
-        "overlap": _overlap_record(history, config, reserved),
-    }
-
-
-def _overlap_record(history: History, config: RunConfig, reserved: Sequence[FinishedTrial]) -> dict[str, Any] | None:
-    """Return the share of proposals among the counted trials and the age of their feedback [trials].
-
-    ratio_with_failures: The share of the trials reserved for the proposer, failed requests included.
-    """
-    method = config.study
-    if method.in_flight is None:
-        return None
-    ages = [trial.number - trial.request[1] for trial in reserved if trial.request and trial.proposal]
-    counted = max(1, len(history) - history.n_init)
-    return {
-        "in_flight": method.in_flight,
-        "ratio_planned": round(method.n_proposals / method.n_total, 4),
-        "ratio": round(len(ages) / counted, 4),
-        "ratio_with_failures": round(len(reserved) / counted, 4),
-        "feedback_age": {"mean": round(sum(ages) / len(ages), 2), "max": max(ages)} if ages else None,
     }
 
 

@@ -44,17 +44,6 @@ class _Verification(_Record):
     hypervolume_worst_case: float
 
 
-class _Age(_Record):
-    mean: float
-    max: int
-
-
-class _Overlap(_Record):
-    ratio: float
-    ratio_planned: float
-    feedback_age: _Age | None
-
-
 class _Proposer(_Record):
     name: str
     model: str | None
@@ -69,7 +58,6 @@ class _Proposer(_Record):
     cost_usd: float | None
     call_seconds: float
     differing_prompts: int = 0
-    overlap: _Overlap | None
 
 
 class _Surrogate(_Record):
@@ -87,11 +75,6 @@ class _Seconds(_Record):
 _Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class _Reduced(_Record):
-    evaluations: Count
-    designs: Count
-
-
 class _Screening(_Record):
     considered: Count
     discarded_by_bounds: Count
@@ -107,7 +90,6 @@ class _Search(_Record):
     infeasible: Count = 0
     screening: _Screening | None = None
     reference_point_from: list[str]
-    reduced: _Reduced
 
 
 class _Nearest(_Record):

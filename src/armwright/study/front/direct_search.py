@@ -240,7 +240,7 @@ class DirectSearch:
     def _finish(self, ended: str, seconds: float) -> FrontRun:
         """Write the results; seconds: search time of all sessions."""
         self._settle_reference_point()
-        trials, record = self._reported_trials()
+        trials, found = self._reported_trials()
         history = History(self.problem, trials, 0, self.config.reference_point)
         statistics = {
             "evaluations": self.search.evaluations,
@@ -249,7 +249,7 @@ class DirectSearch:
             "seconds": round(seconds, 3),
             "ended_by": ended,
             "reference_point_from": self.survey.origins,
-            **record,
+            "found": found,
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }
 
@@ -303,13 +303,13 @@ class DirectSearch:
         """Bound the hypervolume by another point, what is known of the past included."""
         self.search.move_reference_point(point, self.survey.history(point))
 
-    def _reported_trials(self) -> tuple[list[FinishedTrial], dict[str, Any]]:
-        """Return the designs that are reported as trials, and a record of their selection; those of a finished run."""
+    def _reported_trials(self) -> tuple[list[FinishedTrial], int]:
+        """Return the designs that are reported as trials, those of a finished run, and how many were found."""
         stored = None if self.folder is None else read_summary(self.folder.path)
         if self.folder is not None and stored is not None:
             _, history = read_run(self.folder.path)
             if len(history) == stored["n_trials"]:
-                return list(history), {key: stored["search"][key] for key in ("found", "reduced")}
+                return list(history), stored["search"]["found"]
         point, n = self.survey.best_point(), self._affordable_designs()
         front = reported_front(self.problem, self.search.matrix, self.search.values, point, n)
         outcomes = self.problem.evaluate(front.matrix)
@@ -319,8 +319,7 @@ class DirectSearch:
             FinishedTrial(n, FRONT_SEARCH, design, tuple(row), violations=outcome.violations, q=outcome.q)
             for n, (design, row, outcome) in enumerate(zip(designs, values.tolist(), outcomes, strict=True))
         ]
-        reduction = {"evaluations": front.evaluations, "designs": front.reduced}
-        return trials, {"found": front.found, "reduced": reduction}
+        return trials, front.found
 
     def _affordable_designs(self) -> int:
         """Return how many designs of the front there is time to verify and write, by the time that some take."""

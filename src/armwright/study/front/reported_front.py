@@ -19,8 +19,6 @@ class ReportedFront:
 
     matrix: Array  # (K, P) designs
     values: Array  # (K, M) objectives
-    evaluations: int  # reduced designs that were evaluated
-    reduced: int  # reduced designs among the K
     found: int  # designs that a user can tell apart, of which K were affordable
 
 
@@ -34,23 +32,22 @@ def reported_front(
     """
     kept, n_distinct = _selected(problem, matrix, values, reference_point, n)
     matrix, values = matrix[kept], values[kept]
-    known, found = {row.tobytes() for row in matrix}, set[bytes]()
-    parents = matrix
+    known = {row.tobytes() for row in matrix}
+    parents = kept_designs = matrix
     while len(candidates := np.array([row for row in reduced(problem, parents) if row.tobytes() not in known])):
-        found |= {row.tobytes() for row in candidates}
-        known |= found
+        known |= {row.tobytes() for row in candidates}
         # The new designs come first: of designs with equal values, the first one stays on the front.
         values = np.vstack([problem.evaluate(candidates).penalised, values])
         matrix = np.vstack([candidates, matrix])
         on_front = front_mask(values)
         parents = candidates[on_front[: len(candidates)]]
         matrix, values = matrix[on_front], values[on_front]
-    if found:
+    if parents is not kept_designs:
         kept, n_distinct = _selected(problem, matrix, values, reference_point, n)
         matrix, values = matrix[kept], values[kept]
     order = np.argsort(values[:, 0], kind="stable")
     matrix, values = matrix[order], values[order]
-    return ReportedFront(matrix, values, len(found), sum(row.tobytes() in found for row in matrix), n_distinct)
+    return ReportedFront(matrix, values, n_distinct)
 
 
 def _selected(
