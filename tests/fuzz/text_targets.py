@@ -55,16 +55,16 @@ POINTS = [
 
 def run_words(data: bytes) -> None:
     """Read expressions of options and task files; none of them is evaluated as code."""
-    from armwright.problem.conditions import read_condition, read_weights
+    from armwright.problem.conditions import read_condition
     from armwright.problem.constraints import read_constraints
     from armwright.study.front.search_budget import read_seconds
 
     text = data.decode("utf-8", "replace")
-    reads = (read_condition, read_weights, read_seconds, lambda words: read_constraints(words.split("\n")))
+    reads = (read_condition, read_seconds, lambda words: read_constraints(words.split("\n")))
     any_of((lambda read=read: read(text)) for read in reads)
 
 
 WORDS = [
-    b"position_error<=0.05", b"torque>1e3", b"position_error=2,torque=1", b"5s", b"2.5min", b"1e6", b"100_000",
+    b"position_error<=0.05", b"torque>1e3", b"5s", b"2.5min", b"1e6", b"100_000",
     b"mass <= 3\nlength >= 0.2",
 ]  # fmt: skip

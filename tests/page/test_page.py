@@ -238,13 +238,11 @@ def test_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: Histo
         assert verdict in row.inner_text()
 
 
-def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", holds: bool = False) -> list[int]:
+def asked(tab: Tab, where: str = "", by: str = "the knee", holds: bool = False) -> list[int]:
     """The designs of the table, in its order, after a query was typed in."""
     page = tab.page
     page.locator("#pick-where").fill(where)
     page.locator("#pick-by").select_option(label=by)
-    if by == "weights":
-        page.locator("#pick-weights").fill(weights)
     page.locator("#pick-holds").set_checked(holds)
     page.get_by_role("button", name="Pick", exact=True).click()
     return [int(text) for text in page.locator("#table tbody tr td:first-child").all_inner_texts()]
@@ -265,12 +263,10 @@ def test_page_pick_matches_the_pick_command(run: Path, tab: Tab) -> None:
     assert asked(tab, ",".join(where), by="least mass") == picked(run, *where, by="mass")
     assert asked(tab, holds=True) == picked(run, holds=True)
     assert asked(tab, "origin_z >= 1e-2") == picked(run, "origin_z>=0.01")
-    last = asked(tab, "torque < 4.5", by="weights", weights="position_error=2, torque=1")
-    assert last == picked(run, "torque<4.5", weights={"position_error": 2.0, "torque": 1.0})
+    last = asked(tab, "torque < 4.5", by="least mass")
+    assert last == picked(run, "torque<4.5", by="mass")
     assert tab.ask("armwright.state.design") == last[0]
-    assert tab.text("#pick-message").endswith(
-        'armwright pick RUN --where "torque<4.5" --weights position_error=2,torque=1'
-    )
+    assert tab.text("#pick-message").endswith('armwright pick RUN --where "torque<4.5" --by mass')
     tab.page.get_by_role("button", name="Show all").click()
     assert tab.page.locator("#table tbody tr").count() == len(picked(run))
 
@@ -281,12 +277,8 @@ def test_page_pick_explains_empty_results(run: Path, tab: Tab, history: History)
     asked(tab, "torque<100, position_error<=1e-6")
     least = float(re.findall(r"the nearest has ([\d.]+)\.", tab.text("#pick-message"))[0])
     assert least == pytest.approx(min(member.values[0] for member in history.front), rel=1e-3)
-    for where, weights, message in (
-        ("mas<2", "", 'Unknown quantity "mas"'),
-        ("torque", "", "such as mass<=2.5"),
-        ("", "torque=0", "above 0"),
-    ):
-        asked(tab, where, by="weights" if weights else "the knee", weights=weights)
+    for where, message in (("mas<2", 'Unknown quantity "mas"'), ("torque", "such as mass<=2.5")):
+        asked(tab, where)
         assert message in tab.text("#pick-message")
     assert tab.page.locator("#table tbody tr").count() == before
     assert tab.faults == []

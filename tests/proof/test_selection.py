@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import mujoco
-import numpy as np
 import pytest
 import yourdfpy
 from hypothesis import given
@@ -47,14 +46,6 @@ def test_default_pick_is_the_knee(history: History) -> None:
     assert len(pick(history)) == len(history.front)
 
 
-def test_weights_are_relative_to_the_reference_point(history: History) -> None:
-    values = np.array([member.values for member in history.front])
-    for weights in ((1.0, 0.0), (0.0, 2.0), (3.0, 1.0)):
-        best = history.front[int(np.argmin(values @ (np.array(weights) / 5.0)))]
-        named = dict(zip(("position_error", "torque"), weights, strict=True))
-        assert pick(history, weights=named)[0].number == best.number
-
-
 def test_pick_can_be_restricted_to_designs_that_hold(run: Path) -> None:
     """Without constraints, these are the robust ones."""
     robust = json.loads((run / "summary.json").read_text(encoding="utf-8"))["verification"]["robust_numbers"]
@@ -72,10 +63,6 @@ def test_empty_selection_names_the_reason(history: History) -> None:
         pick(history, both)
     with pytest.raises(SettingsError, match=r'unknown quantity "torqe".*Did you mean "torque"'):
         pick(history, [Condition("torqe", "<", 1.0)])
-    with pytest.raises(SettingsError, match='unknown quantity "mass"'):
-        pick(history, weights={"mass": 1.0})  # not an objective here
-    with pytest.raises(SettingsError, match="one quantity or weights, got both"):
-        pick(history, by="torque", weights={"torque": 1.0})
 
 
 @given(
@@ -150,7 +137,6 @@ def test_mistakes_are_reported(run: Path) -> None:
         (["export", str(run), "--design", "999"], "has the designs 0 to 49"),
         (["export", str(run), "--format", "urfd"], 'Did you mean "urdf"'),
         (["pick", str(run), "-n", "0"], "-n 0"),
-        (["pick", str(run), "--weights", "torque"], "names with numbers"),
     ):
         result = CliRunner().invoke(app, arguments)
         assert words in str(result.exception)

@@ -15,34 +15,31 @@ def pick(
     *,
     where: list[str] | None = None,
     by: str | None = None,
-    weights: str | None = None,
     holds: bool = False,
     n: int = 1,
     all_: bool = False,
     json_: bool = False,
     csv_: bool = False,
 ) -> None:
-    """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee.
+    """Choose designs of RUN's front by conditions and one quantity; by default, its knee.
 
     Parameters:
         where: A condition such as "position_error<=0.05" (may be repeated).
         by: The quantity to minimise: torque, mass, link_1, …
-        weights: Weights of objectives relative to the reference point: position_error=2,torque=1.
         holds: Only designs that hold with a heavier payload, less voltage, and the base or a link 1 mm off.
         n: Number of designs, the best first.
         all_: All designs that meet the conditions, in a table.
     """
     from armwright.cli.show_picked import picked_rows, show_picked, show_picked_table, with_parts
-    from armwright.problem.conditions import read_condition, read_weights
+    from armwright.problem.conditions import read_condition
     from armwright.proof.selection import pick_from, survival_of
 
     check_formats(json_, csv_)
     if n < 1:
         raise SettingsError(f"-n {n}: expected a whole number from 1")
     conditions = [read_condition(text) for text in where or ()]
-    weighed = None if weights is None else read_weights(weights)
     with activity(f"reading {run}"):
-        history, picked, records = pick_from(run, conditions, by, weighed, holds)
+        history, picked, records = pick_from(run, conditions, by, holds)
     chosen = picked if all_ else picked[:n]
     names = [*(condition.name for condition in conditions), *([] if by is None else [by])]
     rows = picked_rows(history, chosen, names, records)

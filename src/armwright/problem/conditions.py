@@ -1,4 +1,4 @@
-"""Conditions on quantities, such as `price <= 200 USD`, and weights, as users write them."""
+"""Conditions on quantities, such as `price <= 200 USD`, as users write them."""
 
 import re
 from collections.abc import Mapping
@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.exceptions import SettingsError
-from armwright.units import NUMBER, OTHER_UNITS, UNSIGNED
+from armwright.units import NUMBER, OTHER_UNITS
 
 _CONDITION = re.compile(rf"\s*([A-Za-z_]\w*)\s*(<=|>=|==|<|>)\s*({NUMBER})\s*([^\W\d][^<>=]*)?")
-_WEIGHT = re.compile(rf"\s*([A-Za-z_]\w*)\s*=\s*({UNSIGNED})\s*")
 _HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.greater, "==": np.equal}
 
 
@@ -46,16 +45,3 @@ def read_condition(text: str) -> Condition:
         raise SettingsError(f'--where "{text}": expected a name, one of <= < == > >= and a number, such as mass<=2.5')
     name, relation, bound, unit = found.groups("")
     return Condition(name, relation, float(bound), unit.strip())
-
-
-def read_weights(text: str) -> dict[str, float]:
-    """Parse weights such as `position_error=2,torque=1`."""
-    weights: dict[str, float] = {}
-    for part in text.split(","):
-        found = _WEIGHT.fullmatch(part)
-        if found is None:
-            raise SettingsError(f'--weights "{text}": expected names with numbers, such as position_error=2,torque=1')
-        weights[found[1]] = float(found[2])
-    if not any(weights.values()):
-        raise SettingsError(f'--weights "{text}": expected at least one above 0')
-    return weights

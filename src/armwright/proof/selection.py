@@ -1,10 +1,9 @@
-"""Selection of designs of a front: by conditions, by one quantity, by weights, or the knee."""
+"""Selection of designs of a front: by conditions, by one quantity, or the knee."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic_core import to_jsonable_python
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
@@ -45,25 +44,23 @@ def pick(
     history: History,
     where: Sequence[Condition] = (),
     by: str | None = None,
-    weights: Mapping[str, float] | None = None,
     numbers: Sequence[int] | None = None,
     facts: Mapping[int, Facts] | None = None,
 ) -> list[FrontMember]:
     """Select the designs of the front that satisfy all conditions, the best first.
 
-    Without `by` and `weights`, the knee of the front comes first, then the designs nearest to its corner.
+    Without `by`, the knee of the front comes first, then the designs nearest to its corner.
 
     Args:
         history: The trials.
         where: Conditions. Quantities that the run did not evaluate are evaluated now, in the task's first case.
         by: The quantity to sort by, smallest first.
-        weights: Weights of the objectives, which are divided by the reference point and summed.
         numbers: The trials to select from, such as those that hold; None for all.
         facts: What is known of the designs by number; None to compute it if needed.
 
     Raises:
         FailureError: No design satisfies the conditions.
-        SettingsError: A quantity does not exist, or both `by` and `weights` are given.
+        SettingsError: A quantity does not exist.
 
     Examples:
         >>> import armwright as aw
@@ -72,17 +69,12 @@ def pick(
         >>> lightest.values[1] == min(member.values[1] for member in run.front if member.arm.length <= 1.2)
         True
     """
-    if by is not None and weights is not None:
-        raise SettingsError("expected one quantity or weights, got both")
     if len(history) and not history.front:
         raise FailureError(describe_infeasibility(history))
-    objectives = [objective.name for objective in history.problem.objectives]
     asked = [*(condition.name for condition in where), *([] if by is None else [by])]
     quantities = quantities_of_front(history, asked, facts)
     units = _units(history)
     where = [condition.in_unit(units[condition.name]) for condition in where]
-    for name in weights or {}:
-        _check_name(name, objectives)
     left = [
         member
         for member in history.front
@@ -93,10 +85,6 @@ def pick(
         raise FailureError(_describe_unmet(where, list(quantities.values())))
     if by is not None:
         return sorted(left, key=lambda member: quantities[member.number][by])
-    if weights is not None:
-        scale = np.array(history.reference_point or np.ones(len(objectives)))
-        scaled_weights = np.array([weights.get(name, 0.0) for name in objectives]) / scale
-        return sorted(left, key=lambda member: float(scaled_weights @ np.array(member.values)))
     return knee_first(history, left)
 
 
@@ -104,7 +92,6 @@ def pick_from(
     run: Path,
     where: Sequence[Condition] = (),
     by: str | None = None,
-    weights: Mapping[str, float] | None = None,
     holds: bool = False,
 ) -> tuple[History, list[FrontMember], dict[int, DesignRecord]]:
     """Select designs of a run folder; return history, designs, and the records of the front by number.
@@ -119,7 +106,7 @@ def pick_from(
             raise FailureError(f'{run} is not verified; armwright.verify_run("{run}") in Python verifies it')
         numbers = verification["verdict"]["numbers"]
     records = read_records(run, history, [member.number for member in history.front])
-    return history, pick(history, where, by, weights, numbers, facts_by_number(records)), records
+    return history, pick(history, where, by, numbers, facts_by_number(records)), records
 
 
 def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:

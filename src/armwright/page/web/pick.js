@@ -6,9 +6,8 @@ import { $, number, plural } from "./format.js";
 
 const NUMBER = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][-+]?\\d+)?";
 const CONDITION = new RegExp(`^\\s*([A-Za-z_]\\w*)\\s*(<=|>=|<|>)\\s*(${NUMBER})\\s*$`);
-const WEIGHT = new RegExp(`^\\s*([A-Za-z_]\\w*)\\s*=\\s*(${NUMBER})\\s*$`);
 const HOLDS = { "<=": (a, b) => a <= b, ">=": (a, b) => a >= b, "<": (a, b) => a < b, ">": (a, b) => a > b };
-const KNEE = "", WEIGHTS = "="; // no number has such a name
+const KNEE = ""; // no number has such a name
 
 let content = null;
 let names = [];
@@ -18,11 +17,8 @@ export function openPick(shownContent) {
   names = [...content.objectives.map((o) => o.name), ...new Set(content.head.front.flatMap((i) => Object.keys(content.head.arms[i]))),
     ...content.head.parameters.filter((p) => !p.choices).map((p) => p.name)];
   names = [...new Set(names)];
-  $("pick-by").append(new Option("the knee", KNEE), new Option("weights", WEIGHTS),
-    ...names.map((name) => new Option(`least ${name}`, name)));
-  $("pick-weights").placeholder = content.objectives.map((o) => `${o.name}=1`).join(", ");
+  $("pick-by").append(new Option("the knee", KNEE), ...names.map((name) => new Option(`least ${name}`, name)));
   $("pick-where").placeholder = `such as ${content.objectives[0].name}<=0.05, length<1`;
-  $("pick-by").addEventListener("change", () => { $("pick-weights").parentElement.hidden = $("pick-by").value !== WEIGHTS; });
   $("pick").addEventListener("submit", (event) => {
     event.preventDefault();
     choose();
@@ -81,25 +77,10 @@ function conditions() {
   });
 }
 
-function weights() {
-  const found = new Map(split($("pick-weights").value).map((part) => {
-    const match = WEIGHT.exec(part);
-    if (!match || !(Number(match[2]) >= 0)) throw new Error(`"${part.trim()}": expected names with weights, such as position_error=2, torque=1`);
-    return [known(match[1], content.objectives.map((o) => o.name)), Number(match[2])];
-  }));
-  if (![...found.values()].some((weight) => weight > 0)) throw new Error("Expected at least one weight above 0.");
-  return found;
-}
-
 function ordered(left, quantities) {
-  const by = $("pick-by").value, { reference_point: reference } = content.head;
+  const by = $("pick-by").value;
   if (by === KNEE) return ranked(content, left);
-  let value = (i) => quantities.get(i).get(by);
-  if (by === WEIGHTS) {
-    const heavy = weights();
-    const shares = content.objectives.map((o, k) => (heavy.get(o.name) ?? 0) / (reference ? reference[k] : 1));
-    value = (i) => shares.reduce((sum, share, k) => sum + share * content.values(i)[k], 0);
-  }
+  const value = (i) => quantities.get(i).get(by);
   return [...left].sort((a, b) => value(a) - value(b) || a - b);
 }
 
@@ -143,8 +124,7 @@ function choose() {
 function command(requested, holds) {
   const by = $("pick-by").value;
   const parts = requested.map(({ name, relation, bound }) => `--where "${name}${relation}${bound}"`);
-  if (by === WEIGHTS) parts.push(`--weights ${[...weights()].map(([name, weight]) => `${name}=${weight}`).join(",")}`);
-  else if (by !== KNEE) parts.push(`--by ${by}`);
+  if (by !== KNEE) parts.push(`--by ${by}`);
   if (holds) parts.push("--holds");
   return `In a terminal: armwright pick RUN ${parts.join(" ")}`.trim();
 }
