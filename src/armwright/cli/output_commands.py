@@ -82,7 +82,6 @@ def report(
     runs: list[Path],
     *,
     live: bool = False,
-    host: str = "127.0.0.1",
     port: int = 0,
     follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
 ) -> None:
@@ -91,7 +90,6 @@ def report(
     Parameters:
         runs (RUN...): Run folders.
         live: Serve the live page of RUN until Ctrl-C instead (extra live).
-        host: Address to listen on; any other than the default opens the page to a network.
         port: Port to listen on; 0: any free port.
     """
     from armwright.page.live_server import serve
@@ -103,7 +101,7 @@ def report(
             raise SettingsError(f"--live: expected one run folder, got {len(runs)}")
         if not follow:
             read_config(runs[0])  # report a folder without a run at once
-        serve(runs[0], print_text, host, port, sys.stdin.buffer if follow else None)
+        serve(runs[0], print_text, port, sys.stdin.buffer if follow else None)
         return
     for run in runs:
         with activity(f"writing the page of {run}"):

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from armwright.editor.edited_files import EditedFiles
 from armwright.extras import check_extra
-from armwright.page.live_server import LOOPBACK, serve_app
+from armwright.page.live_server import serve_app
 
 
 def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0, opens_browser: bool = False) -> None:
@@ -30,7 +30,7 @@ def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0,
             if opens_browser:
                 _open(address, Path(private))
 
-        serve_app(editor_app(files), SHELLS, announce, LOOPBACK, port)
+        serve_app(editor_app(files), SHELLS, announce, port)
 
 
 def _open(address: str, private: Path) -> None:

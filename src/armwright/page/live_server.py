@@ -4,7 +4,6 @@ The server reads the run folder and writes the user's requests into control.json
 Needs the extra `live`.
 """
 
-import ipaddress
 import secrets
 import socket
 import subprocess
@@ -13,7 +12,7 @@ import time
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, cast
+from typing import TYPE_CHECKING, BinaryIO
 
 from armwright.child_process import start_module
 from armwright.exceptions import FailureError, SettingsError
@@ -23,14 +22,12 @@ if TYPE_CHECKING:
     from starlette.applications import Starlette
 
 LOOPBACK = "127.0.0.1"
-HTTP_PORT = 80  # omitted in addresses
+HTTP_PORT = ":80"  # omitted in addresses
 GRACE = 3.0  # [s] to wait for a first page after the study has ended
 LINGER = 60.0  # [s] to wait for the next request of a page, such as a tab in the background
 
 
-def serve(
-    folder: Path, tell: Callable[[str], None], host: str = LOOPBACK, port: int = 0, study: BinaryIO | None = None
-) -> None:
+def serve(folder: Path, tell: Callable[[str], None], port: int = 0, study: BinaryIO | None = None) -> None:
     """Serve the page of a run until Ctrl-C; port 0 is any free one.
 
     `tell` is called with the page's address, which holds the key, once it can be opened. `study` is a pipe that closes
@@ -38,19 +35,18 @@ def serve(
 
     Raises:
         MissingExtraError: The extra `live` is not installed.
-        FailureError: The address cannot be used.
+        FailureError: The port cannot be used.
     """
     check_extra("live", "the live page")
     from armwright.page.live_app import live_app
 
-    serve_app(live_app(folder), {"/"}, tell, host, port, study)
+    serve_app(live_app(folder), {"/"}, tell, port, study)
 
 
 def serve_app(
     app: "Starlette",
     shells: Collection[str],
     tell: Callable[[str], None],
-    host: str,
     port: int,
     study: BinaryIO | None = None,
 ) -> None:
@@ -62,9 +58,10 @@ def serve_app(
 
     from armwright.page.request_guard import Guard
 
-    listener, key = _listen(host, port), secrets.token_urlsafe(24)
+    listener, key = _listen(port), secrets.token_urlsafe(24)
     port = listener.getsockname()[1]
-    guard = Guard(app, key, shells, _hosts(host, listener))
+    hosts = {f"{name}:{port}".removesuffix(HTTP_PORT) for name in ("localhost", LOOPBACK)}
+    guard = Guard(app, key, shells, hosts)
     settings = uvicorn.Config(
         guard, log_config=None, access_log=False,
         log_level="error",  # a client's invalid requests are not news
@@ -77,7 +74,7 @@ def serve_app(
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
             # From here on Ctrl-C ends it in order.
-            tell(f"http://{f'[{host}]' if ':' in host else host}:{port}/#key={key}")
+            tell(f"http://{LOOPBACK}:{port}/#key={key}")
 
     server = Server(settings)
 
@@ -94,36 +91,17 @@ def serve_app(
         server.run(sockets=[listener])
 
 
-def _listen(host: str, port: int) -> socket.socket:
-    if not host:
-        raise SettingsError("--host: expected an address, got an empty one; use 127.0.0.1 for this machine alone")
+def _listen(port: int) -> socket.socket:
     try:
-        kind = socket.AF_INET6 if ":" in host else socket.AF_INET
-        listener = socket.socket(kind, socket.SOCK_STREAM)
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind((host, port))
+        listener.bind((LOOPBACK, port))
         listener.listen(128)  # accepts connections before the address is announced
     except OSError as fault:
-        raise FailureError(f"cannot listen on {host}, port {port}: {fault.strerror or fault}") from fault
+        raise FailureError(f"cannot listen on {LOOPBACK}, port {port}: {fault.strerror or fault}") from fault
     except OverflowError as fault:
         raise SettingsError(f"--port: expected a whole number from 0 to 65535, got {port}") from fault
     return listener
-
-
-def _hosts(host: str, listener: socket.socket) -> Callable[[str], bool]:
-    """Return the check of Host headers for this address."""
-    address, port = cast("tuple[str, int]", listener.getsockname()[:2])
-    if not _is_loopback(address):
-        return lambda host: True  # on a network, any name may lead here
-    names = {f"[{name}]" if ":" in name else name for name in (host.lower(), address, "localhost", LOOPBACK, "::1")}
-    known = {f"{name}:{port}" for name in names}
-    return lambda host: host.lower() in known or (port == HTTP_PORT and host.lower() in names)
-
-
-def _is_loopback(address: str) -> bool:
-    ip = ipaddress.ip_address(address)
-    mapped = ip.ipv4_mapped if isinstance(ip, ipaddress.IPv6Address) else None
-    return (mapped or ip).is_loopback
 
 
 def start_server(folder: Path) -> str:

@@ -7,7 +7,7 @@ which belongs to one port, and sends it as a header. A cookie would reach the se
 
 import secrets
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from typing import Any
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -28,15 +28,15 @@ HEADERS = {
 class Guard:
     """Refuse requests for other hosts and without the key, and add the security headers to every response.
 
-    `shells` are the paths of pages, which hold no data and need no key. `is_allowed` tells whether a Host header names
+    `shells` are the paths of pages, which hold no data and need no key. `hosts` are the Host headers that name
     this server; others are refused (DNS rebinding).
     """
 
-    def __init__(self, app: Any, key: str, shells: Collection[str], is_allowed: Callable[[str], bool]) -> None:
+    def __init__(self, app: Any, key: str, shells: Collection[str], hosts: Collection[str]) -> None:
         self._app = app
         self._key = key.encode()
         self._shells = shells
-        self._is_allowed = is_allowed
+        self._hosts = hosts
         self.latest: float | None = None  # when a page last asked for data [s of the monotonic clock]
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
@@ -56,7 +56,7 @@ class Guard:
     def _refusal(self, scope: Any) -> Response | None:
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
-        if len(hosts) != 1 or not self._is_allowed(hosts[0]):  # with two, a proxy might use the other one
+        if len(hosts) != 1 or hosts[0].lower() not in self._hosts:  # with two, a proxy might use the other one
             return PlainTextResponse("unknown host; use the address that the server printed", 421)
         if scope["path"] in self._shells:
             return None
