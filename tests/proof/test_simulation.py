@@ -1,5 +1,6 @@
 """Exported models and trajectories of cycles, in MuJoCo."""
 
+import csv
 import runpy
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -13,7 +14,7 @@ from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.trajectory import PERIOD, Trajectory
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
-from armwright.proof.cycle_export import MODEL, TRAJECTORY, cycle_files, read_trajectory, trajectory_of
+from armwright.proof.cycle_export import MODEL, TRAJECTORY, cycle_files, trajectory_of
 from armwright.proof.simulation import FAIL, PASS, SimulatedDesign, simulate_design
 from armwright.robot.arm import Arm
 from armwright.spaces.design_space import DesignSpace
@@ -68,10 +69,10 @@ class Desk:
 
     @property
     def trajectory(self) -> Trajectory:
-        return read_trajectory(self.files[TRAJECTORY], self.names)
+        return trajectory_of(self.arm, self.evaluation, 0)
 
     def simulate(self) -> SimulatedDesign:
-        return simulate_design(0, self.files[MODEL], self.trajectory, self.names)[0]
+        return simulate_design(0, self.files[MODEL], self.trajectory, self.names)
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +126,15 @@ def test_rows_are_from_rest_to_rest_around_the_cycle(desk: Desk) -> None:
     assert trajectory.payload[rows].tolist() == [0.0, 0.0, 0.1]
     assert trajectory.payload[rows - 1].tolist() == [0.1, 0.0, 0.0]
     assert trajectory.time[rows[0]] <= 2.401 + 0.2 < trajectory.time[rows[0] + 1]
+
+
+def test_trajectory_file_holds_the_trajectory(desk: Desk) -> None:
+    rows = list(csv.DictReader(desk.files[TRAJECTORY].splitlines()))
+    for name in ("q", "qd", "qdd", "tau"):
+        values = np.array([[row[f"{name}_{k}"] for k in range(1, 6)] for row in rows], dtype=np.float64)
+        assert np.allclose(values, getattr(desk.trajectory, name), rtol=1e-8, atol=0.0)
+    targets = [desk.names[target] if target >= 0 else "" for target in desk.trajectory.target]
+    assert [row["target"] for row in rows] == targets
 
 
 def test_header_and_names_are_stable(desk: Desk) -> None:

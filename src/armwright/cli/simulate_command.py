@@ -18,7 +18,6 @@ def simulate(
     run: Path,
     *,
     design: int | None = None,
-    recommended: bool = False,
     all_: bool = False,
     json_: bool = False,
     csv_: bool = False,
@@ -28,8 +27,7 @@ def simulate(
     If a recommended design fails, the next one is tried.
 
     Parameters:
-        design: Number of the design.
-        recommended: The recommended designs (the default).
+        design: Number of the design. Default: the recommended designs.
         all_: All designs of the front.
     """
     import json
@@ -45,8 +43,8 @@ def simulate(
     from armwright.runs.folder import read_run
 
     check_formats(json_, csv_)
-    if (design is not None) + recommended + all_ > 1:
-        raise SettingsError("--design, --recommended and --all choose the designs; use one of them")
+    if design is not None and all_:
+        raise SettingsError("--design and --all choose the designs; use one of them")
     with activity(f"reading {run}"):
         _, history = read_run(run)
     simulator = Simulator(history)
@@ -101,8 +99,8 @@ def _show(
     console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: Sequence[dict[str, Any]]
 ) -> None:
     from armwright.cli.show_results import show_recommended
-    from armwright.proof.design_record import DESIGNS
     from armwright.proof.simulation import PASS, mujoco_version
+    from armwright.proof.simulation_files import SIMULATION
 
     if not results:
         console.print(f"nothing to simulate: {run} has no feasible design")
@@ -119,4 +117,4 @@ def _show(
             console.print(f"#{one.design}: {reason}")
     show_recommended(console, choice)
     passed = sum(one.verdict == PASS for one in results)
-    console.print(f"{passed} of {len(results)} pass in MuJoCo {mujoco_version()}: {run / DESIGNS}/NNNN/simulation.csv")
+    console.print(f"{passed} of {len(results)} pass in MuJoCo {mujoco_version()}: {run / SIMULATION}")

@@ -31,16 +31,20 @@ class CycleModel:
     mjcf: str  # the model, as XML
     trajectory: Trajectory  # its motion through the cycle
 
+    def files(self, target_names: Sequence[str]) -> dict[str, str]:
+        """Return the files of the model and of its trajectory, by name."""
+        return {MODEL: self.mjcf, TRAJECTORY: trajectory_csv(self.trajectory, target_names)}
+
 
 def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, name: str) -> Mapping[str, str]:
     """Return the files of an arm, row `row` of an evaluation, by name; none without a cycle of known durations."""
     if evaluation.plan is None:
         return {}
     try:
-        model = _modelled(arm, problem.task.target_names, evaluation, row, name)
+        model = modelled(arm, problem.task.target_names, evaluation, row, name)
     except SettingsError:
         return {}
-    return {MODEL: model.mjcf, TRAJECTORY: trajectory_csv(model.trajectory, problem.task.target_names)}
+    return model.files(problem.task.target_names)
 
 
 def cycle_model(arm: Arm, task: Task) -> CycleModel:
@@ -66,10 +70,10 @@ def cycle_model(arm: Arm, task: Task) -> CycleModel:
     if task.cycle is None:
         raise SettingsError(f"task {task.name} has no cycle; try cycle: in_order")
     equipped = carrying_tool(arm, task.tool)
-    return _modelled(equipped, task.target_names, evaluate(equipped, task), 0, task.name)
+    return modelled(equipped, task.target_names, evaluate(equipped, task), 0, task.name)
 
 
-def _modelled(arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, name: str) -> CycleModel:
+def modelled(arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, name: str) -> CycleModel:
     """Return the model and the trajectory of an arm, which is row `row` of an evaluation; SettingsError without one."""
     trajectory = trajectory_of(arm, evaluation, row)
     peaks = np.abs(trajectory.tau).max(axis=0)
@@ -132,24 +136,3 @@ def trajectory_csv(trajectory: Trajectory, target_names: Sequence[str]) -> str:
         name = target_names[target] if target >= 0 else ""
         out.write(f"{time:.{DIGITS}g},{step},{name},{payload:.{DIGITS}g}," + line % tuple(row))
     return out.getvalue()
-
-
-def read_trajectory(text: str, target_names: Sequence[str]) -> Trajectory:
-    """Return the trajectory of a CSV file."""
-    head, *lines = text.splitlines()
-    cells = [line.split(",") for line in lines]
-    o = head.count(f",{ALLOWED}")
-    n = (len(head.split(",")) - 4 - o) // len(QUANTITIES)
-    number = {name: index for index, name in enumerate(target_names)} | {"": -1}
-    values = np.array([row[4 + o :] for row in cells], dtype=np.float64).reshape(len(cells), len(QUANTITIES), n)
-    return Trajectory(
-        time=np.array([row[0] for row in cells], dtype=np.float64),
-        step=np.array([row[1] for row in cells], dtype=np.intp),
-        target=np.array([number[row[2]] for row in cells], dtype=np.intp),
-        payload=np.array([row[3] for row in cells], dtype=np.float64),
-        allowed=np.array([row[4 : 4 + o] for row in cells], dtype=np.float64).reshape(len(cells), o),
-        q=values[:, 0],
-        qd=values[:, 1],
-        qdd=values[:, 2],
-        tau=values[:, 3],
-    )

@@ -3,12 +3,12 @@
 import time
 from dataclasses import dataclass
 
-from armwright.exceptions import SettingsError
+from armwright.exceptions import SettingsError, UnknownQuantityError
 from armwright.kinematics.cycle.trajectory import Trajectory
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
-from armwright.proof.cycle_export import MODEL, TRAJECTORY, cycle_files, read_trajectory
-from armwright.proof.simulation import Drive, Limits, SimulatedDesign, read_limits, simulate_design
+from armwright.proof.cycle_export import modelled
+from armwright.proof.simulation import SimulatedDesign, simulate_design
 from armwright.robot.arm import Arm
 from armwright.runs.history import History
 
@@ -18,9 +18,7 @@ class SimulatedMember:
     """A simulated design of a history."""
 
     result: SimulatedDesign
-    drive: Drive  # how it moved
     trajectory: Trajectory  # how it should move
-    limits: Limits  # what its model states
     files: dict[str, str]  # content of its model and trajectory, by name
 
 
@@ -46,13 +44,13 @@ class Simulator:
 
 def simulate_arm(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, number: int) -> SimulatedMember:
     """Simulate the arm of a design, row `row` of an evaluation; SettingsError if a duration of a step is unknown."""
-    files = dict(cycle_files(problem, arm, evaluation, row, f"{problem.task.name}-{number}"))
-    if not files:
+    names = problem.task.target_names
+    try:
+        model = modelled(arm, names, evaluation, row, f"{problem.task.name}-{number}")
+    except UnknownQuantityError as fault:
         raise SettingsError(
             f"task {problem.task.name} leaves durations of steps open, and the arms have no actuators with known "
             "speeds; try cycle: {time: 1.5, ...}"
-        )
-    names = problem.task.target_names
-    trajectory = read_trajectory(files[TRAJECTORY], names)
-    result, drive = simulate_design(number, files[MODEL], trajectory, names)
-    return SimulatedMember(result, drive, trajectory, read_limits(files[MODEL]), files)
+        ) from fault
+    result = simulate_design(number, model.mjcf, model.trajectory, names)
+    return SimulatedMember(result, model.trajectory, model.files(names))

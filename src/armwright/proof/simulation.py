@@ -61,13 +61,10 @@ class Contact:
 
 @dataclass(frozen=True)
 class Drive:
-    """A simulated cycle of R rows; S substeps of D joints."""
+    """A simulated cycle; S substeps of D joints."""
 
-    q: Array  # (R, D) joint values at the rows [rad] or [m]
-    qd: Array  # (R, D) speeds at the rows
     tau: Array  # (S, D) torques of the drives [N m], or forces [N]
     speed: Array  # (S, D) speeds at the substeps
-    tip: Array  # (R, 3) position of the tip [m]
     arrivals: tuple[Arrival, ...]  # at the end of each dwell
     contacts: tuple[Contact, ...]  # what touched, by the first time
     stable: bool  # false if MuJoCo reported values that are not finite
@@ -119,7 +116,6 @@ class _Driver:
         """Drive the whole cycle."""
         trajectory, data, model, n = self._trajectory, self._data, self._model, self._n
         rows = len(trajectory.time)
-        q, qd, tip = np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, 3))
         tau, speed = np.empty((2, (rows - 1) * SUBSTEPS, n))
         arrivals: list[Arrival] = []
         data.qpos[:] = trajectory.q[0]
@@ -128,7 +124,6 @@ class _Driver:
         at = 0
         for row in range(rows):
             self._mujoco.mj_kinematics(model, data)
-            q[row], qd[row], tip[row] = data.qpos, data.qvel, data.site_xpos[self._tip]
             if trajectory.target[row] >= 0:
                 arrivals.append(self._arrival(row))
             if row == rows - 1:
@@ -145,8 +140,8 @@ class _Driver:
                 at += 1
                 if data.ncon:
                     self._note_contacts(row)
-        stable = not any(warning.number for warning in data.warning) and bool(np.isfinite(q).all())
-        return Drive(q, qd, tau, speed, tip, tuple(arrivals), tuple(self._contacts.values()), stable)
+        stable = not any(warning.number for warning in data.warning) and bool(np.isfinite(data.qpos).all())
+        return Drive(tau, speed, tuple(arrivals), tuple(self._contacts.values()), stable)
 
     def _rub(self) -> None:
         """Set the friction of the joints by the loads of their gears."""
@@ -239,10 +234,8 @@ def read_limits(model_xml: str) -> Limits:
     return Limits(joints, np.where(limited, model.jnt_actfrcrange[:, 1], np.inf), tolerances)
 
 
-def simulate_design(
-    number: int, model_xml: str, trajectory: Trajectory, names: tuple[str, ...]
-) -> tuple[SimulatedDesign, Drive]:
-    """Drive a design with and without feed-forward, and return the verdict and the drive with it."""
+def simulate_design(number: int, model_xml: str, trajectory: Trajectory, names: tuple[str, ...]) -> SimulatedDesign:
+    """Drive a design with and without feed-forward, and return the verdict."""
     limits = read_limits(model_xml)
     found = drive(model_xml, trajectory, names)
     alone = drive(model_xml, trajectory, names, feed_forward=False)
@@ -267,7 +260,7 @@ def simulate_design(
     energy = float(np.maximum(found.tau * found.speed, 0.0).sum() * TIMESTEP)
     verdict = FAIL if reasons else PASS
     time = float(trajectory.time[-1])
-    return SimulatedDesign(number, verdict, reasons, time, energy, targets, joints, found.contacts), found
+    return SimulatedDesign(number, verdict, reasons, time, energy, targets, joints, found.contacts)
 
 
 def _reasons(
