@@ -173,7 +173,6 @@ def test_names_in_a_run_folder_are_escaped(tmp_path: Path, tab: Tab) -> None:
         record = json.loads(file.read_text(encoding="utf-8"))
         record["facts"] |= {name: {**one, "label": LINK, "explanation": LINK} for name, one in record["facts"].items()}
         file.write_text(json.dumps(record), encoding="utf-8")
-    (folder / "shown.npz").unlink()  # so that these files are read
     (folder / "command.txt").write_text(LINK, encoding="utf-8")
     page = write_report(folder)
     tab.open(page, "#design=5")

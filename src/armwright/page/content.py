@@ -14,13 +14,13 @@ from pydantic_core import to_json
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.existing.compare_arms import read_existing_arms
-from armwright.files import MAX_DERIVED, check_no_links, read_text, replace_surrogates
+from armwright.files import MAX_DERIVED, read_text, replace_surrogates
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
 from armwright.page.reach_maps import PageReachMap, read_reach_maps
 from armwright.pictures.style import EXISTING, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.proof.design_record import DESIGNS, DesignRecord, design_name, read_records
-from armwright.proof.results import COMMAND, SUMMARY, read_summary
-from armwright.proof.shown_run import Arrays, ShownRun, read_shown_run, show_run, shown_facts
+from armwright.proof.results import COMMAND, read_summary
+from armwright.proof.shown_run import Arrays, ShownRun, show_run, shown_facts
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.config import FrontMethod, Method
@@ -30,19 +30,6 @@ from armwright.sheet.record import NOT_MODELLED
 
 FILES = {"urdf": "arm.urdf", "mjcf": "arm.xml"}  # of designs of the front, by format
 MAX_COMMAND = 64 * 1024  # [bytes]
-
-
-def finished_content(folder: Path) -> bytes | None:
-    """Return the content of the page of a finished run, from the files that it wrote at its end; None without them."""
-    check_no_links(folder)
-    shown = read_shown_run(folder) if (folder / SUMMARY).is_file() else None
-    if shown is None:
-        return None
-    params = shown.arrays["params"]
-    maps = read_reach_maps(folder, len(params), params.__getitem__)
-    return _packed(
-        folder, shown, maps, {number: _files(folder, number) for number in shown.head["front"]}, _calls(folder)
-    )
 
 
 class RunContent:
@@ -61,20 +48,22 @@ class RunContent:
             known = {
                 n: one for n, one in earlier.records.items() if self.history.trials[n : n + 1] == [earlier.trial(n)]
             }
-        front = [member.number for member in self.history.front]
-        known |= read_records(folder, self.history, [number for number in front if number not in known])
-        self.records = {number: known[number] for number in front}
+        recommended = [self.history.member(one["design"]).number for one in (self.summary or {}).get("recommended", ())]
+        numbers = dict.fromkeys([*(member.number for member in self.history.front), *recommended])
+        known |= read_records(folder, self.history, [number for number in numbers if number not in known])
+        self.records = {number: known[number] for number in numbers}
 
     def trial(self, number: int) -> FinishedTrial:
         """Return a trial."""
         return self.history.trials[number]
 
-    def packed(self) -> bytes:
-        """Pack the run."""
+    def packed(self, with_files: bool = False) -> bytes:
+        """Pack the run; with the files of its front for a page without a server, if it has ended."""
         shown = show_run(self.config, self.history, self.summary, self.records)
-        return _packed(
-            self.folder, shown, read_reach_maps(self.folder, len(self.history), self._params), {}, self.calls
-        )
+        maps = read_reach_maps(self.folder, len(self.history), self._params)
+        holds_files = with_files and self.summary is not None
+        files = {number: _files(self.folder, number) for number in self.records} if holds_files else {}
+        return _packed(self.folder, shown, maps, files, self.calls)
 
     def file(self, number: int, kind: str) -> str | None:
         """Return a design as text for simulators, urdf or mjcf; None for other kinds."""

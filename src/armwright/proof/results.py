@@ -3,7 +3,6 @@
 summary.json              the result of the run
 trials.csv, front.csv     all trials, and those of the front
 designs/NNNN/             each design of the front (design_record.py)
-shown.npz                 what the page shows (shown_run.py)
 """
 
 import json
@@ -28,7 +27,6 @@ from armwright.proof.infeasibility import ViolationTally, feasibility_record
 from armwright.proof.perturbations import Survival
 from armwright.proof.proposer_bias import proposer_bias
 from armwright.proof.recommendation import recommend, unlimited
-from armwright.proof.shown_run import SHOWN, show_run
 from armwright.proof.summary_file import ProposerSummary, parse_summary
 from armwright.proof.verification import Verification, front_survival, verify_front
 from armwright.runs.config import FrontMethod, RunConfig
@@ -62,8 +60,7 @@ def write_results(
     recommended = {one["design"]: one["survival"] for one in summary.get("recommended", ())}
     survival: dict[int, Any] = {} if verification is None else front_survival(history, verification)
     survival |= {number: one for number, one in recommended.items() if one is not None}
-    records = write_designs(folder, history, verdicts, recommended, survival)
-    folder.write_bytes(SHOWN, show_run(config, history, summary, records).to_bytes())
+    write_designs(folder, history, verdicts, recommended, survival)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
