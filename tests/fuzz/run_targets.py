@@ -36,7 +36,7 @@ def a_run() -> Path:
         proposer = llm_proposer(server.url, memory="chat", origin="scripted")
         aw.optimize(a_problem(), proposer=proposer, n_init=3, n_step=2, n_total=4, out=there)
     write_report(there)
-    control = {"paused": True, "stop": False}
+    control = {"stop": True}
     for name, content in (("existing_arms.json", [EXISTING]), ("control.json", control)):
         (there / name).write_text(json.dumps(content), encoding="utf-8")
     return there

@@ -70,7 +70,7 @@ def live() -> Iterator[ExitStack]:
         yield begun
 
 
-def test_live_page_receives_designs_pauses_and_stops(
+def test_live_page_receives_designs_and_stops(
     tmp_path: Path, tab: Tab, live: ExitStack, chat_server: ChatServer
 ) -> None:
     gate = threading.Event()
@@ -99,19 +99,11 @@ def test_live_page_receives_designs_pauses_and_stops(
     other.open(study.address)
 
     gate.set()
-    # Pause lets no trial begin; two tabs agree about it.
-    page.get_by_role("button", name="Pause").click()
-    expect(other.page.locator("#doing")).to_have_text(re.compile(r"^paused for "))
-    n = len(read_run(study.folder)[1])
-    other.page.get_by_role("button", name="Resume").click()
-    expect(page.locator("#doing")).to_have_text(re.compile("^(evaluating|asking)"))
-    expect(page.locator("#progress")).not_to_have_js_property("value", n)
-
     page.get_by_role("button", name="Stop after this design").click()
     assert study.end() == 130
     assert "stopped" in study.said
     expect(page.locator("#doing")).to_have_text(re.compile(r"^stopped at \d+ of 4004; repeat the command to resume"))
-    expect(page.locator("#pause")).to_be_hidden()
+    expect(page.locator("#stop")).to_be_hidden()
     finished = len(read_run(study.folder)[1])
     assert f"stopped at {finished} of" in page.locator("#doing").inner_text()
     page.reload()  # the server lives on as long as a page looks on
@@ -179,7 +171,7 @@ def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Pat
     ("content", "status"),
     [
         (b"", 422), (b"\xff\xfe", 422), (b"[" * 60000, 422), (b'{"action":' * 9000, 413), ({"action": "explode"}, 422),
-        ({"action": "pause", "more": 1}, 422),
+        ({"action": "stop", "more": 1}, 422),
     ],
 )  # fmt: skip
 def test_invalid_control_requests_are_refused(served: tuple[Path, int, str], content: object, status: int) -> None:
