@@ -12,10 +12,8 @@ from typing import Self
 import psutil
 import pytest
 from playwright.sync_api import Browser, expect
-from typer.testing import CliRunner
 
 import armwright as aw
-from armwright.cli.app import app
 from armwright.page.live_run import LiveRun
 from armwright.proof.results import discard_results
 from armwright.runs.control import Channel, read_control
@@ -138,20 +136,6 @@ def test_study_survives_a_killed_server(tmp_path: Path, tab: Tab, live: ExitStac
     expect(tab.page.locator("#doing")).to_have_text(re.compile("Connection lost"))
     assert study.end() == 0
     assert len(read_run(study.folder)[1]) == 310
-
-
-def test_open_page_shows_a_new_reach_map(served: tuple[Path, int, str], tab: Tab) -> None:
-    folder, port, key = served
-    tab.open(f"http://127.0.0.1:{port}/#key={key}")
-    tab.page.wait_for_function("armwright.content.n === 10")
-    tab.ask("armwright.set({ design: 4 })")
-    box = tab.page.locator("#reach-box")
-    expect(box).to_be_hidden()
-    options = ("--design", "4", "--spacing", "0.3", "--directions", "4")
-    assert CliRunner().invoke(app, ["reach-map", str(folder), *options]).exit_code == 0
-    expect(box).to_be_visible()
-    assert tab.ask("armwright.state.design") == 4
-    assert tab.faults == []
 
 
 def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Path) -> None:

@@ -14,10 +14,10 @@ from armwright.page.content import RunContent
 from armwright.proof.results import REPORT, SUMMARY
 from armwright.runs.config import FrontMethod
 from armwright.runs.control import read_status
-from armwright.runs.folder import CONFIG, REACH_MAPS, is_held, read_config
+from armwright.runs.folder import CONFIG, is_held, read_config
 from armwright.runs.trials_file import TRIALS
 
-SHOWN = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, REACH_MAPS, EXISTING_ARMS, REPORT)  # files that change the page
+SHOWN = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, EXISTING_ARMS, REPORT)  # files that change the page
 CHANGING = {"reference_point", "versions", "earlier_versions", "method"}  # settings of one and the same run
 RECENT = 20  # trials whose mean duration predicts the remaining time
 RUNNING = ("evaluating", "asking", "searching")
