@@ -38,7 +38,6 @@ from .robot.urdf_writer import to_urdf as to_urdf
 from .proof.cycle_export import CycleModel as CycleModel, cycle_model as cycle_model
 from .runs.folder import read_run as read_run
 from .runs.history import FrontMember as FrontMember, History as History
-from .proof.results import verify_run as verify_run
 from .proof.task_mjcf import to_mjcf as to_mjcf
 from .runs.trial import FinishedTrial as FinishedTrial
 from .search.surrogate.sampler import surrogate_sampler as surrogate_sampler

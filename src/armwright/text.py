@@ -40,10 +40,10 @@ def percent(share: float | None, places: int = 0) -> str:
     return "–" if share is None else f"{100.0 * share:.{places}f} %"
 
 
-def significant(value: float, digits: int = 3, signed: bool = False) -> str:
+def significant(value: float, digits: int = 3) -> str:
     """Return a value with significant digits, without an exponent and with at most three decimals."""
     decimals = 0 if value == 0.0 else digits - 1 - math.floor(math.log10(abs(value)))
-    text = f"{value:{'+' if signed else ''},.{min(max(decimals, 0), 3)}f}"
+    text = f"{value:,.{min(max(decimals, 0), 3)}f}"
     return text if any(letter in "123456789" for letter in text) else "0"
 
 

@@ -36,7 +36,7 @@ def a_run() -> Path:
         proposer = llm_proposer(server.url, memory="chat", origin="scripted")
         aw.optimize(a_problem(), proposer=proposer, n_init=3, n_step=2, n_total=4, out=there)
     write_report(there)
-    control = {"paused": True, "stop": False}
+    control = {"stop": True}
     for name, content in (("existing_arms.json", [EXISTING]), ("control.json", control)):
         (there / name).write_text(json.dumps(content), encoding="utf-8")
     return there
@@ -71,7 +71,7 @@ def looked_at(there: Path) -> None:
     """Read a run folder in every way."""
     from armwright.experiments.compare_runs import compare_runs
     from armwright.experiments.tables import markdown
-    from armwright.page.content import RunContent, finished_content
+    from armwright.page.content import RunContent
     from armwright.proof.export import export_design
     from armwright.proof.selection import pick_from
     from armwright.proposers.replay import ReplayProposer
@@ -81,8 +81,7 @@ def looked_at(there: Path) -> None:
         (
             lambda: pick_from(there, holds=True),
             lambda: export_design(there, None, "urdf"),
-            lambda: RunContent(there).packed(),
-            lambda: finished_content(there),
+            lambda: RunContent(there).packed(with_files=True),
             lambda: markdown(compare_runs(there), "runs", notes=()),
             lambda: replayed(ReplayProposer(there)),
             lambda: (read_control(there), read_status(there)),

@@ -132,7 +132,7 @@ WITH_EXTRAS: tuple[tuple[list[str], str], ...] = (  # their only line
     (["optimize", "target-1", "--model", "openai-chat:gpt-4o"], LLM),
     (["draft", "reach a shelf", "--model", "openai-chat:gpt-4o"], LLM),
     (["experiment", "paper"], f"experiment needs {STUDIES}"),
-    (["optimize", "target-1", "--print-prompt", "next"], f"optimize needs {STUDIES}"),
+    (["optimize", "target-1", "--print-prompt"], f"optimize needs {STUDIES}"),
     (["datasheet", "run"], 'datasheet needs matplotlib: pip install "armwright[figures]"'),
 )
 

@@ -136,7 +136,7 @@ def test_no_websocket_is_opened(server: Server) -> None:
 def test_headers_of_proxies_change_nothing(server: Server) -> None:
     path = "/control" if server.kind == "live" else "/stop"
     right = {"Content_Type": "application/json", "X_Armwright_Key": server.key}
-    body = b'{"action": "resume"}' if server.kind == "live" else b"{}"
+    body = b'{"action": "stop"}' if server.kind == "live" else b"{}"
     forged = {"X_Forwarded_Proto": "https", "X_Forwarded_For": "192.0.2.1", "Forwarded": "proto=https"}
     own = f"127.0.0.1:{server.port}"
     assert ask(server.port, "POST", path, body, Origin=f"http://{own}", **right, **forged)[0] == 204
@@ -238,7 +238,7 @@ def neighbour() -> Iterator[tuple[str, list[dict[str, str]]]]:
 
 
 STEAL = """async ([home, paths, posts]) => {
-    const got = [], body = '{"action":"pause"}';
+    const got = [], body = '{"action":"stop"}';
     const attempt = async (what) => {
         try { got.push(String(await what())); } catch (fault) { got.push(fault.name); } };
     const loads = (element) => new Promise((done) => {
@@ -259,7 +259,7 @@ STEAL = """async ([home, paths, posts]) => {
             const target = document.createElement('iframe'), form = document.createElement('form');
             target.name = form.target = path; target.onload = () => done('sent');
             Object.assign(form, { method: 'POST', action: home + path, enctype: 'text/plain' });
-            form.innerHTML = `<input name='{"action":"pause","x":"' value='"}'>`;
+            form.innerHTML = `<input name='{"action":"stop","x":"' value='"}'>`;
             document.body.append(target, form); form.submit(); }));
     }
     await attempt(() => JSON.stringify([sessionStorage, localStorage, document.cookie]));

@@ -12,10 +12,8 @@ from typing import Self
 import psutil
 import pytest
 from playwright.sync_api import Browser, expect
-from typer.testing import CliRunner
 
 import armwright as aw
-from armwright.cli.app import app
 from armwright.page.live_run import LiveRun
 from armwright.proof.results import discard_results
 from armwright.runs.control import Channel, read_control
@@ -70,7 +68,7 @@ def live() -> Iterator[ExitStack]:
         yield begun
 
 
-def test_live_page_receives_designs_pauses_and_stops(
+def test_live_page_receives_designs_and_stops(
     tmp_path: Path, tab: Tab, live: ExitStack, chat_server: ChatServer
 ) -> None:
     gate = threading.Event()
@@ -99,19 +97,11 @@ def test_live_page_receives_designs_pauses_and_stops(
     other.open(study.address)
 
     gate.set()
-    # Pause lets no trial begin; two tabs agree about it.
-    page.get_by_role("button", name="Pause").click()
-    expect(other.page.locator("#doing")).to_have_text(re.compile(r"^paused for "))
-    n = len(read_run(study.folder)[1])
-    other.page.get_by_role("button", name="Resume").click()
-    expect(page.locator("#doing")).to_have_text(re.compile("^(evaluating|asking)"))
-    expect(page.locator("#progress")).not_to_have_js_property("value", n)
-
     page.get_by_role("button", name="Stop after this design").click()
     assert study.end() == 130
     assert "stopped" in study.said
     expect(page.locator("#doing")).to_have_text(re.compile(r"^stopped at \d+ of 4004; repeat the command to resume"))
-    expect(page.locator("#pause")).to_be_hidden()
+    expect(page.locator("#stop")).to_be_hidden()
     finished = len(read_run(study.folder)[1])
     assert f"stopped at {finished} of" in page.locator("#doing").inner_text()
     page.reload()  # the server lives on as long as a page looks on
@@ -148,20 +138,6 @@ def test_study_survives_a_killed_server(tmp_path: Path, tab: Tab, live: ExitStac
     assert len(read_run(study.folder)[1]) == 310
 
 
-def test_open_page_shows_a_new_reach_map(served: tuple[Path, int, str], tab: Tab) -> None:
-    folder, port, key = served
-    tab.open(f"http://127.0.0.1:{port}/#key={key}")
-    tab.page.wait_for_function("armwright.content.n === 10")
-    tab.ask("armwright.set({ design: 4 })")
-    box = tab.page.locator("#reach-box")
-    expect(box).to_be_hidden()
-    options = ("--design", "4", "--spacing", "0.3", "--directions", "4")
-    assert CliRunner().invoke(app, ["reach-map", str(folder), *options]).exit_code == 0
-    expect(box).to_be_visible()
-    assert tab.ask("armwright.state.design") == 4
-    assert tab.faults == []
-
-
 def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     aw.find_front(aw.Problem(aw.load_task("target-1")), evaluations=400, out=folder)
@@ -179,7 +155,7 @@ def test_direct_search_is_searching_as_long_as_it_holds_its_folder(tmp_path: Pat
     ("content", "status"),
     [
         (b"", 422), (b"\xff\xfe", 422), (b"[" * 60000, 422), (b'{"action":' * 9000, 413), ({"action": "explode"}, 422),
-        ({"action": "pause", "more": 1}, 422),
+        ({"action": "stop", "more": 1}, 422),
     ],
 )  # fmt: skip
 def test_invalid_control_requests_are_refused(served: tuple[Path, int, str], content: object, status: int) -> None:

@@ -92,9 +92,9 @@ def test_two_host_headers_are_refused(served: tuple[Path, int, str], first: bool
     folder, port, key = served
     hosts = [f"Host: 127.0.0.1:{port}", "Host: evil.example"][:: 1 if first else -1]
     origin = f"Origin: http://{hosts[0].partition(': ')[2]}"
-    request = lines("POST /control HTTP/1.1", *hosts, origin, *right(port, key)[2:], "Content-Length: 18")
-    assert said(port, request + b'{"action":"pause"}')[0] in (400, 421)
-    assert not read_control(folder).paused
+    request = lines("POST /control HTTP/1.1", *hosts, origin, *right(port, key)[2:], "Content-Length: 17")
+    assert said(port, request + b'{"action":"stop"}')[0] in (400, 421)
+    assert not read_control(folder).stop
 
 
 PATHS = (
@@ -127,22 +127,22 @@ def test_endless_body_is_refused_early(served: tuple[Path, int, str]) -> None:
         assert said(port, lines("POST /control HTTP/1.1", *right(port, "no"), extra))[0] == 403
     assert refused(port, lines("GET / HTTP/1.1", f"Host: 127.0.0.1:{port}", "X: " + "x" * 200_000))
     assert psutil.Process(server).memory_info().rss - before < 50e6
-    assert not read_control(folder).paused
+    assert not read_control(folder).stop
 
 
 @pytest.mark.slow
 def test_slow_clients_do_not_block_others(served: tuple[Path, int, str]) -> None:
     folder, port, key = served
-    begun = lines("POST /control HTTP/1.1", *right(port, key), "Content-Length: 18") + b'{"action":'
+    begun = lines("POST /control HTTP/1.1", *right(port, key), "Content-Length: 17") + b'{"action":'
     slow = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) for _ in range(50)]
     for number, connection in enumerate(slow):
         connection.sendall(begun if number % 2 else begun[:30])
     assert ask(port, "GET", "/run", X_Armwright_Key=key)[0] == 200
-    assert post_control(port, key, {"action": "resume"}) == 204
+    assert post_control(port, key) == 204
     for connection in slow:
         connection.close()
     assert ask(port, "GET", "/run", X_Armwright_Key=key)[0] == 200
-    assert not read_control(folder).paused
+    assert read_control(folder).stop
 
 
 def changed(file: Path, change: Callable[[dict[str, Any]], dict[str, Any]]) -> list[dict[str, Any]]:
@@ -173,7 +173,6 @@ def test_names_in_a_run_folder_are_escaped(tmp_path: Path, tab: Tab) -> None:
         record = json.loads(file.read_text(encoding="utf-8"))
         record["facts"] |= {name: {**one, "label": LINK, "explanation": LINK} for name, one in record["facts"].items()}
         file.write_text(json.dumps(record), encoding="utf-8")
-    (folder / "shown.npz").unlink()  # so that these files are read
     (folder / "command.txt").write_text(LINK, encoding="utf-8")
     page = write_report(folder)
     tab.open(page, "#design=5")

@@ -62,14 +62,13 @@ def test_positions_may_come_with_one_arm() -> None:
 
 def test_model_of_an_arm_in_a_task_has_tool_payload_obstacles_and_postures() -> None:
     bare = SPACE.arm(DESIGNS[0])
-    alone, text = aw.to_mjcf(bare), aw.to_mjcf(bare, JOB, name="mine")
-    assert aw.to_mjcf([bare]) == [alone]
+    text = aw.to_mjcf(bare, JOB, name="mine")
     assert text == aw.to_mjcf(PROBLEM.arm(DESIGNS[0]), JOB, name="mine")
     model = mujoco.MjModel.from_xml_string(text)
     assert model.body("payload").mass == pytest.approx(0.3)
     assert model.geom("obstacle_pole").size[0] == pytest.approx(0.03)
     assert sum(model.body_mass) == pytest.approx(
-        sum(mujoco.MjModel.from_xml_string(alone).body_mass) + 0.2 + 0.3, rel=1e-6
+        sum(mujoco.MjModel.from_xml_string(aw.to_mjcf(bare)).body_mass) + 0.2 + 0.3, rel=1e-6
     )
     data = mujoco.MjData(model)
     evaluation = aw.evaluate(bare, JOB)

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armwright.exceptions import FailureError
 from armwright.problem.problem import Problem
-from armwright.proof.results import read_summary, verify_run
+from armwright.proof.selection import pick_from
 from armwright.proof.verification import Verification, verify, verify_front
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
@@ -94,21 +95,20 @@ def test_robust_values_are_the_worst_case(designs: list[Design]) -> None:
     assert np.array_equal(robust.evaluate(designs).values, worst)
 
 
-def test_verify_run_marks_the_front(tmp_path: Path) -> None:
-    settings = {"proposer": "rules", "n_init": 5, "n_step": 5, "n_total": 20, "seed": 0, "out": tmp_path / "run"}
-    run = optimize(PROBLEM, verify=False, **settings)
+def test_verification_marks_the_front(tmp_path: Path) -> None:
+    settings = {"proposer": "rules", "n_init": 5, "n_step": 5, "n_total": 20, "seed": 0}
+    run = optimize(PROBLEM, verify=False, **settings, out=tmp_path / "without")
     assert run.summary["verification"] is None
-    assert "verdict" not in (tmp_path / "run" / "front.csv").read_text(encoding="utf-8")
-    history, summary = verify_run(tmp_path / "run")
-    assert summary == read_summary(tmp_path / "run")
-    record = summary["verification"]
-    assert record["robust"] + record["sensitive"] == len(history.front)
-    assert {**summary, "verification": None} == run.summary
+    assert "verdict" not in (tmp_path / "without" / "front.csv").read_text(encoding="utf-8")
+    with pytest.raises(FailureError, match="without a verification"):
+        pick_from(tmp_path / "without", holds=True)
+    verified = optimize(PROBLEM, **settings, out=tmp_path / "run")
+    record = verified.summary["verification"]
+    assert record["robust"] + record["sensitive"] == len(verified.front)
+    assert {**verified.summary, "verification": None, "seconds": None} == {**run.summary, "seconds": None}
     table = (tmp_path / "run" / "front.csv").read_text(encoding="utf-8")
     assert table.count(",robust,") == record["robust"]
     assert table.count(",sensitive,") == record["sensitive"]
-    other = optimize(PROBLEM, **{**settings, "out": tmp_path / "other"})
-    assert other.summary["verification"] == record
 
 
 def test_history_without_a_reference_point_is_not_verified() -> None:

@@ -1,8 +1,7 @@
-"""Pause, stop and status of a running study."""
+"""Stop and status of a running study."""
 
 import os
 import shlex
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -15,58 +14,16 @@ from armwright.runs.control import (
     MAX_FILE_SIZE,
     STATUS,
     Control,
-    pause_study,
     read_control,
     read_status,
-    resume_study,
     stop_study,
 )
-from armwright.study.progress import Progress
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import armwright
-from tests.support.controlled_runs import after, asks, interrupt, lines, run, status
+from tests.support.controlled_runs import after, asks, lines, run, status
 from tests.support.wire_formats import model_options
 
-# Pause and stop.
-
-
-def test_paused_study_adds_no_trial_until_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    out = tmp_path / "run"
-    looks: list[tuple[int, str, int]] = []
-    notes: list[str] = []
-    watch = after(6, lambda: pause_study(out))
-
-    def look(seconds: float) -> None:
-        looks.append((len(lines(out)), status(out).doing, status(out).number))
-        if len(looks) == 5:
-            resume_study(out)
-
-    def watching(progress: Progress) -> None:
-        watch(progress)
-        if progress.doing == "paused":
-            notes.append(progress.note)
-
-    monkeypatch.setattr(time, "sleep", look)
-    run(out, watch=watching)
-    assert looks == [(7, "paused", 7)] * 5
-    assert notes == ["paused by a watcher, who can resume it; Ctrl-C ends it"]
-    assert read_control(out) == Control()
-    run(tmp_path / "undisturbed")
-    assert lines(out) == lines(tmp_path / "undisturbed")
-
-
-def test_ctrl_c_ends_a_paused_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    out = tmp_path / "run"
-    monkeypatch.setattr(time, "sleep", lambda seconds: interrupt())
-    with pytest.raises(KeyboardInterrupt):
-        run(out, watch=after(6, lambda: pause_study(out)))
-    assert (status(out).doing, status(out).number, status(out).fault) == ("stopped", 7, "")
-    monkeypatch.undo()
-
-    def watch(progress: Progress) -> None:
-        assert progress.doing != "paused"  # the pause of an earlier session is past
-
-    assert len(run(out, watch=watch).trials) == 13
+# Stop.
 
 
 @pytest.mark.parametrize(("proposer", "number"), [("rules", 0), ("none", 3), ("rules", 11)])
@@ -80,19 +37,6 @@ def test_stopped_study_resumes_identically(tmp_path: Path, proposer: str, number
     assert status(out).doing == "finished"
     run(tmp_path / "whole", proposer)
     assert lines(out) == lines(tmp_path / "whole")
-
-
-def test_paused_study_can_be_stopped(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-
-    def watch(progress: Progress) -> None:
-        after(6, lambda: pause_study(out))(progress)
-        if progress.doing == "paused":
-            stop_study(out)
-
-    with pytest.raises(StoppedError):
-        run(out, watch=watch)
-    assert len(lines(out)) == 7
 
 
 def test_no_request_survives_an_earlier_session(tmp_path: Path) -> None:
@@ -130,13 +74,13 @@ def test_stopped_command_exits_as_after_ctrl_c(chat_server: ChatServer, in_folde
 
 HOSTILE: Mapping[str, bytes] = {
     "empty": b"",
-    "cut": b'{"paused": true, "st',
+    "cut": b'{"stop": tr',
     "no text": b"\xff\xfe\x00{",
     "a list": b"[true]",
-    "words": b'{"paused": "yes"}',
-    "more": b'{"paused": true, "speed": 2}',
-    "deep": b'{"paused": ' + b"[" * 100_000,
-    "huge": b'{"paused": true' + b" " * MAX_FILE_SIZE + b"}",
+    "words": b'{"stop": "yes"}',
+    "more": b'{"stop": true, "speed": 2}',
+    "deep": b'{"stop": ' + b"[" * 100_000,
+    "huge": b'{"stop": true' + b" " * MAX_FILE_SIZE + b"}",
 }
 
 
@@ -144,8 +88,8 @@ HOSTILE: Mapping[str, bytes] = {
 def test_damaged_control_file_is_ignored(tmp_path: Path, name: str) -> None:
     (tmp_path / CONTROL).write_bytes(HOSTILE[name])
     assert read_control(tmp_path) == Control()
-    pause_study(tmp_path)
-    assert read_control(tmp_path) == Control(paused=True)
+    stop_study(tmp_path)
+    assert read_control(tmp_path) == Control(stop=True)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
@@ -160,7 +104,7 @@ def test_control_path_that_is_not_a_file_is_ignored(tmp_path: Path, make: Callab
 def test_request_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(RunFolderError, match="cannot write"):
-        pause_study(tmp_path / "file")
+        stop_study(tmp_path / "file")
 
 
 def test_status_goes_from_evaluating_through_asking_to_finished(chat_server: ChatServer, tmp_path: Path) -> None:

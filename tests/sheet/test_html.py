@@ -10,7 +10,7 @@ from armwright.problem.facts import ASKED
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.sheet.html import to_html
-from armwright.sheet.record import DataSheet, JointLine, LinkLine, MassLine, Part, Sensitivity
+from armwright.sheet.record import DataSheet, JointLine, LinkLine, MassLine, Part
 from armwright.sheet.tables import number
 from armwright.sheet.urdf_sheet import urdf_sheet
 from armwright.sheet.writer import write_datasheet
@@ -26,10 +26,8 @@ def small_sheet() -> DataSheet:
 
 
 def large_sheet() -> DataSheet:
-    """As much as a design can have: eight joints, with long names, and every change possible or not."""
+    """As much as a design can have: eight joints, with long names."""
     joint = JointLine(1, "joint_1", "revolute", "y", LONG, -2.4, 2.4, (-1.0, 1.0), (1.4, 1.4), 12.3, 4.5, 1.2)
-    impossible = Sensitivity("tube 1", "next stiffer", "60x2 is the stiffest of the space")
-    change = Sensitivity("actuator 1", f"{LONG} → {LONG}", "", 1e-3, -2e-4, 3e-5, 0.1, -100.0, ("deflection <= 1",) * 3)
     source = "https://example.org/" + "a-long-path/" * 9
     part = Part(LONG, 3, 1234.5, 3703.5, "A maker of coreless servos, 123.4 g each", source, "price of a reseller")
     return replace(
@@ -43,7 +41,6 @@ def large_sheet() -> DataSheet:
         links=tuple(LinkLine(n, 0.123, 0.02, 0.001, 0.1) for n in range(1, 9)),
         masses=tuple(MassLine(name, 0.1) for name in ("actuators", "column", "tool", *(f"link {n}" for n in range(8)))),
         parts=(part,) * 8,
-        sensitivities=(change,) * 16 + (impossible,) * 8,
         assumptions={f"assumption {n}": "a sentence about what is assumed of the values, " * 4 for n in range(8)},
     )
 

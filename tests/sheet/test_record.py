@@ -13,7 +13,6 @@ import pytest
 
 import armwright as aw
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.problem.compliance_quantities import backlash_error, deflection
 from armwright.problem.drive_quantities import (
     bearing_utilisation,
     dynamic_utilisation,
@@ -23,7 +22,6 @@ from armwright.problem.drive_quantities import (
     torque_utilisation,
 )
 from armwright.problem.failure import Failure
-from armwright.problem.objectives import mass, worst_error
 from armwright.proof.design_record import compute_facts
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.mounting import Mounting, mounted
@@ -33,14 +31,12 @@ from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.sheet.design_sheet import design_sheet, sheet_of
 from armwright.sheet.record import DataSheet
-from armwright.sheet.sensitivities import variations, varied
 from armwright.sheet.tables import verdict_of
 from armwright.sheet.urdf_sheet import Job, urdf_sheet
 from armwright.sheet.writer import sheet_record
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests.proof.test_simulation import DESK
-from tests.support.arms import LIGHT
 from tests.support.command_line import armwright, refused
 from tests.support.robots import robot
 
@@ -122,63 +118,6 @@ def test_utilisation_of_joints_is_that_of_the_quantities(sheet: DataSheet, histo
         assert max(values) == pytest.approx(float(quantity(evaluation)[0])), key
 
 
-def test_sensitivities_are_those_of_designs_edited_by_hand(sheet: DataSheet, history: History) -> None:
-    problem, design = history.problem, history.trials[NUMBER].design
-    space, before = problem.space, dict(design.params)
-    possible = {(line.part, line.change): line for line in sheet.sensitivities if not line.impossible}
-    edits: dict[tuple[str, str], dict[str, Any]] = {
-        ("link 1", "+10 mm"): {"link_1": before["link_1"] + 0.01},  # type: ignore[operator]
-        ("link 2, 3", "+10 mm"): {k: before[k] + 0.01 for k in ("link_2", "link_3")},  # type: ignore[operator]
-        **{(f"tube {j}", "20x1 → 30x2"): {f"tube_{j}": "30x2"} for j in range(1, 5) if before[f"tube_{j}"] == "20x1"},
-        **{
-            (f"actuator {j}", "XM430-W350 → XM540-W270"): {f"motor_{j}": "XM540-W270"}
-            for j in range(1, 5)
-            if before[f"motor_{j}"] == "XM430-W350"
-        },
-    }
-    assert set(possible) == set(edits)
-    assert len(edits) > 4
-    start = aw.evaluate(space.arm(design), problem.task)
-    for key, edit in edits.items():
-        changed = aw.evaluate(space.arm(aw.Design({**before, **edit})), problem.task)
-        for name, quantity in (
-            ("position_error", worst_error),
-            ("deflection", deflection),
-            ("backlash_error", backlash_error),
-            ("mass", mass),
-        ):
-            expected = float(quantity(changed)[0] - quantity(start)[0])
-            assert getattr(possible[key], name) == pytest.approx(expected, rel=1e-3, abs=1e-6), (key, name)
-    prices = {key: line.price for key, line in possible.items()}
-    assert prices["link 1", "+10 mm"] == pytest.approx(12.0 * 0.01 * space.arm(design).links[0].mass / design.links[0])
-
-
-def test_impossible_changes_say_so(sheet: DataSheet) -> None:
-    reasons = {line.part: line.impossible for line in sheet.sensitivities if line.impossible}
-    assert reasons["link 4"].startswith("the space allows at most 55 mm, it has 5")
-    assert all("of the space" in reason for part, reason in reasons.items() if part != "link 4")
-
-
-def test_parts_are_numbered_like_the_joints_of_the_arm() -> None:
-    """A module of two joints has two actuators, and its link is after the second."""
-    content = {
-        "joints": 2,
-        "joint_types": ["O", "P"],
-        **LIGHT,
-        "actuators": ["XM540-W270", "XM430-W350"],
-        "motor_bodies": False,
-    }
-    space = DesignSpace.model_validate(content)
-    design = space.clipped((0.0, 0.0, 0.0), "OP", (0.1, 0.2))
-    weaker = aw.Design({**design.params, "motor_1": "XM430-W350", "motor_2": "XM430-W350"})
-    found = {variation.part: variation for variation in variations(space, weaker) if not variation.impossible}
-    assert list(found) == ["link 2", "link 3", "actuator 1, 2", "actuator 3"]
-    assert space.arm(varied(space, weaker, found["link 2"])).links[1].length == pytest.approx(0.11)
-    stronger = space.arm(varied(space, weaker, found["actuator 1, 2"]))
-    names = [joint.actuator.name for joint in stronger.joints if joint.actuator is not None]
-    assert names == ["XM540-W270", "XM540-W270", "XM430-W350"]
-
-
 def test_infeasible_designs_state_what_they_violate(sheet: DataSheet, history: History) -> None:
     violations = history.trials[NUMBER].violations
     assert len(sheet.violated) == sum(violation > 0.0 for violation in violations) > 0
@@ -212,8 +151,6 @@ def test_unknown_values_are_not_stated_and_never_zero(plain: Path) -> None:
         assert sheet.facts[key].value is None
     assert sheet.facts["cycle_time"].reason == "the task has no cycle"
     assert sheet.facts["price"].reason == "no actuators are named"
-    assert {line.price for line in sheet.sensitivities} == {None}
-    assert {line.impossible for line in sheet.sensitivities} >= {"the space names no actuator"}
     assert all(line.payload is None for line in sheet.over_reach)
 
 

@@ -12,9 +12,9 @@ from armwright import Problem, Task, find_front, load_task, optimize, read_run, 
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
 from armwright.pareto import front_mask, hypervolume
 from armwright.proof.front_gap import known_front
-from armwright.proof.results import read_summary, verify_run
-from armwright.search.front.front_search import LATE_SHARE, SMALLEST_BATCH, FrontSearch
-from armwright.search.front.screening import CANDIDATES
+from armwright.proof.results import read_summary
+from armwright.proof.verification import verify_front
+from armwright.search.front.front_search import SMALLEST_BATCH, FrontSearch
 from armwright.spaces.design_space import default_space, paper_space
 from armwright.study.front.direct_search import SHORT_FIRST_BATCH, FrontRun
 from tests.support.controlled_runs import interrupt_at
@@ -57,8 +57,6 @@ def test_front_run_writes_summary_and_designs(done: FrontRun) -> None:
     assert search["hypervolume_history"][-1][1] == pytest.approx(final, rel=5e-3)
     assert 0.99 * final < hypervolume(done.history.values, (5, 5)) <= final
     assert summary["front_gap"]["share"] == pytest.approx(final / summary["front_gap"]["hypervolume"])
-    _, verified = verify_run(done.folder)
-    assert verified == summary
     assert summary["verification"]["robust"] + summary["verification"]["sensitive"] == len(done.history)
     for member in done.front[:: len(done.front) // 5]:
         mujoco.MjModel.from_xml_path(str(done.folder / f"designs/{member.number:04d}/arm.urdf"))
@@ -90,12 +88,7 @@ def test_resumed_front_run_of_a_cycle_is_screened_identically(tmp_path: Path) ->
     run = find_front(problem, evaluations=650, seed=1, out=tmp_path / "run")
     assert run.resumed == 600
     assert np.array_equal(run.history.values, whole.history.values)
-    screening = run.summary["search"]["screening"]
-    assert screening == whole.summary["search"]["screening"]
-    each = round((1.0 - LATE_SHARE) * SMALLEST_BATCH)  # of five generations of 100
     assert run.summary["search"]["evaluations"] == SHORT_FIRST_BATCH + 5 * SMALLEST_BATCH
-    assert screening["considered"] == CANDIDATES * 5 * each
-    assert screening["evaluated_though_rejected"] >= 0.05 * 5 * each
 
 
 @pytest.mark.slow
@@ -179,7 +172,6 @@ def test_front_outside_the_reference_box_is_kept_and_resumed(tmp_path: Path) -> 
         assert front_mask(run.history.values).all()
         assert 0 < len(run.history) <= 300
         assert write_figures(tmp_path / "run")
-    assert verify_run(tmp_path / "run")[1]["verification"]["robust"] >= 0
 
 
 @pytest.mark.slow
@@ -188,7 +180,9 @@ def test_gpu_run_is_verified_without_a_gpu(tmp_path: Path) -> None:
     config = tmp_path / "run" / "config.yaml"
     config.write_text(config.read_text(encoding="utf-8").replace("device: cpu", "device: cuda"), encoding="utf-8")
     assert "device: cuda" in config.read_text(encoding="utf-8")
-    assert verify_run(tmp_path / "run")[1]["verification"]["robust"] > 0
+    verification = verify_front(read_run(tmp_path / "run")[1])
+    assert verification is not None
+    assert verification.robust.any()
     assert write_figures(tmp_path / "run")
 
 

@@ -95,5 +95,5 @@ def ask(port: int, method: str, path: str, body: bytes | None = None, **headers:
 def post_control(port: int, key: str, content: object = None, **headers: str) -> int:
     """What the server says to a POST that is right but for these headers."""
     right = {"Origin": f"http://127.0.0.1:{port}", "Content_Type": "application/json", "X_Armwright_Key": key}
-    body = content if isinstance(content, bytes) else json.dumps(content or {"action": "pause"}).encode()
+    body = content if isinstance(content, bytes) else json.dumps(content or {"action": "stop"}).encode()
     return ask(port, "POST", "/control", body, **{k: v for k, v in (right | headers).items() if v})[0]

@@ -34,7 +34,7 @@ def short(folder: Path, **settings: Any) -> StudyResult:
 def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("intact") / "run"
     short(folder)
-    (folder / "control.json").write_text('{"paused": false, "stop": false}', encoding="utf-8")
+    (folder / "control.json").write_text('{"stop": false}', encoding="utf-8")
     return folder
 
 

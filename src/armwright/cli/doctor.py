@@ -1,18 +1,16 @@
-"""Examine what is installed and configured, and whether it works."""
+"""Examine what is installed and configured."""
 
 import os
 from collections.abc import Iterator
 from importlib import metadata
 
-from armwright.exceptions import ArmwrightError, ModelError
+from armwright.exceptions import ArmwrightError
 from armwright.extras import EXTRAS, install_command, missing_packages
-from armwright.llm.backend import CHECK, CHECK_FORMAT, CallError
 from armwright.llm.configuration import configuration_path, configured_model
 from armwright.llm.model_options import ModelOptions
 from armwright.problem.problem import Problem
 from armwright.runs.config import versions
 from armwright.tasks.catalogue import load_task
-from armwright.text import one_line
 
 OK, MISSING, WRONG = "ok", "--", "!!"  # what is missing matters only if it is wanted
 
@@ -65,28 +63,4 @@ def _configured(options: ModelOptions) -> tuple[str, str]:
         ModelClient(configured.options)
     except ArmwrightError as fault:
         return WRONG, f"model: {configured}: {fault}" if configured else f"model: {fault}"
-    return OK, f"model: {configured}; --call tries it"
-
-
-def try_model(options: ModelOptions) -> str:
-    """Make one small call to the configured model.
-
-    Raises:
-        ModelError: No model is configured, or the call fails.
-    """
-    configured = configured_model(options)
-    if configured is None:
-        raise ModelError("no model is configured; give --model, or set ARMWRIGHT_MODEL")
-    from armwright.llm.client import ModelClient
-
-    client = ModelClient(configured.options)
-    try:
-        reply = client.ask(CHECK, CHECK_FORMAT)
-    except CallError as fault:
-        raise ModelError(f"{fault} ({fault.kind})") from fault
-    cost = "price unknown" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
-    return (
-        f"{OK} call: {configured.options.model} answered {one_line(reply.answer, 60)} in {reply.seconds:.1f} s (output "
-        f"{reply.output_mode}), {reply.input_tokens} tokens in, {reply.output_tokens} out, {cost}"
-        f"{client.note and f'; {client.note}'}"
-    )
+    return OK, f"model: {configured}"

@@ -109,15 +109,9 @@ def report(
         print_text(str(written))
 
 
-def doctor(*, model: str | None = None, model_options: str | None = None, call: bool = False) -> None:
-    """Show what is installed and which models are configured.
-
-    Nothing is sent unless --call is given.
-
-    Parameters:
-        call: Make one small call to the configured model.
-    """
-    from armwright.cli.doctor import WRONG, examine, try_model
+def doctor(*, model: str | None = None, model_options: str | None = None) -> None:
+    """Show what is installed and which models are configured; nothing is sent."""
+    from armwright.cli.doctor import WRONG, examine
     from armwright.llm.configuration import load_model_options
 
     console = open_console()
@@ -128,5 +122,3 @@ def doctor(*, model: str | None = None, model_options: str | None = None, call: 
         marks.add(mark)
     if WRONG in marks:
         sys.exit(FailureError.exit_code)
-    if call:
-        console.print(try_model(options))

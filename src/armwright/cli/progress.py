@@ -44,7 +44,7 @@ def study_progress(console: Console) -> Generator[Callable[[StudyProgress], None
             state = f"{volume}  front {progress.front_size}{failed}"
             count, is_last = f"iteration {done}/{progress.n_total}", done == progress.n_total
             if update is not None:
-                activity = {"proposing": f"asking {source} …", "paused": "paused"}.get(progress.doing, source)
+                activity = f"asking {source} …" if progress.doing == "proposing" else source
                 waiting = f"  {progress.n_in_flight} in flight" if progress.n_in_flight else ""
                 is_ended = progress.doing == "finished" and is_last
                 state = f"{volume}  {VERIFYING}" if is_ended else f"{state}  {activity}{waiting}"

@@ -55,16 +55,13 @@ def reach_map(
     """
     from armwright.cli.notes import can_draw
     from armwright.kinematics.reach.reach_map import reach_map
-    from armwright.page.page import write_report
-    from armwright.page.reach_maps import MOST_POINTS
-    from armwright.proof.results import read_summary
 
     if out is not None and out.suffix != ".npz":
         raise SettingsError(f"--out {out}: expected a name that ends in .npz")
     middle = parse_numbers("--axis", axis, "three numbers with commas, such as 0,0,-1", 3)
     corners = "six numbers with commas, such as -0.5,-0.5,0,0.5,0.5,0.8"
     numbers = None if box is None else parse_numbers("--box", box, corners, 6)
-    mapped, file, run = _subject(source, design, tip, task, _describe_conditions(payload, clearance, obstacles))
+    mapped, file = _subject(source, design, tip, task, _describe_conditions(payload, clearance, obstacles))
     if obstacles and not mapped.obstacles:
         where = "a task; try --task TASK" if mapped.task is None else "obstacles in the task, which has none"
         raise SettingsError(f"--obstacles: expected {where}")
@@ -83,21 +80,18 @@ def reach_map(
         obstacles=mapped.obstacles if obstacles else (),
     )
     if out is not None:
-        file, run = out, None
+        file = out
     file.parent.mkdir(parents=True, exist_ok=True)
     around = "of the whole sphere" if cone >= 180.0 else f"within {cone:g}° of ({axis})"
     count = f"{len(found.directions)} directions" if len(found.directions) > 1 else "one direction"
     texts = {"directions_text": f"{count} {around}", "conditions": mapped.conditions}
-    found.save(file, design=mapped.design, **texts)
+    found.save(file, **texts)
     files = [file]
     if can_draw(open_console(json_)):
         from armwright.pictures.reach_figure import write_reach_figure
 
         files.append(file.with_suffix(".png"))
         write_reach_figure(found, mapped, files[1])
-    is_shown = len(found.points) <= MOST_POINTS
-    if run is not None and is_shown and read_summary(run) is not None:
-        files.append(write_report(run))
     coverages = {"within joint limits": found.bare}
     if mapped.conditions:
         coverages[mapped.conditions] = found.usable
@@ -134,15 +128,12 @@ def reach_map(
     print_table(console, columns, volumes, "--json prints all")
     for written in files:
         console.print(str(written))
-    if run is not None and not is_shown:
-        console.print(f"the report shows maps of up to {MOST_POINTS:,} points")
 
 
 def _subject(
     source: str, design: int | None, tip: str | None, task: str | None, conditions: str
-) -> "tuple[MappedArm, Path, Path | None]":
-    """Return the arm of a run or of a URDF, the file of its map, and the run."""
-    from armwright.page.reach_maps import design_text
+) -> "tuple[MappedArm, Path]":
+    """Return the arm of a run or of a URDF, and the file of its map."""
     from armwright.pictures.mapped_arm import MappedArm
     from armwright.proof.selection import pick
     from armwright.robot.robot_descriptions import find_urdf
@@ -156,7 +147,7 @@ def _subject(
             raise SettingsError(f"--design {design} is for a run; {source} is an arm")
         arm = read_urdf(find_urdf(source), tip)
         around = None if task is None else load_task(task)
-        return MappedArm(run.stem, arm, around, conditions), Path(f"{run.stem}-reach.npz"), None
+        return MappedArm(run.stem, arm, around, conditions), Path(f"{run.stem}-reach.npz")
     for name, value in (("--tip", tip), ("--task", task)):
         if value is not None:
             raise SettingsError(f"{name} {value} is for a URDF; the run {source} has its own")
@@ -164,8 +155,7 @@ def _subject(
     member = pick(history)[0] if design is None else history.member(design)
     title = f"design {member.number} of {source}"
     file = run / REACH_MAPS / f"{member.number:04d}.npz"
-    params = history.problem.space.matrix([member.design])[0]
-    return MappedArm(title, member.arm, history.problem.task, conditions, design_text(params)), file, run
+    return MappedArm(title, member.arm, history.problem.task, conditions), file
 
 
 def _describe_conditions(payload: float | None, clearance: float | None, obstacles: bool) -> str:

@@ -19,12 +19,11 @@ from armwright.cli.streams import (
     print_json,
     print_text,
 )  # fmt: skip
-from armwright.exceptions import SettingsError, StoppedError
+from armwright.exceptions import StoppedError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from armwright.llm.model_options import ModelOptions
     from armwright.problem.problem import Problem
 
 
@@ -115,7 +114,7 @@ def optimize(
     memory: str | None = None,
     max_cost: float | None = None,
     model_options: str | None = None,
-    print_prompt: str | None = None,
+    print_prompt: bool = False,
     device: str = "auto",
     workers: int = 0,
     scheduler: str | None = None,
@@ -148,8 +147,7 @@ def optimize(
         prompt: Prompt: plus (with analysis instructions), minus, or full (whole front, mechanics). Default: plus.
         memory: What the model remembers of a run: none (every question is new) or chat (the whole conversation).
             Default: none.
-        print_prompt (WHAT): Print what a model is sent, and exit: next (the first prompt of a new run), or schema (of
-            the answer).
+        print_prompt: Print the first prompt that a model would be sent, and exit.
 
     Evaluation:
         workers: Local processes that evaluate designs; 0: this process (extra distributed).
@@ -172,8 +170,13 @@ def optimize(
     console = open_console(json_)
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
     problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
-    if print_prompt is not None:
-        _show_prompt(print_prompt, problem, given, n_init=n_init, n_total=n_total, seed=seed)
+    if print_prompt:
+        from armwright.llm.prompt import estimated_tokens
+        from armwright.study.prompt_preview import first_prompt
+
+        text = first_prompt(problem, given, n_init, n_total, seed)
+        print_text(text, end="")
+        print_error(f"about {estimated_tokens(text):,} tokens; for trial {n_init}")
         return
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     choice = choose_proposer(proposer, given)
@@ -225,20 +228,6 @@ def optimize(
         show_result(console, run, drawn)
     if all(trial.failure is not None for trial in run.trials):
         raise typer.Exit(1)
-
-
-def _show_prompt(what: str, problem: "Problem", options: "ModelOptions", **settings: int) -> None:
-    """Print the first prompt of a run with these settings, or the schema of its answer."""
-    from armwright.study.prompt_preview import preview
-
-    if what not in ("next", "schema"):
-        raise SettingsError(f'--print-prompt "{what}": expected next or schema')
-    shown = preview(problem, options, **settings)
-    if what == "schema":
-        print_json(shown.schema)
-        return
-    print_text(shown.prompt, end="")
-    print_error(f"about {shown.tokens:,} tokens; for trial {shown.number}")
 
 
 def _begin(console: "Console", problem: "Problem", space: Path | None, folder: Path) -> None:

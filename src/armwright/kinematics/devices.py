@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.kinematics.kernel_cache import init_warp, make_cache_writable, report_cache_errors
+from armwright.kinematics.kernel_cache import init_warp, report_cache_errors
 
 Device = Literal["cpu", "cuda"]
 
@@ -168,7 +168,5 @@ def _load_modules(modules: Sequence[Any], device: Device) -> None:
     for module in modules:
         folder = os.path.join(str(warp.config.kernel_cache_dir), module.get_module_identifier(block_dim))
         is_cached = os.path.exists(folder)
-        if not is_cached:
-            make_cache_writable(warp)
         with nullcontext() if is_cached else compilation.timed():
             module.load(device, block_dim)

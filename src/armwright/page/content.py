@@ -3,7 +3,7 @@
 report.html embeds these bytes; the live server sends them whenever they change.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 from pydantic_core import to_json
 
-from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.existing.compare_arms import read_existing_arms
-from armwright.files import MAX_DERIVED, check_no_links, read_text, replace_surrogates
-from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
-from armwright.page.reach_maps import PageReachMap, read_reach_maps
+from armwright.files import MAX_DERIVED, read_text, replace_surrogates
+from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.pictures.style import EXISTING, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.proof.design_record import DESIGNS, DesignRecord, design_name, read_records
-from armwright.proof.results import COMMAND, SUMMARY, read_summary
-from armwright.proof.shown_run import Arrays, ShownRun, read_shown_run, show_run, shown_facts
+from armwright.proof.results import COMMAND, read_summary
+from armwright.proof.shown_run import Arrays, show_run, shown_facts
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.config import FrontMethod, Method
@@ -30,19 +28,7 @@ from armwright.sheet.record import NOT_MODELLED
 
 FILES = {"urdf": "arm.urdf", "mjcf": "arm.xml"}  # of designs of the front, by format
 MAX_COMMAND = 64 * 1024  # [bytes]
-
-
-def finished_content(folder: Path) -> bytes | None:
-    """Return the content of the page of a finished run, from the files that it wrote at its end; None without them."""
-    check_no_links(folder)
-    shown = read_shown_run(folder) if (folder / SUMMARY).is_file() else None
-    if shown is None:
-        return None
-    params = shown.arrays["params"]
-    maps = read_reach_maps(folder, len(params), params.__getitem__)
-    return _packed(
-        folder, shown, maps, {number: _files(folder, number) for number in shown.head["front"]}, _calls(folder)
-    )
+COLOURS = {"missed": MISSED, "target": TARGET, "joint": JOINT, "obstacle": OBSTACLE, "infeasible": INFEASIBLE}
 
 
 class RunContent:
@@ -55,26 +41,42 @@ class RunContent:
         summary = read_summary(folder)
         # A summary of another kind of run does not belong to this one.
         self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
-        self.calls = _calls(folder)
+        self.calls = Transcript(folder / TRANSCRIPTS, read_only=True).calls
         known: dict[int, DesignRecord] = {}
         if earlier is not None and self.summary is None:  # those of a finished run are its results
             known = {
                 n: one for n, one in earlier.records.items() if self.history.trials[n : n + 1] == [earlier.trial(n)]
             }
-        front = [member.number for member in self.history.front]
-        known |= read_records(folder, self.history, [number for number in front if number not in known])
-        self.records = {number: known[number] for number in front}
+        recommended = [self.history.member(one["design"]).number for one in (self.summary or {}).get("recommended", ())]
+        numbers = dict.fromkeys([*(member.number for member in self.history.front), *recommended])
+        known |= read_records(folder, self.history, [number for number in numbers if number not in known])
+        self.records = {number: known[number] for number in numbers}
 
     def trial(self, number: int) -> FinishedTrial:
         """Return a trial."""
         return self.history.trials[number]
 
-    def packed(self) -> bytes:
-        """Pack the run."""
+    def packed(self, with_files: bool = False) -> bytes:
+        """Pack the run; with the files of its front for a page without a server, if it has ended."""
         shown = show_run(self.config, self.history, self.summary, self.records)
-        return _packed(
-            self.folder, shown, read_reach_maps(self.folder, len(self.history), self._params), {}, self.calls
-        )
+        holds_files = with_files and self.summary is not None
+        head = {
+            **shown.head,
+            "files": {number: _files(self.folder, number) for number in self.records} if holds_files else {},
+            "folder": replace_surrogates(self.folder.resolve().name),
+            "command": _command(self.folder),
+            "calls": [asdict(call) for call in self.calls],
+            "existing_arms": [
+                {"name": arm.name, "values": arm.values, "facts": shown_facts(arm.facts), "violated": arm.violated}
+                for arm in read_existing_arms(self.folder, len(self.config.objectives))
+            ],
+            "existing": EXISTING._asdict(),
+            "not_modelled": NOT_MODELLED,
+            "looks": {source: look(source)._asdict() for source in shown.head["sources"]},
+            "colours": COLOURS,
+            "joint_labels": JOINT_LABEL,
+        }
+        return pack(head, shown.arrays)
 
     def file(self, number: int, kind: str) -> str | None:
         """Return a design as text for simulators, urdf or mjcf; None for other kinds."""
@@ -83,44 +85,6 @@ class RunContent:
             return stored[kind]
         name, arm = f"{self.history.problem.task.name}-{number}", self.history.member(number).arm
         return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}.get(kind)
-
-    def _params(self, number: int) -> Array:
-        return self.history.problem.space.matrix([self.trial(number).design])[0]
-
-
-def _calls(folder: Path) -> tuple[Call, ...]:
-    return Transcript(folder / TRANSCRIPTS, read_only=True).calls
-
-
-def _packed(
-    folder: Path,
-    shown: ShownRun,
-    maps: Mapping[int, PageReachMap],
-    files: Mapping[int, Mapping[str, str]],
-    calls: Sequence[Call],
-) -> bytes:
-    """Pack what is shown of a run with what its folder holds beside it.
-
-    Maps and files are by number of the design, files also by format.
-    """
-    head = {
-        **shown.head,
-        "files": files,
-        "folder": replace_surrogates(folder.resolve().name),
-        "command": _command(folder),
-        "calls": [asdict(call) for call in calls],
-        "reach_maps": {number: one.head for number, one in maps.items()},
-        "existing_arms": [
-            {"name": arm.name, "values": arm.values, "facts": shown_facts(arm.facts), "violated": arm.violated}
-            for arm in read_existing_arms(folder, len(shown.head["config"]["objectives"]))
-        ],
-        "existing": EXISTING._asdict(),
-        "not_modelled": NOT_MODELLED,
-        "looks": {source: look(source)._asdict() for source in shown.head["sources"]},
-        "colours": {"missed": MISSED, "target": TARGET, "joint": JOINT, "obstacle": OBSTACLE, "infeasible": INFEASIBLE},
-        "joint_labels": JOINT_LABEL,
-    }
-    return pack(head, {**shown.arrays, **{f"reach_{number}": one.levels for number, one in maps.items()}})
 
 
 def _command(folder: Path) -> str:

@@ -4,13 +4,12 @@
 /run            the run, packed
 /file           a design as text: ?design=N&format=urdf, mjcf or datasheet
 /status         the status of the study, which a page that is looked at asks for twice a second
-/control        POST: pause, resume, stop; from the page alone
+/control        POST: stop; from the page alone
 
 All but the page need the server's key (request_guard.py).
 """
 
 import asyncio
-from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -24,7 +23,7 @@ from armwright.exceptions import ArmwrightError, RunFolderError
 from armwright.page.live_run import LiveRun
 from armwright.page.page import live_shell
 from armwright.page.request_guard import read_request
-from armwright.runs.control import pause_study, resume_study, stop_study
+from armwright.runs.control import stop_study
 
 MAX_BODY = 64 * 1024  # largest POST [bytes]
 
@@ -32,10 +31,7 @@ MAX_BODY = 64 * 1024  # largest POST [bytes]
 class ControlRequest(BaseModel, frozen=True, extra="forbid"):
     """A request of the page's user to the study."""
 
-    action: Literal["pause", "resume", "stop"]
-
-
-_ACTIONS: dict[str, Callable[[Path], None]] = {"pause": pause_study, "resume": resume_study, "stop": stop_study}
+    action: Literal["stop"]
 
 
 def live_app(folder: Path) -> Starlette:
@@ -91,17 +87,18 @@ class LivePage:
         if isinstance(body, Response):
             return body
         try:
-            await asyncio.to_thread(self._apply, ControlRequest.model_validate_json(body))
+            ControlRequest.model_validate_json(body)
+            await asyncio.to_thread(self._stop)
         except ValidationError:
-            return PlainTextResponse("expected pause, resume or stop", status_code=422)
+            return PlainTextResponse("expected stop", status_code=422)
         except ArmwrightError as fault:
             return PlainTextResponse(str(fault), status_code=409)
         return Response(status_code=204)
 
-    def _apply(self, request: ControlRequest) -> None:
+    def _stop(self) -> None:
         if not self._folder.is_dir():
             raise RunFolderError("the run folder is gone")
-        _ACTIONS[request.action](self._folder)
+        stop_study(self._folder)
 
 
 def _natural(request: Request, name: str) -> int | None:

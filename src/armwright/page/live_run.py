@@ -13,14 +13,14 @@ from armwright.llm.transcript import TRANSCRIPTS
 from armwright.page.content import RunContent
 from armwright.proof.results import REPORT, SUMMARY
 from armwright.runs.config import FrontMethod
-from armwright.runs.control import read_control, read_status
-from armwright.runs.folder import CONFIG, REACH_MAPS, is_held, read_config
+from armwright.runs.control import read_status
+from armwright.runs.folder import CONFIG, is_held, read_config
 from armwright.runs.trials_file import TRIALS
 
-SHOWN = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, REACH_MAPS, EXISTING_ARMS, REPORT)  # files that change the page
+SHOWN = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, EXISTING_ARMS, REPORT)  # files that change the page
 CHANGING = {"reference_point", "versions", "earlier_versions", "method"}  # settings of one and the same run
 RECENT = 20  # trials whose mean duration predicts the remaining time
-RUNNING = ("evaluating", "asking", "paused", "searching")
+RUNNING = ("evaluating", "asking", "searching")
 
 
 class LiveRun:
@@ -85,7 +85,7 @@ class LiveRun:
         with self._lock:
             self._look()
             content, version, run = self._content, self._version, self._run
-        status, control = read_status(self.folder), read_control(self.folder)
+        status = read_status(self.folder)
         trials = () if content is None else content.history.trials
         study = None if content is None else content.study
         is_finished = content is not None and content.summary is not None
@@ -105,7 +105,6 @@ class LiveRun:
             "designs": len(trials),
             "planned": planned,
             "left": None if planned is None or not recent else (planned - len(trials)) * sum(recent) / len(recent),
-            "paused": control.paused,
             "fault": self.fault or ("" if status is None else status.fault),
             "asks_a_model": study is not None and "prompt" in (study.proposer or {}),
         }

@@ -7,7 +7,7 @@ from pathlib import Path
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, replace_file, replace_surrogates
 from armwright.page.assembly import PageSource, assemble
-from armwright.page.content import RunContent, finished_content
+from armwright.page.content import RunContent
 from armwright.proof.results import REPORT
 
 PAGE = PageSource("page.html", "main.js", ("page.css",), ("plotly-basic.min.js", "three.min.js"))
@@ -16,7 +16,10 @@ PAGE = PageSource("page.html", "main.js", ("page.css",), ("plotly-basic.min.js",
 def write_report(folder: str | Path) -> Path:
     """Write report.html into a run folder, replacing an existing one."""
     folder = Path(folder)
-    data = base64.b64encode(zlib.compress(finished_content(folder) or _content(folder), 6)).decode()
+    content = RunContent(folder)
+    if not len(content.history):
+        raise RunFolderError(f"{folder} has no finished trial yet, so there is nothing to report")
+    data = base64.b64encode(zlib.compress(content.packed(with_files=True), 6)).decode()
     holder = f'<script type="text/plain" id="content">{data}</script>'
     page = assemble(
         PAGE, f"{replace_surrogates(folder.resolve().name)}: armwright", connects=False, values={"data": holder}
@@ -25,14 +28,6 @@ def write_report(folder: str | Path) -> Path:
     with naming_write_errors(path, "; the trials are safe"):
         replace_file(path, page.encode())
     return path
-
-
-def _content(folder: Path) -> bytes:
-    """Return the content of the page of a run that has not ended, or has lost what it wrote at its end."""
-    content = RunContent(folder)
-    if not len(content.history):
-        raise RunFolderError(f"{folder} has no finished trial yet, so there is nothing to report")
-    return content.packed()
 
 
 def live_shell() -> str:

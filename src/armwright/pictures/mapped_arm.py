@@ -18,7 +18,6 @@ class MappedArm:
     arm: Arm | UrdfArm
     task: Task | None = None  # whose obstacles and targets are drawn
     conditions: str = ""  # that usable poses satisfy, in words
-    design: str = ""  # its parameters, by which the page knows the design of a run
 
     @property
     def body(self) -> Arm:

@@ -109,15 +109,11 @@ def write_designs(
     verdicts: Mapping[int, Mapping[str, Any]],
     recommended: Collection[int],
     survival: Mapping[int, Any],
-) -> dict[int, DesignRecord]:
+) -> None:
     """Write the folders of designs of the front and of recommended ones; remove the others.
 
     verdicts, survival: What was found about designs, by number.
-
-    Returns:
-        Their records by number.
     """
-    written: dict[int, DesignRecord] = {}
     numbers = list(dict.fromkeys([*(member.number for member in history.front), *recommended]))
     names = {design_name(number) for number in numbers}
     for stale in (folder.path / DESIGNS).glob("[0-9]*"):
@@ -134,8 +130,6 @@ def write_designs(
         if number in survival:
             record["survival"] = to_jsonable_python(survival[number])
         folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
-        written[number] = DesignRecord.model_validate(record)
-    return written
 
 
 def design_name(number: int) -> str:

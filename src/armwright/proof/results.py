@@ -3,7 +3,6 @@
 summary.json              the result of the run
 trials.csv, front.csv     all trials, and those of the front
 designs/NNNN/             each design of the front (design_record.py)
-shown.npz                 what the page shows (shown_run.py)
 """
 
 import json
@@ -16,7 +15,6 @@ from typing import Any
 from pydantic_core import to_jsonable_python
 
 from armwright.arrays import Array
-from armwright.exceptions import RunFolderError
 from armwright.files import MAX_DERIVED, naming_write_errors, read_text, replace_folder, to_csv
 from armwright.pareto import hypervolume
 from armwright.problem.assumptions import assumed_values
@@ -28,11 +26,10 @@ from armwright.proof.infeasibility import ViolationTally, feasibility_record
 from armwright.proof.perturbations import Survival
 from armwright.proof.proposer_bias import proposer_bias
 from armwright.proof.recommendation import recommend, unlimited
-from armwright.proof.shown_run import SHOWN, show_run
 from armwright.proof.summary_file import ProposerSummary, parse_summary
-from armwright.proof.verification import Verification, front_survival, verify_front
-from armwright.runs.config import FrontMethod, RunConfig
-from armwright.runs.folder import RunFolder, read_run
+from armwright.proof.verification import Verification, front_survival
+from armwright.runs.config import RunConfig
+from armwright.runs.folder import RunFolder
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
 
@@ -62,34 +59,8 @@ def write_results(
     recommended = {one["design"]: one["survival"] for one in summary.get("recommended", ())}
     survival: dict[int, Any] = {} if verification is None else front_survival(history, verification)
     survival |= {number: one for number, one in recommended.items() if one is not None}
-    records = write_designs(folder, history, verdicts, recommended, survival)
-    folder.write_bytes(SHOWN, show_run(config, history, summary, records).to_bytes())
+    write_designs(folder, history, verdicts, recommended, survival)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
-
-
-def rewrite_results(
-    folder: RunFolder, history: History, config: RunConfig, summary: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Verify the front and write the results again; return the summary, which keeps what only its sessions knew."""
-    verification = verify_front(history)
-    if isinstance(config.method, FrontMethod):
-        new = {**summary, "verification": _verification_record(history, verification)}
-    else:
-        known = {key: summary[key] for key in ("proposer", "proposer_bias", "surrogate") if key in summary}
-        new = summarize(history, config, None, verification) | known
-    write_results(folder, history, config, new, verification)
-    return new
-
-
-def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
-    """Verify the front of a finished run again, rewrite its results, and return history and summary."""
-    path = Path(path)
-    config, history = read_run(path)
-    summary = read_summary(path)
-    if summary is None:
-        raise RunFolderError(f"{path} is not finished; rerun the command that began it")
-    with RunFolder(path) as folder:
-        return history, rewrite_results(folder, history, config, summary)
 
 
 def complete_summary(path: Path, history: History) -> dict[str, Any] | None:

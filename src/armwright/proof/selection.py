@@ -103,7 +103,7 @@ def pick_from(
     if holds and history.front:
         verification = (read_summary(run) or {}).get("verification")
         if verification is None:
-            raise FailureError(f'{run} is not verified; armwright.verify_run("{run}") in Python verifies it')
+            raise FailureError(f"{run} was made without a verification (verify=False), which --holds needs")
         numbers = verification["verdict"]["numbers"]
     records = read_records(run, history, [member.number for member in history.front])
     return history, pick(history, where, by, numbers, facts_by_number(records)), records

@@ -1,18 +1,13 @@
-"""What the page shows of a run, as JSON and arrays: stored when the run ends, computed while it goes on."""
+"""What the page shows of a run, as JSON and arrays."""
 
-import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
-from pydantic_core import to_json
 
-from armwright.arrays import UNREADABLE, open_arrays
 from armwright.pareto import hypervolume
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.facts import ASKED, Facts, describe_supply
@@ -29,23 +24,8 @@ from armwright.spaces.parameters import FloatParameter
 from armwright.tasks.drawn_task import drawn_task
 from armwright.tasks.task import Task
 
-SHOWN = "shown.npz"
-
 Arrays = Mapping[str, NDArray[Any]]
 Summary = Mapping[str, Any] | None  # None if the run has not ended
-
-
-class _Config(BaseModel, extra="allow"):
-    objectives: list[Any]
-
-
-class _Head(BaseModel, extra="allow"):
-    """What the page's Python reads of a stored head; its script reads the rest."""
-
-    config: _Config
-    n: int
-    front: list[int]
-    sources: list[str]
 
 
 @dataclass(frozen=True)
@@ -54,26 +34,6 @@ class ShownRun:
 
     head: Mapping[str, Any]  # in JSON types
     arrays: Arrays  # one row for each design; `curve`: hypervolume after each design of the run
-
-    def to_bytes(self) -> bytes:
-        """Return the content of `shown.npz`."""
-        content, head = io.BytesIO(), to_json(self.head, inf_nan_mode="null")
-        arrays: dict[str, Any] = {"head": np.frombuffer(head, dtype=np.uint8), **self.arrays}
-        np.savez_compressed(content, **arrays)
-        return content.getvalue()
-
-
-def read_shown_run(folder: Path) -> ShownRun | None:
-    """Return what a finished run stored; None if it is missing or damaged."""
-    try:
-        with open_arrays(folder / SHOWN) as stored:
-            arrays = dict(stored)
-        head = _Head.model_validate_json(arrays.pop("head").tobytes()).model_dump()
-        if arrays["params"].ndim != 2 or len(arrays["params"]) != head["n"]:
-            raise ValueError("expected the parameters of each design")
-    except UNREADABLE:
-        return None
-    return ShownRun(head, arrays)
 
 
 def show_run(config: RunConfig, history: History, summary: Summary, records: Mapping[int, DesignRecord]) -> ShownRun:

@@ -75,12 +75,6 @@ class _Seconds(_Record):
 _Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class _Screening(_Record):
-    considered: Count
-    discarded_by_bounds: Count
-    evaluated_though_rejected: Count
-
-
 class _Search(_Record):
     evaluations: Count
     seconds: float
@@ -88,7 +82,6 @@ class _Search(_Record):
     found: Count
     hypervolume_history: Annotated[list[_Point], Field(min_length=1)]
     infeasible: Count = 0
-    screening: _Screening | None = None
     reference_point_from: list[str]
 
 

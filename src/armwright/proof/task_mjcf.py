@@ -1,7 +1,4 @@
-"""`aw.to_mjcf`: arms as MJCF, alone or in a task."""
-
-from collections.abc import Sequence
-from typing import overload
+"""`aw.to_mjcf`: an arm as MJCF, alone or in a task."""
 
 from armwright.problem.evaluation import evaluate
 from armwright.proof.cycle_export import peak_torques, task_model
@@ -11,16 +8,8 @@ from armwright.spaces.tool_mount import carrying_tool
 from armwright.tasks.task import Task
 
 
-@overload
-def to_mjcf(arm: Arm, task: Task | None = None, *, name: str = "arm") -> str: ...
-
-
-@overload
-def to_mjcf(arm: Sequence[Arm], task: Task | None = None, *, name: str = "arm") -> list[str]: ...
-
-
-def to_mjcf(arm: Arm | Sequence[Arm], task: Task | None = None, *, name: str = "arm") -> str | list[str]:
-    """Return the MJCF of an arm, or of each arm of a list.
+def to_mjcf(arm: Arm, task: Task | None = None, *, name: str = "arm") -> str:
+    """Return the MJCF of an arm.
 
     The arm alone has bodies base, link_1 on joint_1, …, a site `tip`, and motors motor_1 on joint_1, …, whose `ctrl` is
     the torque [N m] or force [N] on that joint. Its geometry is for display only.
@@ -31,7 +20,7 @@ def to_mjcf(arm: Arm | Sequence[Arm], task: Task | None = None, *, name: str = "
     keyframes are its postures. The payload is held from the start.
 
     Args:
-        arm: One arm or several.
+        arm: The arm.
         task: What the arm works on; None for the arm alone.
         name: Name of the model.
 
@@ -42,8 +31,6 @@ def to_mjcf(arm: Arm | Sequence[Arm], task: Task | None = None, *, name: str = "
         >>> "motor_1" in aw.to_mjcf(arm), "target_1" in aw.to_mjcf(arm, aw.load_task("target-1"))
         (True, True)
     """
-    if not isinstance(arm, Arm):
-        return [to_mjcf(one, task, name=name) for one in arm]
     if task is None:
         return mjcf.to_mjcf(arm, name)
     equipped = carrying_tool(arm, task.tool)

@@ -1,6 +1,6 @@
 """Control of a running study from another process, by two small files in the run folder.
 
-control.json   requests: pause, stop; written by the watcher
+control.json   the request to stop; written by the watcher
 status.json    activity of the study, written by the study when it changes
 
 Neither process waits for the other, and a study gives the same trials without a watcher.
@@ -21,13 +21,12 @@ STATUS = "status.json"
 CHANNEL_FILES = (CONTROL, STATUS)
 MAX_FILE_SIZE = 1024 * 1024  # [bytes]; the message of a fault may be long
 
-Doing = Literal["evaluating", "asking", "paused", "stopped", "finished"]
+Doing = Literal["evaluating", "asking", "stopped", "finished"]
 
 
 class Control(BaseModel, frozen=True, extra="forbid", strict=True):
     """A request to a study."""
 
-    paused: bool = False  # no trial begins
     stop: bool = False  # the session ends before the next trial
 
 
@@ -54,18 +53,8 @@ def read_status(folder: Path) -> Status | None:
     return _read(folder / STATUS, Status)
 
 
-def pause_study(folder: Path) -> None:
-    """Begin no new trial until `resume_study`."""
-    _write(folder, Control(paused=True))
-
-
-def resume_study(folder: Path) -> None:
-    """Continue a paused study."""
-    _write(folder, Control())
-
-
 def stop_study(folder: Path) -> None:
-    """End the study's session after the current trial, or at once if it is paused."""
+    """End the study's session after the current trial."""
     _write(folder, Control(stop=True))
 
 

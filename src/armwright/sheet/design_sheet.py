@@ -20,7 +20,6 @@ from armwright.sheet.arm_lines import ASSUMED, arm_lines
 from armwright.sheet.joint_lines import joint_lines
 from armwright.sheet.parts import mass_lines, parts_list
 from armwright.sheet.record import DataSheet
-from armwright.sheet.sensitivities import sensitivities
 from armwright.text import rounded
 
 SHEET_VALUES = ("backlash", "joint_stiffness")  # of actuators, which a sheet depends on whatever the objectives
@@ -63,7 +62,6 @@ def sheet_of(history: History, member: FrontMember, facts: Facts, verdict: Mappi
         joints=joint_lines(arm, evaluation),
         masses=mass_lines(arm),
         parts=parts,
-        sensitivities=sensitivities(problem, member.design),
         assumptions=_assumptions(history, member, payload, [part.part for part in parts if part.price is None]),
         **lines,
     )
@@ -109,7 +107,6 @@ def _assumptions(history: History, member: FrontMember, payload: float, unpriced
         "errors": f"at the targets of the task, with its payload of {payload:g} kg; static, small displacements; "
         "backlash is the sum of half the play of all joints",
         "over the reach": f"{ASSUMED['over the reach']}; deflection with {payload:g} kg at the tip",
-        "sensitivities": "each change alone, with postures of its own; errors are the largest at the targets",
     }
     if any(joint.actuator is not None for joint in arm.joints):
         found["utilisation"] = f"with a safety factor of {arm.safety_factor:g}; motors at the voltage of their supply"

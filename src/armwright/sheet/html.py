@@ -36,9 +36,9 @@ th { border-bottom-color: #111; } .left { text-align: left; } p, li { font-size:
 }
 """
 SIZES = (9.5, 9.0, 8.5, 8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0, 4.5, 4.0)  # of printed text [pt]; the largest that fits
-PAGE = 560.0  # lines of 1 pt on a page of A4
+PAGE = 500.0  # lines of 1 pt on a page of A4
 WIDTH = 1150.0  # letters of 1 pt in a line
-DRAWN = 220.0  # lines of 1 pt that the drawings take
+DRAWN = 160.0  # lines of 1 pt that the drawings take
 
 
 def to_html(sheet: DataSheet) -> str:
@@ -53,16 +53,16 @@ def to_html(sheet: DataSheet) -> str:
         _beside(*("".join(map(_table, column)) for column in columns)),
         _beside(_picture(sheet, draw_side, "side view"), _picture(sheet, draw_top, "top view")),
     ]
-    joints, parts, changes = tables.joint_table(sheet), tables.parts_table(sheet), tables.sensitivity_table(sheet)
+    joints, parts = tables.joint_table(sheet), tables.parts_table(sheet)
     assumed = tuple(f"{about}: {text}." for about, text in sheet.assumptions.items())
     bodies, sources = tables.body_lines(sheet), tables.source_lines(sheet)
     second = [
-        *(_table(joints), _list(bodies), _table(parts), _list(sources), _table(changes)),
+        *(_table(joints), _list(bodies), _table(parts), _list(sources)),
         *("<h2>What the values assume</h2>", _list(assumed)),
     ]
     sizes = (
         min(_printed_size(column, (verdict,), PAGE - DRAWN, WIDTH / 2.0) for column in columns),
-        _printed_size((joints, parts, changes), (*bodies, *sources, *assumed, "", ""), PAGE, WIDTH),
+        _printed_size((joints, parts), (*bodies, *sources, *assumed, "", ""), PAGE, WIDTH),
     )
     pages = [
         f'<section style="--size: {size}pt">\n{chr(10).join(filter(None, texts))}\n</section>'

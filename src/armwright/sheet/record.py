@@ -82,21 +82,6 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Sensitivity:
-    """What one change of a design changes; None where a quantity is not known."""
-
-    part: str  # what is changed
-    change: str  # how
-    impossible: str = ""  # why it cannot be changed so; empty if it can
-    position_error: float | None = None  # change of the largest position error at the targets
-    deflection: float | None = None  # change of the largest deflection at the targets
-    backlash_error: float | None = None  # change of the largest backlash error at the targets
-    mass: float | None = None  # change of the mass
-    price: float | None = None  # change of the price
-    broken: tuple[str, ...] = ()  # constraints that the changed design violates and the design does not
-
-
-@dataclass(frozen=True)
 class Drawing:
     """The arm with all joints at 0, or at the nearest limit, and what its tip reaches."""
 
@@ -134,7 +119,6 @@ class DataSheet:
     """What the run evaluated, by name with the unit."""
     payload: float | None = None  # the largest payload of the task; None without one
     parts: tuple[Part, ...] = ()  # the parts list
-    sensitivities: tuple[Sensitivity, ...] = ()  # what changes of the design change
     assumptions: Mapping[str, str] = field(default_factory=dict[str, str])
     """What the values assume, by what they are about."""
     not_modelled: str = NOT_MODELLED  # what neither mass nor price include

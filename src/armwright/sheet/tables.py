@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armwright.problem.facts import ASKED, PAYLOAD_AT_FULL_REACH, VOLTAGE
-from armwright.sheet.record import NOT_STATED, DataSheet, JointLine, Sensitivity
+from armwright.sheet.record import NOT_STATED, DataSheet, JointLine
 from armwright.tasks.moments import MAX_MASS
 from armwright.text import significant
 
@@ -24,11 +24,11 @@ class Table:
     note: str = ""  # A line below; why there are no rows, if there are none
 
 
-def number(value: float | None, factor: float = 1.0, signed: bool = False, missing: str = NOT_STATED) -> str:
+def number(value: float | None, factor: float = 1.0, missing: str = NOT_STATED) -> str:
     """Return a value in other units, with three significant digits and no exponent; never more than 3 decimals."""
     if value is None:
         return missing
-    return significant(factor * value, signed=signed)
+    return significant(factor * value)
 
 
 def money(value: float | None, missing: str = NOT_STATED) -> str:
@@ -149,20 +149,6 @@ def reach_table(sheet: DataSheet) -> Table:
     return Table("Over the reach", header, rows, (), "–: no posture was found there, or not stated.")
 
 
-def sensitivity_table(sheet: DataSheet) -> Table:
-    """Return what changes of the design change."""
-    header = ("part", "change", "error [mm]", "deflection [mm]", "backlash [mm]", "mass [g]", "price [USD]", "breaks")
-    rows = tuple(_sensitivity_row(line) for line in sheet.sensitivities if not line.impossible)
-    parts_by_reason: dict[str, list[str]] = {}
-    for line in sheet.sensitivities:
-        if line.impossible:
-            parts_by_reason.setdefault(f"({line.change}): {line.impossible}", []).append(line.part)
-    shown = [f"{', '.join(parts)} {reason}" for reason, parts in parts_by_reason.items()]
-    note = "An existing arm has no design space." if sheet.design is None else ""
-    note = f"Impossible: {'; '.join(shown)}." if shown else note
-    return Table("Sensitivities", header, rows, (0, 1, 7), note)
-
-
 def _base(position: Sequence[float], yaw: float) -> str:
     """Return where the base is: the first joint of a design, the base link of an existing arm."""
     turned = f", turned by {math.degrees(yaw):.1f}°" if yaw else ""
@@ -199,11 +185,3 @@ def _joint_row(sheet: DataSheet, joint: JointLine) -> tuple[str, ...]:
         number(joint.tilting_moment, missing="–"),
         share(joint.bearing_utilisation),
     )
-
-
-def _sensitivity_row(line: Sensitivity) -> tuple[str, ...]:
-    errors = (line.position_error, line.deflection, line.backlash_error)
-    shown = [number(value, 1e3, signed=True, missing="–") for value in errors]
-    price = NOT_STATED if line.price is None else "0" if abs(line.price) < 0.005 else f"{line.price:+,.2f}"
-    shown += [number(line.mass, 1e3, signed=True, missing="–"), price]
-    return (line.part, line.change, *shown, ", ".join(line.broken))

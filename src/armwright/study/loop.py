@@ -84,7 +84,6 @@ class Study:
         self._backend: LocalBackend | DaskBackend = LocalBackend(problem)
         self._schedule = Schedule()
         self._pending: dict[int, PendingTrial] = {}  # by number; a trial is recorded when all before it are
-        self._is_paused = False
 
     def run(self, verify: bool) -> StudyResult:
         """Run the trials that are left, and write the results."""
@@ -173,17 +172,12 @@ class Study:
 
         The first counted trial waits for all random ones, on which it depends.
         """
-        control = self._channel.control()
-        if control.stop:
+        if self._channel.control().stop:
             if self._pending:
                 return False
             assert self._folder is not None
             raise StoppedError(self._folder.path)
-        if control.paused and not self._is_paused:
-            self._channel.report("paused", number)
-            self._report("paused", number, note="paused by a watcher, who can resume it; Ctrl-C ends it")
-        self._is_paused = control.paused
-        if control.paused or (self._pending and number == self._method.n_init):
+        if self._pending and number == self._method.n_init:
             return False
         return sum(not pending.is_evaluated for pending in self._pending.values()) < self._backend.capacity
 

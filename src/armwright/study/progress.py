@@ -10,12 +10,12 @@ from armwright.runs.config import RunConfig
 from armwright.runs.history import FrontMember, History
 from armwright.runs.trial import FinishedTrial
 
-Activity = Literal["beginning", "proposing", "paused", "finished"]
+Activity = Literal["beginning", "proposing", "finished"]
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a study: it begins, requests a proposal, is paused, or has finished a trial."""
+    """Progress of a study: it begins, requests a proposal, or has finished a trial."""
 
     doing: Activity
     number: int

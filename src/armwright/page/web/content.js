@@ -43,7 +43,6 @@ export class Content {
     this.head = head;
     this._arrays = arrays;
     this.curve = arrays.curve.data;
-    this.reach = Object.fromEntries(Object.entries(head.reach_maps).map(([i, map]) => [i, { ...map, levels: arrays[`reach_${i}`].data }]));
     ({ n: this.n, proposals: this.proposals, failures: this.failures, calls: this.calls } = head);
   }
 

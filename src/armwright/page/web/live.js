@@ -22,7 +22,6 @@ export function openLive(shownContent, taken) {
   openKey();
   $("live").hidden = false;
   $("loading").textContent = "The first designs are being evaluated …";
-  $("pause").addEventListener("click", () => send({ action: status?.paused ? "resume" : "pause" }));
   $("stop").addEventListener("click", () => send({ action: "stop" }));
   follow();
   setInterval(show, 1000); // updates the elapsed seconds
@@ -96,7 +95,6 @@ function doing() {
     case "asking": return `asking the ${status.asks_a_model ? "model" : "proposer"}, ${since()}`;
     case "evaluating":
       return status.designs < status.planned ? `evaluating ${status.designs + 1} of ${status.planned}` : "writing the results";
-    case "paused": return `paused for ${since()}, at ${status.designs} of ${status.planned}`;
     case "stopped": return `stopped at ${status.designs} of ${status.planned}; repeat the command to resume`;
     case "searching": return "searching; its designs appear when the search ends";
     case "finished": return `finished: ${plural(status.designs, "design")}`;
@@ -105,7 +103,7 @@ function doing() {
 }
 
 function show() {
-  const isOver = lost || !["asking", "evaluating", "paused"].includes(status?.doing);
+  const isOver = lost || !["asking", "evaluating"].includes(status?.doing);
   if (lost && status?.doing !== "finished") $("doing").textContent = "Connection lost; trying again …";
   else if (status !== null) $("doing").textContent = doing();
   if (status === null) return;
@@ -113,9 +111,7 @@ function show() {
   $("progress").max = status.planned || 1;
   $("progress").value = status.designs;
   $("left").textContent = isOver || status.left === null || status.left < 1 ? "" : `about ${duration(status.left)} left`;
-  $("pause").hidden = $("stop").hidden = !lost && isOver;
-  $("pause").disabled = $("stop").disabled = lost;
-  $("pause").setAttribute("aria-pressed", status.paused);
-  $("pause").textContent = status.paused ? "Resume" : "Pause";
+  $("stop").hidden = !lost && isOver;
+  $("stop").disabled = lost;
   complain("fault", status.fault ? `last fault: ${status.fault}` : "");
 }

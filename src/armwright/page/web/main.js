@@ -11,7 +11,6 @@ import { fileFetcher, openLive } from "./live.js";
 import { drawLoads, openLoads } from "./loads.js";
 import { growPareto, openPareto } from "./pareto.js";
 import { drawPick, openPick, ranked } from "./pick.js";
-import { drawReach, openReach } from "./reach.js";
 import { arrange, drawRecommended, openRecommended } from "./recommended.js";
 import { fromAddress, keepAddress, set, state } from "./state.js";
 import { drawTable, openTable } from "./table.js";
@@ -46,7 +45,6 @@ function open() {
   openArm(content);
   openRecommended(content);
   openLoads(content);
-  openReach(content);
   drawConfiguration();
   addEventListener("hashchange", () => set(fromAddress(content)));
   $("loading").hidden = true;
@@ -61,7 +59,6 @@ function grow() {
   drawPick();
   drawTranscript();
   drawConfiguration();
-  drawReach();
   drawExisting();
 }
 

@@ -32,8 +32,7 @@ NEAR_SHARE = 0.35  # of the designs to evaluate: ranked with the violation of co
 NEAR_MISSES = 40  # infeasible designs that are parents
 REMEMBERED = 2000  # evaluated designs, the latest, whose postures estimates begin with
 
-COUNTS = ("considered", "discarded_by_bounds", "evaluated_though_rejected")  # in summary.json
-_ARRAYS = ("matrix", "postures", "feasible", "front", "near_matrix", "near_values", "counts")
+_ARRAYS = ("matrix", "postures", "feasible", "front", "near_matrix", "near_values")
 
 
 def pays(problem: Problem) -> bool:
@@ -60,12 +59,6 @@ class Screen:
         self._front = np.empty((0, len(problem.objectives)))
         self._near_matrix: Array = np.empty((0, len(parameters)))
         self._near_values: Array = np.empty((0, len(problem.objectives) + 1))  # the last one is the violation
-        self._counts = np.zeros(len(COUNTS), dtype=np.int64)
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Designs considered, discarded by bounds, and evaluated although the estimates rejected them."""
-        return dict(zip(COUNTS, self._counts.tolist(), strict=True))
 
     def offspring(
         self, pool: Array, ranks: Indices, encoding: DesignEncoding, n: int, rng: np.random.Generator
@@ -80,7 +73,6 @@ class Screen:
         left, discarded = np.flatnonzero(~hopeless), np.flatnonzero(hopeless)
         best, rejected = self._ranked(candidates[left], n - math.ceil(REJECTED_SHARE * n), rng)
         drawn = rng.permutation(rejected)[: n - len(best)]
-        self._counts = self._counts + np.array([len(candidates), len(discarded), len(drawn)])
         return candidates[np.concatenate([left[best], left[drawn], discarded])[:n]]
 
     def learn(self, matrix: Array, outcomes: Outcomes) -> None:

@@ -245,7 +245,6 @@ class DirectSearch:
         statistics = {
             "evaluations": self.search.evaluations,
             **({"infeasible": self.infeasible} if self.problem.constraints else {}),
-            **({} if self.screen is None else {"screening": self.screen.counts}),
             "seconds": round(seconds, 3),
             "ended_by": ended,
             "reference_point_from": self.survey.origins,

@@ -35,7 +35,7 @@ class LocalBackend:
         """Return the trial that was submitted; None after `timeout` [s] if none was."""
         result, self._result = self._result, None
         if result is None and timeout:
-            time.sleep(timeout)  # a paused study looks again then
+            time.sleep(timeout)
         return result
 
     def close(self) -> None:
