@@ -84,8 +84,7 @@ def _distances(
             "half": np.hstack([bodies.half, np.tile(tip["half"], (len(arms), 1, 1))]),
             "middle": motors.empty(size, links.kernels.Vector3),
             "into": motors.empty(size, motors.kernels.Matrix3),
-            "payload": arms.dof + ("tool" in at_tip),
-            "carries": np.empty(0) if rules is None else rules.carries,
+            "count": np.full(dim[1], size[2]) - (0 if rules is None else ("payload" in at_tip) & ~rules.carries),
             "allowed": np.empty((0, 0)) if rules is None else rules.allowed,
         }
         placed = motors.struct("Motors", body)

@@ -79,8 +79,13 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         return (wp.abs(wp.dot(n, d)) - reach) / wp.sqrt(square)
 
     @wp.func
-    def best_axis(d: Vector3, shape: int, half: Vector3, into: Matrix3, other: int, other_half: Vector3):
-        """Return the candidate with the largest separation, as a vector towards the other body, and its separation."""
+    def best_axis(
+        d: Vector3, shape: int, half: Vector3, into: Matrix3, other: int, other_half: Vector3, enough: real
+    ):  # fmt: skip
+        """Return the candidate with the largest separation, as a vector towards the other body, and its separation.
+
+        The cross products count only if no axis separates the bodies enough.
+        """
         z = Vector3(zero, zero, one)
         x = side_axis(shape, d)
         own = wp.matrix_from_rows(x, wp.cross(z, x), z)
@@ -88,13 +93,16 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         back = wp.transpose(into)
         its = wp.matrix_from_rows(back * u, back * wp.cross(z, u), back * z)
         n, best = z, real(-1.0e30)
-        for i in range(3):
-            for k in range(5):
-                m = own[i]
-                if k == 1:
-                    m = its[i]
-                if k > 1:
-                    m = wp.cross(own[i], its[k - 2])
+        for i in range(6):
+            m = own[i % 3]
+            if i > 2:
+                m = its[i - 3]
+            found = along(m, d, shape, half, into, other, other_half)
+            if found > best:
+                n, best = m, found
+        if best < enough:
+            for i in range(9):
+                m = wp.cross(own[i % 3], its[i / 3])
                 found = along(m, d, shape, half, into, other, other_half)
                 if found > best:
                     n, best = m, found
@@ -109,7 +117,7 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         d: middle of the other body.  into: rotation into the other body's frame.  enough: a lower bound of this size
         ends the search.
         """
-        n, bound = best_axis(d, shape, half, into, other, other_half)
+        n, bound = best_axis(d, shape, half, into, other, other_half, enough)
         # If one is a cylinder, no candidate may separate bodies that are apart.
         boxes = shape != wp.static(CYLINDER) and other != wp.static(CYLINDER)
         if bound >= enough or (boxes and bound <= zero):
