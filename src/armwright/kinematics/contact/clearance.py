@@ -21,7 +21,12 @@ SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than th
 
 
 def clearances(
-    arms: ArmArrays, q: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu", rules: TipRules | None = None
+    arms: ArmArrays,
+    q: Array,
+    obstacles: Sequence[Obstacle] = (),
+    device: Device = "cpu",
+    rules: TipRules | None = None,
+    most: float = np.inf,
 ) -> tuple[Array, Array]:
     """Return the (N, T) self-clearance and obstacle clearance [m] of arms in postures q (N, T, D) [rad] or [m].
 
@@ -32,13 +37,14 @@ def clearances(
 
     rules: where the payload is carried at each of the T postures, and what tool and payload may touch there; None if
         neither counts.
+    most: largest clearance of interest, which greater ones count as; 0 is fast for those who ask for overlaps alone.
     """
     n, t, _ = q.shape
     distances = np.empty((2, n, t))
     solids = _solids(tuple(obstacles), arms.precision, device) if obstacles else None
 
     def measure(chunk: slice) -> None:
-        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, device, rules)
+        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, device, rules, most)
 
     size = MAX_CHUNK[device] // t
     if device == "cpu":
@@ -58,11 +64,11 @@ def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
 
 
 def _distances(
-    arms: ArmArrays, q: Array, solids: Any, device: Device, rules: TipRules | None
+    arms: ArmArrays, q: Array, solids: Any, device: Device, rules: TipRules | None, most: float
 ) -> NDArray[np.floating[Any]]:
     """Return the (2, N, T) clearances of a chunk of arms [m]."""
     dim, links = q.shape[:2], load_kernels("contact.clearance_kernels", device, arms.precision)
-    own, free = (links.array(np.full(dim, np.inf), links.kernels.real) for _ in range(2))
+    own, free = (links.array(np.full(dim, most), links.kernels.real) for _ in range(2))
     offset = arms.offset.copy()
     offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
     values = {name: getattr(arms, name) for name in ("base", "motion", "radius")} | {"offset": offset, "q": q}

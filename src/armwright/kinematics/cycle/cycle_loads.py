@@ -90,7 +90,7 @@ def cycle_loads(
     for group, own in zip(paths.groups, terms, strict=True):
         density, gravity = _density(group), own.torques[:, :, 0]
         instants = density * (paths.instants - 1) + 1
-        size = max(1, SAMPLES[device] // (m * instants))
+        size = max(1, 4 * SAMPLES[device] // (m * instants))
         for rows in (slice(at, at + size) for at in range(0, len(group.index), size)):
             index, arms = group.index[rows], group.arms[rows]
             load, heavier = _loads(own[rows], arms, group.counts, instants)

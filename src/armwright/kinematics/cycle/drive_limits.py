@@ -124,11 +124,8 @@ def least_time(*cases: tuple[MotionLoad, Actuation], device: Device = "cpu") -> 
     """
     *of_motions, _, _ = cases[0][0].gravity.shape
     loaded, rate = load_kernels("cycle.drive_kernels", device), np.full(of_motions, MAX_RATE).reshape(of_motions[0], -1)
-    known, given = np.ones(of_motions, dtype=bool), list[tuple[Any, Any]]()
+    given: list[tuple[Any, Any]] = []
     for load, drives in cases:
-        ratings = np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
-        needed = np.isnan(load.coulomb + load.viscous + load.gear + load.inertial).any(axis=(-2, -1))
-        known &= ~(ratings.reshape(-1, *(1,) * (needed.ndim - 1)) | needed)
         fields = {name: each.reshape(*rate.shape, *each.shape[-2:]) for name, each in vars(load).items()}
         limits = {name: getattr(drives, name) for name in LIMITS}
         given.append((loaded.struct("Load", fields), loaded.struct("Limits", limits)))
@@ -140,5 +137,4 @@ def least_time(*cases: tuple[MotionLoad, Actuation], device: Device = "cpu") -> 
         if not left:
             break
     with np.errstate(divide="ignore", over="ignore"):
-        time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0)).reshape(of_motions)
-    return np.where(known, time, np.nan)
+        return np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0)).reshape(of_motions)
