@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.arms.motor_bodies import bodies_in, without_bodies
 from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.devices import Device, load_kernels
+from armwright.kinematics.devices import Device, cores, load_kernels
 from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
 from armwright.tasks.tip_rules import Solids, TipRules
 
@@ -48,7 +48,7 @@ def clearances(
 
     size = MAX_CHUNK[device] // t
     if device == "cpu":
-        size = min(size, max(-(-n // 8), SMALLEST_CHUNK // t))
+        size = min(size, max(-(-n // cores()), SMALLEST_CHUNK // t))
     in_chunks(measure, n, max(1, size), device)
     return distances[0], distances[1]
 

@@ -25,7 +25,7 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
     solid = solid_math(precision)
     Posed, Solids = solid.Posed, solid.Solids
     signed_distance, along_segment = solid.signed_distance, solid.along_segment
-    bound_along, nearer_link = solid.bound_along, solid.nearer_link
+    may_be_nearer, nearer_link = solid.may_be_nearer, solid.nearer_link
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
     tiny = real(1e-30)
     parallel = real(1e-12)  # square of the sine of an angle that is 0 in float32
@@ -120,7 +120,7 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
                         v = solids.into[o] * along
                         p = base + foot * v
                         v = (one - foot) * v
-                        if bound_along(solids.shape[o], p, v, solids.half[o]) - r < nearest:
+                        if may_be_nearer(nearest + r, solids.shape[o], solids.half[o], p, v):
                             distance = along_segment(solids.shape[o], p, v, solids.half[o]) - r
                             mounted = j == 0 and signed_distance(solids.shape[o], base, solids.half[o]) <= r
                             # The first link is always close to what the arm is mounted on: only overlaps count.

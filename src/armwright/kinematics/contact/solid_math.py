@@ -114,25 +114,26 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         return signed_distance(shape, p + half * (low + high) * v, size)
 
     @wp.func
-    def bound_along(shape: int, p: Vector3, v: Vector3, size: Vector3):
-        """Return a lower bound of the signed distance on the segment from p to p + v.
+    def may_be_nearer(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3):
+        """Return whether a point of the segment from p to p + v may have a smaller signed distance, by lower bounds.
 
         Distance changes by no more than the path length, and rises with each coordinate, except from the ground.
         """
-        bound = signed_distance(shape, p + half * v, size) - half * wp.length(v)
+        if signed_distance(shape, p + half * v, size) - half * wp.length(v) >= nearest:
+            return False
         if shape == wp.static(GROUND):
-            return bound
+            return True
         low, high = wp.min(p, p + v), wp.max(p, p + v)
-        return wp.max(bound, signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size))
+        return signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size) < nearest
 
     @wp.func
     def nearer_link(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real):
         """Return the smaller of a distance and that of a solid from a link with the axis from p to p + v."""
-        if bound_along(shape, p, v, size) - radius < nearest:
+        if may_be_nearer(nearest + radius, shape, size, p, v):
             return wp.min(nearest, along_segment(shape, p, v, size) - radius)
         return nearest
 
     return SimpleNamespace(
         Posed=Posed, Motors=Motors, Solids=Solids, signed_distance=signed_distance, along_segment=along_segment,
-        bound_along=bound_along, nearer_link=nearer_link,
+        may_be_nearer=may_be_nearer, nearer_link=nearer_link,
     )  # fmt: skip

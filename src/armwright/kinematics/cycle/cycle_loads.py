@@ -150,8 +150,9 @@ def _loads(
     """
     _, _, s_t, s_tt = _instants(counts, instants)
     rate, change = s_t[:, None], s_tt[:, None]
-    gravity, drag, push, *payload = np.moveaxis(_at_instants(terms.torques, counts, instants), 3, 0)
-    q_s, q_ss = np.moveaxis(_at_instants(terms.states, counts, instants), 3, 0)
+    torques, states = (_at_instants(each, counts, instants) for each in (terms.torques, terms.states))
+    gravity, drag, push, *payload = np.ascontiguousarray(np.moveaxis(torques, 3, 0))
+    q_s, q_ss = np.ascontiguousarray(np.moveaxis(states, 3, 0))
     inertial, velocity = drag * rate**2 + push * change, q_s * rate
     if arms.actuation is None:
         nothing = np.zeros(gravity.shape)
