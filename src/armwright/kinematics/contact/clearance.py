@@ -21,13 +21,9 @@ SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than th
 
 
 def clearances(
-    arms: ArmArrays,
-    q: Array,
-    obstacles: Sequence[Obstacle] = (),
-    device: Device = "cpu",
-    rules: TipRules | None = None,
-    most: float = np.inf,
-) -> tuple[Array, Array]:
+    arms: ArmArrays, q: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu",
+    rules: TipRules | None = None, most: float = np.inf,
+) -> tuple[Array, Array]:  # fmt: skip
     """Return the (N, T) self-clearance and obstacle clearance [m] of arms in postures q (N, T, D) [rad] or [m].
 
     These are the smallest distances of two links that are not neighbours, and of a link from an obstacle. The bodies of

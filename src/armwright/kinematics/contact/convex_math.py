@@ -93,16 +93,13 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         back = wp.transpose(into)
         its = wp.matrix_from_rows(back * u, back * wp.cross(z, u), back * z)
         n, best = z, real(-1.0e30)
-        for i in range(6):
-            m = own[i % 3]
-            if i > 2:
-                m = its[i - 3]
-            found = along(m, d, shape, half, into, other, other_half)
-            if found > best:
-                n, best = m, found
-        if best < enough:
-            for i in range(9):
-                m = wp.cross(own[i % 3], its[i / 3])
+        for i in range(15):
+            if i < 6 or best < enough:
+                m = own[i % 3]
+                if i > 2:
+                    m = its[i % 3]
+                if i > 5:
+                    m = wp.cross(own[i % 3], its[i / 3 - 2])
                 found = along(m, d, shape, half, into, other, other_half)
                 if found > best:
                     n, best = m, found

@@ -28,6 +28,7 @@ ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite o
 MIN_TIME, MAX_TIME = 0.15, 1e3  # [s] of a motion that is as fast as possible; drives cannot follow shorter ones
 MORE_PAYLOAD = 0.1  # share of the payload by which it may be heavier in a motion as fast as possible
 VOLTAGE_SHARE = 0.9  # of the voltage, that suffices for it
+Counts = tuple[int, ...]  # of samples along each motion
 BETWEEN = 16  # times as many instants of a sharp path, of which the largest values count
 
 
@@ -141,9 +142,7 @@ def _thinned(values: Array, density: int) -> Array:
     return np.concatenate([values[..., :1, :], between, values[..., -1:, :]], axis=-2)
 
 
-def _loads(
-    terms: TorqueTerms, arms: ArmArrays, counts: tuple[int, ...], instants: int
-) -> tuple[MotionLoad, MotionLoad]:
+def _loads(terms: TorqueTerms, arms: ArmArrays, counts: Counts, instants: int) -> tuple[MotionLoad, MotionLoad]:
     """Return the loads of all motions as they are and with a heavier payload.
 
     The drives' own inertia and friction count where they are known.
@@ -173,7 +172,7 @@ def quintic(t: Array) -> tuple[Array, Array, Array]:
     return s, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
 
 
-def _at_instants(values: Array, counts: tuple[int, ...], instants: int) -> Array:
+def _at_instants(values: Array, counts: Counts, instants: int) -> Array:
     """Return (N, M, F, ...) of values at the samples of all motions (N, R, ...), interpolated at F instants of each."""
     before, share, _, _ = _instants(counts, instants)
     share = share.reshape(*share.shape, *(1,) * (values.ndim - 2))
@@ -181,7 +180,7 @@ def _at_instants(values: Array, counts: tuple[int, ...], instants: int) -> Array
 
 
 @cache
-def _instants(counts: tuple[int, ...], instants: int) -> tuple[NDArray[np.int32], Array, Array, Array]:
+def _instants(counts: Counts, instants: int) -> tuple[NDArray[np.int32], Array, Array, Array]:
     """Return the sample before each of F instants of M motions, the share of the way to the next (M, F), s_τ and s_ττ.
 
     counts: Samples of each motion, equally spaced in s.

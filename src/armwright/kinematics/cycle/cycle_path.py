@@ -198,15 +198,9 @@ def _follow(
 
 
 def _measure(
-    arms: ArmArrays,
-    plan: CyclePlan,
-    entry: Array,
-    groups: Sequence[CycleGroup],
-    jumps: NDArray[np.bool_],
-    obstacles: Sequence[Obstacle],
-    device: Device,
-    between: int = 2,
-) -> CyclePaths:
+    arms: ArmArrays, plan: CyclePlan, entry: Array, groups: Sequence[CycleGroup], jumps: NDArray[np.bool_],
+    obstacles: Sequence[Obstacle], device: Device, between: int = 2,
+) -> CyclePaths:  # fmt: skip
     """Return the paths with what they are off by and how near they come; between: as in `_line_errors`."""
     n, m = jumps.shape
     values = np.zeros((5, n, m))
@@ -241,15 +235,9 @@ def _measure(
 
 
 def _look_between(
-    arms: ArmArrays,
-    plan: CyclePlan,
-    ends: Array,
-    step: Array,
-    clearance: Array,
-    worst: Array,
-    obstacles: Sequence[Obstacle],
-    device: Device,
-) -> None:
+    arms: ArmArrays, plan: CyclePlan, ends: Array, step: Array, clearance: Array, worst: Array,
+    obstacles: Sequence[Obstacle], device: Device,
+) -> None:  # fmt: skip
     """Lower clearances (2, N, M), and move the shares (N, M) where they are worst, to those between samples.
 
     Corners pass each other between the samples of a joint motion, so one that comes near is searched around its worst
@@ -265,7 +253,7 @@ def _look_between(
         if not len(place[0]):
             continue
         part, (start, end), size = arms[place[0]], ends[place].swapaxes(0, 1)[:, :, None], step[place][:, None]
-        rules = plan.rules(plan.motions[place[1][0]], np.full(len(BETWEEN), 0.5))
+        rules = plan.rules(plan.motions[int(place[1][0])], np.full(len(BETWEEN), 0.5))
         for _ in range(ZOOMS):
             size = size / 4.0
             share = np.clip(worst[place][:, None] + size * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (P, S)

@@ -65,14 +65,9 @@ def dynamics_kernels() -> SimpleNamespace:
 
     @kernel
     def torque_terms(
-        bodies: Bodies,
-        q: wp.array3d(dtype=real),
-        q_s: wp.array3d(dtype=real),
-        q_ss: wp.array3d(dtype=real),
-        carried: wp.array(dtype=real),
-        terms: wp.array4d(dtype=real),
-        wrenches: wp.array4d(dtype=Wrench),
-    ):
+        bodies: Bodies, q: wp.array3d(dtype=real), q_s: wp.array3d(dtype=real), q_ss: wp.array3d(dtype=real),
+        carried: wp.array(dtype=real), terms: wp.array4d(dtype=real), wrenches: wp.array4d(dtype=Wrench),
+    ):  # fmt: skip
         """Compute the terms of the torque along a motion.
 
         q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  carried: (S,) share of
@@ -161,16 +156,10 @@ def dynamics_kernels() -> SimpleNamespace:
 
     @kernel
     def bearing_loads(
-        before: wp.array2d(dtype=int),
-        share: wp.array2d(dtype=real),
-        rate: wp.array(dtype=real),
-        change: wp.array(dtype=real),
-        durations: wp.array2d(dtype=real),
-        motion: wp.array2d(dtype=int),
-        offset: wp.array2d(dtype=real),
-        wrenches: wp.array4d(dtype=Wrench),
-        largest: wp.array4d(dtype=real),
-    ):
+        before: wp.array2d(dtype=int), share: wp.array2d(dtype=real), rate: wp.array(dtype=real),
+        change: wp.array(dtype=real), durations: wp.array2d(dtype=real), motion: wp.array2d(dtype=int),
+        offset: wp.array2d(dtype=real), wrenches: wp.array4d(dtype=Wrench), largest: wp.array4d(dtype=real),
+    ):  # fmt: skip
         """Find the largest loads across the axes of joints that turn, as of `bearings.py`.
 
         before, share: (M, F) sample before each instant of each motion, and share of the way to the next.  rate,
@@ -181,8 +170,8 @@ def dynamics_kernels() -> SimpleNamespace:
         for j in range(motion.shape[1]):
             tilting, axial, radial = real(0.0), real(0.0), real(0.0)
             if motion[arm, j] < wp.static(PRISMATIC):
-                x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
-                a = axis_of(motion[arm, j], x, y, z)
+                a = Vector3()
+                a[motion[arm, j]] = one
                 for f in range(rate.shape[0]):
                     sample, after = before[path, f], share[path, f]
                     s, ss = rate[f] / durations[arm, path], change[f] / (durations[arm, path] * durations[arm, path])
