@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.arms.motor_bodies import bodies_in, without_bodies
 from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.devices import Device, load_kernels
+from armwright.kinematics.devices import Device, cores, load_kernels
 from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
 from armwright.tasks.tip_rules import Solids, TipRules
 
@@ -21,8 +21,9 @@ SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than th
 
 
 def clearances(
-    arms: ArmArrays, q: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu", rules: TipRules | None = None
-) -> tuple[Array, Array]:
+    arms: ArmArrays, q: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu",
+    rules: TipRules | None = None, most: float = np.inf,
+) -> tuple[Array, Array]:  # fmt: skip
     """Return the (N, T) self-clearance and obstacle clearance [m] of arms in postures q (N, T, D) [rad] or [m].
 
     These are the smallest distances of two links that are not neighbours, and of a link from an obstacle. The bodies of
@@ -32,17 +33,18 @@ def clearances(
 
     rules: where the payload is carried at each of the T postures, and what tool and payload may touch there; None if
         neither counts.
+    most: largest clearance of interest, which greater ones count as; 0 is fast for those who ask for overlaps alone.
     """
     n, t, _ = q.shape
     distances = np.empty((2, n, t))
     solids = _solids(tuple(obstacles), arms.precision, device) if obstacles else None
 
     def measure(chunk: slice) -> None:
-        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, device, rules)
+        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, device, rules, most)
 
     size = MAX_CHUNK[device] // t
     if device == "cpu":
-        size = min(size, max(-(-n // 8), SMALLEST_CHUNK // t))
+        size = min(size, max(-(-n // cores()), SMALLEST_CHUNK // t))
     in_chunks(measure, n, max(1, size), device)
     return distances[0], distances[1]
 
@@ -58,11 +60,11 @@ def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
 
 
 def _distances(
-    arms: ArmArrays, q: Array, solids: Any, device: Device, rules: TipRules | None
+    arms: ArmArrays, q: Array, solids: Any, device: Device, rules: TipRules | None, most: float
 ) -> NDArray[np.floating[Any]]:
     """Return the (2, N, T) clearances of a chunk of arms [m]."""
     dim, links = q.shape[:2], load_kernels("contact.clearance_kernels", device, arms.precision)
-    own, free = (links.array(np.full(dim, np.inf), links.kernels.real) for _ in range(2))
+    own, free = (links.array(np.full(dim, most), links.kernels.real) for _ in range(2))
     offset = arms.offset.copy()
     offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
     values = {name: getattr(arms, name) for name in ("base", "motion", "radius")} | {"offset": offset, "q": q}
@@ -84,8 +86,7 @@ def _distances(
             "half": np.hstack([bodies.half, np.tile(tip["half"], (len(arms), 1, 1))]),
             "middle": motors.empty(size, links.kernels.Vector3),
             "into": motors.empty(size, motors.kernels.Matrix3),
-            "payload": arms.dof + ("tool" in at_tip),
-            "carries": np.empty(0) if rules is None else rules.carries,
+            "count": np.full(dim[1], size[2]) - (0 if rules is None else ("payload" in at_tip) & ~rules.carries),
             "allowed": np.empty((0, 0)) if rules is None else rules.allowed,
         }
         placed = motors.struct("Motors", body)

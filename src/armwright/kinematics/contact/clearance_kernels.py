@@ -25,7 +25,7 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
     real, Vector3, advance = base.real, base.Vector3, base.advance
     solid, separation = solid_math(precision), convex_math(precision).separation
     Posed, Solids = solid.Posed, solid.Solids
-    signed_distance, along_segment, nearer_link = solid.signed_distance, solid.along_segment, solid.nearer_link
+    along_segment, may_be_nearer, nearer_link = solid.along_segment, solid.may_be_nearer, solid.nearer_link
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
     tiny = real(1e-30)
     parallel = real(1e-12)  # square of the sine of an angle that is 0 in float32
@@ -129,9 +129,7 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
                         v = solids.into[o] * along
                         p = base + foot * v
                         v = (one - foot) * v
-                        # No point of the link is nearer than this: distance changes by no more than the path length.
-                        bound = signed_distance(solids.shape[o], p + half * v, solids.half[o]) - half * wp.length(v)
-                        if bound - r < nearest:
+                        if may_be_nearer(nearest + r, solids.shape[o], solids.half[o], p, v):
                             distance = from_axis(p, v, solids, o, nearest + r) - r
                             mounted = j == 0 and from_axis(base, Vector3(), solids, o, two * r) <= r
                             # The first link is always close to what the arm is mounted on: only overlaps count.

@@ -92,8 +92,13 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         return (wp.abs(wp.dot(n, d)) - reach) / wp.sqrt(square)
 
     @wp.func
-    def best_axis(d: Vector3, shape: int, half: Vector3, into: Matrix3, other: int, other_half: Vector3):
-        """Return the candidate with the largest separation, as a vector towards the other body, and its separation."""
+    def best_axis(
+        d: Vector3, shape: int, half: Vector3, into: Matrix3, other: int, other_half: Vector3, enough: real
+    ):  # fmt: skip
+        """Return the candidate with the largest separation, as a vector towards the other body, and its separation.
+
+        The cross products count only if no axis separates the bodies enough.
+        """
         z = Vector3(zero, zero, one)
         x = side_axis(shape, d)
         own = wp.matrix_from_rows(x, wp.cross(z, x), z)
@@ -101,13 +106,13 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         back = wp.transpose(into)
         its = wp.matrix_from_rows(back * u, back * wp.cross(z, u), back * z)
         n, best = z, real(-1.0e30)
-        for i in range(3):
-            for k in range(5):
-                m = own[i]
-                if k == 1:
-                    m = its[i]
-                if k > 1:
-                    m = wp.cross(own[i], its[k - 2])
+        for i in range(15):
+            if i < 6 or best < enough:
+                m = own[i % 3]
+                if i > 2:
+                    m = its[i % 3]
+                if i > 5:
+                    m = wp.cross(own[i % 3], its[i / 3 - 2])
                 found = along(m, d, shape, half, into, other, other_half)
                 if found > best:
                     n, best = m, found
@@ -141,7 +146,7 @@ def convex_math(precision: Precision) -> SimpleNamespace:
         if other == wp.static(MESH):
             n, bound = best_face(d, shape, half, into, solids, o)
         else:
-            n, bound = best_axis(d, shape, half, into, other, other_half)
+            n, bound = best_axis(d, shape, half, into, other, other_half, enough)
         # If one is no box, no candidate may separate bodies that are apart.
         boxes = shape == wp.static(BOX) and other == wp.static(BOX)
         if bound >= enough or (boxes and bound <= zero):

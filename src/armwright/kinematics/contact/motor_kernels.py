@@ -59,13 +59,6 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
             motors.middle[arm, target, arms.motion.shape[1] + k] = p + wp.transpose(into) * at_tip.centre[k]
             motors.into[arm, target, arms.motion.shape[1] + k] = at_tip.into[k] * into
 
-    @wp.func
-    def kind_of(motors: Motors, arm: int, target: int, body: int):
-        """Return the shape of a body, below 0 for none; of a payload where it is carried."""
-        if body >= motors.payload and motors.carries[target] == 0:
-            return -1
-        return motors.shape[arm, body]
-
     @kernel
     def self_clearance(arms: Posed, motors: Motors, clearance: wp.array2d(dtype=real)):
         """Lower (N, T) clearances to the distance of a body from other bodies and from links that it does not join.
@@ -75,8 +68,8 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
         arm, target = wp.tid()
         dof = arms.motion.shape[1]
         nearest = clearance[arm, target]
-        for i in range(motors.shape.shape[1]):
-            kind = kind_of(motors, arm, target, i)
+        for i in range(motors.count[target]):
+            kind = motors.shape[arm, i]
             if kind >= 0:
                 size, place, frame = motors.half[arm, i], motors.middle[arm, target, i], motors.into[arm, target, i]
                 links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
@@ -89,8 +82,8 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                                 nearest, kind, size, frame * (start - place), frame * (end - start), r
                             )
                         links_between += 1
-                for j in range(i + 1, motors.shape.shape[1]):
-                    other = kind_of(motors, arm, target, j)
+                for j in range(i + 1, motors.count[target]):
+                    other = motors.shape[arm, j]
                     if other >= 0 and (j < dof or links_between > 1):
                         d = motors.middle[arm, target, j] - place
                         other_size = motors.half[arm, j]
@@ -124,22 +117,25 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
         dof = arms.motion.shape[1]
         nearest = clearance[arm, target]
         is_at_rest = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-        for j in range(motors.shape.shape[1]):
-            kind = kind_of(motors, arm, target, j)
+        for j in range(motors.count[target]):
+            kind = motors.shape[arm, j]
             if kind >= 0:
                 place, box, frame = motors.middle[arm, target, j], motors.half[arm, j], motors.into[arm, target, j]
                 for o in range(solids.shape.shape[0]):
-                    allowed = real(-1.0)
-                    if j >= dof:
+                    # A body at rest is always close to what the arm is mounted on, tool and payload to what they may
+                    # touch: only overlaps count, and only what is deeper than allowed.
+                    allowed, counts = zero, nearest
+                    if j >= dof and motors.allowed[target, o] >= zero:
                         allowed = motors.allowed[target, o]
+                        counts = wp.min(nearest, zero)
+                    if is_at_rest == 1:
+                        counts = wp.min(nearest, zero)
+                    counts -= allowed
                     at = -(solids.into[o] * (solids.centre[o] - place))
-                    if signed_distance(solids.shape[o], at, solids.half[o]) - wp.length(box) < nearest:
-                        found = from_obstacle(place, kind, box, frame, solids, o, nearest)
-                        found += wp.max(allowed, zero)
-                        # A body at rest is always close to what the arm is mounted on, tool and payload to what they
-                        # may touch: only overlaps count, and only what is deeper than allowed.
-                        if (is_at_rest == 0 and allowed < zero) or found < zero:
-                            nearest = wp.min(nearest, found)
+                    if signed_distance(solids.shape[o], at, solids.half[o]) - wp.length(box) < counts:
+                        found = from_obstacle(place, kind, box, frame, solids, o, counts)
+                        if found < counts:
+                            nearest = found + allowed
             if j < dof and arms.motion[arm, j] < wp.static(FIXED):
                 is_at_rest = 0
         clearance[arm, target] = nearest
@@ -155,8 +151,8 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
             centre = arms.base[arm] - Vector3(zero, zero, size[2])
             nearest = clearance[arm, target]
             is_at_rest = int(1)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-            for j in range(motors.shape.shape[1]):
-                kind = kind_of(motors, arm, target, j)
+            for j in range(motors.count[target]):
+                kind = motors.shape[arm, j]
                 if kind >= 0 and is_at_rest == 0:
                     d = motors.middle[arm, target, j] - centre
                     box = motors.half[arm, j]

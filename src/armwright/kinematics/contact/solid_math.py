@@ -47,8 +47,7 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         half: wp.array2d(dtype=Vector3)  # (N, K) [m]
         middle: wp.array3d(dtype=Vector3)  # (N, T, K) [m]
         into: wp.array3d(dtype=Matrix3)  # (N, T, K) rotation into the body's frame
-        payload: int  # index of the payload
-        carries: wp.array(dtype=int)  # (T,) whether it is there
+        count: wp.array(dtype=int)  # (T,) how many are there: without the payload, which is the last, if not carried
         allowed: wp.array2d(dtype=real)  # (T, O) depth of tool and payload that does not count [m], as of `TipRules`
 
     @wp.struct
@@ -118,14 +117,26 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         return signed_distance(shape, p + half * (low + high) * v, size)
 
     @wp.func
+    def may_be_nearer(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3):
+        """Return whether a point of the segment from p to p + v may have a smaller signed distance, by lower bounds.
+
+        Distance changes by no more than the path length, and rises with each coordinate, except from the ground.
+        """
+        if signed_distance(shape, p + half * v, size) - half * wp.length(v) >= nearest:
+            return False
+        if shape == wp.static(GROUND):
+            return True
+        low, high = wp.min(p, p + v), wp.max(p, p + v)
+        return signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size) < nearest
+
+    @wp.func
     def nearer_link(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real):
         """Return the smaller of a distance and that of a solid from a link with the axis from p to p + v."""
-        bound = signed_distance(shape, p + half * v, size) - half * wp.length(v)
-        if bound - radius < nearest:
+        if may_be_nearer(nearest + radius, shape, size, p, v):
             return wp.min(nearest, along_segment(shape, p, v, size) - radius)
         return nearest
 
     return SimpleNamespace(
         Posed=Posed, Motors=Motors, Solids=Solids, signed_distance=signed_distance, along_segment=along_segment,
-        nearer_link=nearer_link,
+        may_be_nearer=may_be_nearer, nearer_link=nearer_link,
     )  # fmt: skip

@@ -169,7 +169,7 @@ def _avoid_collisions(
         change = chosen[:, [samples.first[(b + 1) % n_blocks] for b in range(n_edges)]] - start
         between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)
         q = np.concatenate([chosen, between.reshape(len(index), -1, arms.dof)], axis=1)
-        depth = np.maximum(0.0, -np.minimum(*clearances(part, q, obstacles, device, rules)))
+        depth = np.maximum(0.0, -np.minimum(*clearances(part, q, obstacles, device, rules, most=0.0)))
         in_blocks = np.maximum.reduceat(depth[:, : chosen.shape[1]], samples.first[:-1], axis=1)
         in_edges = depth[:, chosen.shape[1] :].reshape(len(index), n_edges, len(share)).max(axis=2, initial=0.0)
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)

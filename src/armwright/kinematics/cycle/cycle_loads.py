@@ -28,6 +28,7 @@ ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite o
 MIN_TIME, MAX_TIME = 0.15, 1e3  # [s] of a motion that is as fast as possible; drives cannot follow shorter ones
 MORE_PAYLOAD = 0.1  # share of the payload by which it may be heavier in a motion as fast as possible
 VOLTAGE_SHARE = 0.9  # of the voltage, that suffices for it
+Counts = tuple[int, ...]  # of samples along each motion
 BETWEEN = 16  # times as many instants of a sharp path, of which the largest values count
 
 
@@ -90,7 +91,7 @@ def cycle_loads(
     for group, own in zip(paths.groups, terms, strict=True):
         density, gravity = _density(group), own.torques[:, :, 0]
         instants = density * (paths.instants - 1) + 1
-        size = max(1, SAMPLES[device] // (m * instants))
+        size = max(1, 4 * SAMPLES[device] // (m * instants))
         for rows in (slice(at, at + size) for at in range(0, len(group.index), size)):
             index, arms = group.index[rows], group.arms[rows]
             load, heavier = _loads(own[rows], arms, group.counts, instants)
@@ -141,17 +142,16 @@ def _thinned(values: Array, density: int) -> Array:
     return np.concatenate([values[..., :1, :], between, values[..., -1:, :]], axis=-2)
 
 
-def _loads(
-    terms: TorqueTerms, arms: ArmArrays, counts: tuple[int, ...], instants: int
-) -> tuple[MotionLoad, MotionLoad]:
+def _loads(terms: TorqueTerms, arms: ArmArrays, counts: Counts, instants: int) -> tuple[MotionLoad, MotionLoad]:
     """Return the loads of all motions as they are and with a heavier payload.
 
     The drives' own inertia and friction count where they are known.
     """
     _, _, s_t, s_tt = _instants(counts, instants)
     rate, change = s_t[:, None], s_tt[:, None]
-    gravity, drag, push, *payload = np.moveaxis(_at_instants(terms.torques, counts, instants), 3, 0)
-    q_s, q_ss = np.moveaxis(_at_instants(terms.states, counts, instants), 3, 0)
+    torques, states = (_at_instants(each, counts, instants) for each in (terms.torques, terms.states))
+    gravity, drag, push, *payload = np.ascontiguousarray(np.moveaxis(torques, 3, 0))
+    q_s, q_ss = np.ascontiguousarray(np.moveaxis(states, 3, 0))
     inertial, velocity = drag * rate**2 + push * change, q_s * rate
     if arms.actuation is None:
         nothing = np.zeros(gravity.shape)
@@ -172,7 +172,7 @@ def quintic(t: Array) -> tuple[Array, Array, Array]:
     return s, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
 
 
-def _at_instants(values: Array, counts: tuple[int, ...], instants: int) -> Array:
+def _at_instants(values: Array, counts: Counts, instants: int) -> Array:
     """Return (N, M, F, ...) of values at the samples of all motions (N, R, ...), interpolated at F instants of each."""
     before, share, _, _ = _instants(counts, instants)
     share = share.reshape(*share.shape, *(1,) * (values.ndim - 2))
@@ -180,7 +180,7 @@ def _at_instants(values: Array, counts: tuple[int, ...], instants: int) -> Array
 
 
 @cache
-def _instants(counts: tuple[int, ...], instants: int) -> tuple[NDArray[np.int32], Array, Array, Array]:
+def _instants(counts: Counts, instants: int) -> tuple[NDArray[np.int32], Array, Array, Array]:
     """Return the sample before each of F instants of M motions, the share of the way to the next (M, F), s_τ and s_ττ.
 
     counts: Samples of each motion, equally spaced in s.

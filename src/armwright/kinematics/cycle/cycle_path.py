@@ -135,7 +135,7 @@ def find_paths(
                 groups.append(CycleGroup(index[rows], part[rows], found, kind))
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
-    found = _measure(plan, entry, groups, jumps, obstacles, device)
+    found = _measure(arms, plan, entry, groups, jumps, obstacles, device)
     return replace(found, branches=chosen.branches)
 
 
@@ -152,7 +152,7 @@ def rough_paths(
     paths = _follow(arms, plan, entry, ROUGH, device)
     group = CycleGroup(np.arange(len(arms)), arms, paths, is_sharp=False)
     jumps = np.zeros((len(arms), len(paths)), dtype=bool)
-    return replace(_measure(plan, entry, [group], jumps, obstacles, device, between=1), instants=ROUGH_INSTANTS)
+    return replace(_measure(arms, plan, entry, [group], jumps, obstacles, device, between=1), instants=ROUGH_INSTANTS)
 
 
 def _refined(refinement: IndexArray, ratio: Array) -> IndexArray:
@@ -198,18 +198,13 @@ def _follow(
 
 
 def _measure(
-    plan: CyclePlan,
-    entry: Array,
-    groups: Sequence[CycleGroup],
-    jumps: NDArray[np.bool_],
-    obstacles: Sequence[Obstacle],
-    device: Device,
-    between: int = 2,
-) -> CyclePaths:
+    arms: ArmArrays, plan: CyclePlan, entry: Array, groups: Sequence[CycleGroup], jumps: NDArray[np.bool_],
+    obstacles: Sequence[Obstacle], device: Device, between: int = 2,
+) -> CyclePaths:  # fmt: skip
     """Return the paths with what they are off by and how near they come; between: as in `_line_errors`."""
     n, m = jumps.shape
     values = np.zeros((5, n, m))
-    worst = np.zeros((n, m, 3))
+    worst, ends, step = np.zeros((n, m, 3)), np.empty((n, m, 2, arms.dof)), np.empty((n, m))
     for group in groups:
         if plan.is_loop:
             gap = np.abs(group.paths[-1].q[:, -1] - group.paths[0].q[:, 0]).max(axis=1)
@@ -231,39 +226,42 @@ def _measure(
             values[4, group.index, i] = margin[:, at:end].min(axis=1)
             if path.motion.by == "line":  # where a joint meets its limit, the speeds of the others jump
                 jumps[group.index, i] |= (margin[:, at + 1 : end - 1] <= ON_LIMIT).any(axis=1)
+            ends[group.index, i], step[group.index, i] = path.q[:, [0, -1]], 1.0 / (path.q.shape[1] - 1)
             at = end
-        if between > 1:
-            _look_between(group, plan, values[2:4], worst[:, :, 2], obstacles, device)
+    if between > 1:
+        _look_between(arms, plan, ends, step, values[2:4], worst[:, :, 2], obstacles, device)
     path_error, path_angle, own, clear, margin = values
     return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
 
 
 def _look_between(
-    group: CycleGroup, plan: CyclePlan, clearance: Array, worst: Array, obstacles: Sequence[Obstacle], device: Device
-) -> None:
+    arms: ArmArrays, plan: CyclePlan, ends: Array, step: Array, clearance: Array, worst: Array,
+    obstacles: Sequence[Obstacle], device: Device,
+) -> None:  # fmt: skip
     """Lower clearances (2, N, M), and move the shares (N, M) where they are worst, to those between samples.
 
-    Corners pass each other between the samples of a joint motion, so it is searched around its worst sample, of arms
-    that do not touch anything there but come near.
+    Corners pass each other between the samples of a joint motion, so one that comes near is searched around its worst
+    sample, of arms that do not touch anything at samples.
+
+    ends: (N, M, 2, D) first and last posture of joint motions.  step: (N, M) from one sample to the next, as a share.
     """
-    motions = [i for i, path in enumerate(group.paths) if path.motion.by == "joint"]
-    least = clearance[:, group.index].min(axis=(0, 2))
-    rows = np.flatnonzero((least > 0.0) & (least < NEAR))
-    if not motions or not len(rows):
-        return
-    arms, place = group.arms[rows], np.ix_(group.index[rows], np.array(motions))
-    ends = np.stack([group.paths[i].q[rows][:, [0, -1]] for i in motions], axis=1)[:, :, None]  # (n, m, 1, 2, D)
-    step = np.array([1.0 / (group.paths[i].q.shape[1] - 1) for i in motions])[:, None]
-    rules = joined_rules([plan.rules(group.paths[i].motion, np.full(len(BETWEEN), 0.5)) for i in motions])
-    for _ in range(ZOOMS):
-        step = step / 4.0
-        share = np.clip(worst[place][..., None] + step * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (n, m, S)
-        q = ends[..., 0, :] + share[..., None] * (ends[..., 1, :] - ends[..., 0, :])
-        found = np.stack(clearances(arms, q.reshape(len(rows), -1, arms.dof), obstacles, device, rules))
-        found = found.reshape(2, *share.shape)
-        best = np.take_along_axis(share, found.min(axis=0).argmin(axis=2)[..., None], axis=2)[..., 0]
-        worst[place] = np.where(found.min(axis=(0, 3)) < clearance[:, *place].min(axis=0), best, worst[place])
-        clearance[:, *place] = np.minimum(clearance[:, *place], found.min(axis=3))
+    least = clearance.min(axis=0)
+    is_joint = [motion.by == "joint" for motion in plan.motions]
+    near = is_joint & (least < NEAR) & (least.min(axis=1, keepdims=True) > 0.0)
+    for carries in (False, True):
+        place = np.nonzero(near & [motion.carries == carries for motion in plan.motions])  # P of N, of M
+        if not len(place[0]):
+            continue
+        part, (start, end), size = arms[place[0]], ends[place].swapaxes(0, 1)[:, :, None], step[place][:, None]
+        rules = plan.rules(plan.motions[int(place[1][0])], np.full(len(BETWEEN), 0.5))
+        for _ in range(ZOOMS):
+            size = size / 4.0
+            share = np.clip(worst[place][:, None] + size * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (P, S)
+            q = start + share[..., None] * (end - start)
+            found = np.stack(clearances(part, q, obstacles, device, rules))  # (2, P, S)
+            best = np.take_along_axis(share, found.min(axis=0).argmin(axis=1)[:, None], axis=1)[:, 0]
+            worst[place] = np.where(found.min(axis=(0, 2)) < clearance[:, *place].min(axis=0), best, worst[place])
+            clearance[:, *place] = np.minimum(clearance[:, *place], found.min(axis=2))
 
 
 def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> list[Any]:

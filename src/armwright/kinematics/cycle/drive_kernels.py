@@ -65,9 +65,13 @@ def drive_kernels() -> SimpleNamespace:
 
     @kernel
     def lower_rates(load: Load, limits: Limits, rates: wp.array2d(dtype=real)):
-        """Lower the rates of motions (N, M) [1/s] until the limits allow them; -infinite if they allow none."""
+        """Lower the rates of motions (N, M) [1/s] until the limits allow them; -infinite if they allow none.
+
+        NaN if a rating is unknown.
+        """
         arm, motion = wp.tid()
         u = rates[arm, motion]
+        total = real(0.0)
         before = real(wp.inf)
         while u < before and u > zero:
             before = u
@@ -90,6 +94,7 @@ def drive_kernels() -> SimpleNamespace:
                     scale = share * pushing * wp.sign(velocity)
                     a = scale * (gravity + load.coulomb[arm, motion, s, j])
                     b, c = scale * load.viscous[arm, motion, s, j], scale * load.inertial[arm, motion, s, j]
+                    total += a + b + c + speed + gap
                     torque = a + (b + c * u) * u
                     if torque > allowed:
                         u = root_below(c, b, a - one, u)
@@ -98,6 +103,6 @@ def drive_kernels() -> SimpleNamespace:
                     b += speed * rise
                     if a + (b + c * u) * u > level + slack:
                         u = root_below(c, b, a - level, u)
-        rates[arm, motion] = u
+        rates[arm, motion] = wp.where(wp.isnan(total), total, u)
 
     return SimpleNamespace(Load=Load, Limits=Limits, lower_rates=lower_rates)

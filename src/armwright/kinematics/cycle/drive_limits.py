@@ -10,7 +10,6 @@ share of limits that makers state at the output is 0 (`Actuation.limit_friction`
 """
 
 from dataclasses import dataclass
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -124,21 +123,15 @@ def least_time(*cases: tuple[MotionLoad, Actuation], device: Device = "cpu") -> 
     """
     *of_motions, _, _ = cases[0][0].gravity.shape
     loaded, rate = load_kernels("cycle.drive_kernels", device), np.full(of_motions, MAX_RATE).reshape(of_motions[0], -1)
-    known, given = np.ones(of_motions, dtype=bool), list[tuple[Any, Any]]()
+    given: list[tuple[Any, Any]] = []
     for load, drives in cases:
-        ratings = np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
-        needed = np.isnan(load.coulomb + load.viscous + load.gear + load.inertial).any(axis=(-2, -1))
-        known &= ~(ratings.reshape(-1, *(1,) * (needed.ndim - 1)) | needed)
         fields = {name: each.reshape(*rate.shape, *each.shape[-2:]) for name, each in vars(load).items()}
         limits = {name: getattr(drives, name) for name in LIMITS}
         given.append((loaded.struct("Load", fields), loaded.struct("Limits", limits)))
-    left = len(given)
-    for case in cycle(given):  # until all others leave what one of them allows
+    before = np.inf
+    while np.any(rate < before):
         before = rate.copy()
-        loaded.launch("lower_rates", rate.shape, *case, outputs=[rate])
-        left = len(given) - 1 if (rate < before).any() else left - 1
-        if not left:
-            break
+        for case in given:
+            loaded.launch("lower_rates", rate.shape, *case, outputs=[rate])
     with np.errstate(divide="ignore", over="ignore"):
-        time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0)).reshape(of_motions)
-    return np.where(known, time, np.nan)
+        return np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0)).reshape(of_motions)

@@ -47,10 +47,6 @@ def dynamics_kernels() -> SimpleNamespace:
         payload_inertia: wp.array(dtype=Matrix3)  # (N,) about its centre of mass, in the last frame
 
     @wp.func
-    def row(values: Vectors, j: int):
-        return Vector3(values[j, 0], values[j, 1], values[j, 2])
-
-    @wp.func
     def accelerated(acceleration: Vector3, alpha: Vector3, omega: Vector3, lever: Vector3):
         """Return the acceleration of a point of a body, from that of another point at a lever."""
         return acceleration + wp.cross(alpha, lever) + wp.cross(omega, wp.cross(omega, lever))
@@ -69,14 +65,9 @@ def dynamics_kernels() -> SimpleNamespace:
 
     @kernel
     def torque_terms(
-        bodies: Bodies,
-        q: wp.array3d(dtype=real),
-        q_s: wp.array3d(dtype=real),
-        q_ss: wp.array3d(dtype=real),
-        carried: wp.array(dtype=real),
-        terms: wp.array4d(dtype=real),
-        wrenches: wp.array4d(dtype=Wrench),
-    ):
+        bodies: Bodies, q: wp.array3d(dtype=real), q_s: wp.array3d(dtype=real), q_ss: wp.array3d(dtype=real),
+        carried: wp.array(dtype=real), terms: wp.array4d(dtype=real), wrenches: wp.array4d(dtype=Wrench),
+    ):  # fmt: skip
         """Compute the terms of the torque along a motion.
 
         q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  carried: (S,) share of
@@ -93,11 +84,10 @@ def dynamics_kernels() -> SimpleNamespace:
             motion = bodies.motion[arm, j]
             a = axis_of(motion, x, y, z)
             here, p, x, y, z = advance(motion, bodies.offset[arm, j], q[arm, sample, j], p, x, y, z)
-            for i in range(3):
-                place[j, i] = here[i]
-                axis[j, i] = a[i]
-                along_x[j, i] = x[i]
-                along_y[j, i] = y[i]
+            place[j] = here
+            axis[j] = a
+            along_x[j] = x
+            along_y[j] = y
         tip = p
         for term in range(3):
             force, moment = Vectors(), Vectors()  # on each link, about the joint
@@ -106,10 +96,10 @@ def dynamics_kernels() -> SimpleNamespace:
                 acceleration = Vector3(zero, zero, real(GRAVITY))  # as of a base that accelerates upwards
             before = bodies.base[arm]
             if bodies.dof > 0:
-                before = row(place, 0)
+                before = place[0]
             for j in range(bodies.dof):
                 motion = bodies.motion[arm, j]
-                a = row(axis, j)
+                a = axis[j]
                 rate = real(0.0)
                 change = real(0.0)
                 if term == 1:
@@ -117,7 +107,7 @@ def dynamics_kernels() -> SimpleNamespace:
                     change = q_ss[arm, sample, j]
                 if term == 2:
                     change = q_s[arm, sample, j]
-                here = row(place, j)
+                here = place[j]
                 lever = here - before
                 acceleration = accelerated(acceleration, alpha, omega, lever)
                 if motion < wp.static(PRISMATIC):
@@ -126,14 +116,11 @@ def dynamics_kernels() -> SimpleNamespace:
                 elif motion < wp.static(FIXED):
                     acceleration = acceleration + change * a + (two * rate) * wp.cross(omega, a)
                 before = here
-                lx = row(along_x, j)
-                ly = row(along_y, j)
-                frame = wp.matrix_from_cols(lx, ly, wp.cross(lx, ly))
+                frame = wp.matrix_from_cols(along_x[j], along_y[j], wp.cross(along_x[j], along_y[j]))
                 lever = frame * bodies.com[arm, j]
                 f, n = wrench(bodies.mass[arm, j], bodies.inertia[arm, j], frame, lever, acceleration, alpha, omega)
-                for i in range(3):
-                    force[j, i] = f[i]
-                    moment[j, i] = n[i]
+                force[j] = f
+                moment[j] = n
             # The payload moves with the last link; x, y, z are its axes.
             frame = wp.matrix_from_cols(x, y, z)
             lever = tip - before + frame * bodies.payload_com[arm]
@@ -144,21 +131,19 @@ def dynamics_kernels() -> SimpleNamespace:
             after = before
             for step in range(bodies.dof):
                 j = bodies.dof - 1 - step
-                here = row(place, j)
-                total_moment = total_moment + wp.cross(after - here, total_force) + row(moment, j)
+                here = place[j]
+                total_moment = total_moment + wp.cross(after - here, total_force) + moment[j]
                 carried_moment = carried_moment + wp.cross(after - here, carried_force)
-                total_force = total_force + row(force, j)
+                total_force = total_force + force[j]
                 load, added = real(0.0), real(0.0)
                 if bodies.motion[arm, j] < wp.static(PRISMATIC):
-                    load, added = wp.dot(row(axis, j), total_moment), wp.dot(row(axis, j), carried_moment)
+                    load, added = wp.dot(axis[j], total_moment), wp.dot(axis[j], carried_moment)
                 elif bodies.motion[arm, j] < wp.static(FIXED):
-                    load, added = wp.dot(row(axis, j), total_force), wp.dot(row(axis, j), carried_force)
+                    load, added = wp.dot(axis[j], total_force), wp.dot(axis[j], carried_force)
                 terms[arm, sample, term, j] = load
                 terms[arm, sample, 3 + term, j] = added
                 if wrenches.shape[1] > 0:
-                    lx = row(along_x, j)
-                    ly = row(along_y, j)
-                    local = wp.transpose(wp.matrix_from_cols(lx, ly, wp.cross(lx, ly)))
+                    local = wp.matrix_from_rows(along_x[j], along_y[j], wp.cross(along_x[j], along_y[j]))
                     f = local * total_force
                     n = local * total_moment
                     wrenches[arm, sample, term, j] = Wrench(f[0], f[1], f[2], n[0], n[1], n[2])
@@ -171,16 +156,10 @@ def dynamics_kernels() -> SimpleNamespace:
 
     @kernel
     def bearing_loads(
-        before: wp.array2d(dtype=int),
-        share: wp.array2d(dtype=real),
-        rate: wp.array(dtype=real),
-        change: wp.array(dtype=real),
-        durations: wp.array2d(dtype=real),
-        motion: wp.array2d(dtype=int),
-        offset: wp.array2d(dtype=real),
-        wrenches: wp.array4d(dtype=Wrench),
-        largest: wp.array4d(dtype=real),
-    ):
+        before: wp.array2d(dtype=int), share: wp.array2d(dtype=real), rate: wp.array(dtype=real),
+        change: wp.array(dtype=real), durations: wp.array2d(dtype=real), motion: wp.array2d(dtype=int),
+        offset: wp.array2d(dtype=real), wrenches: wp.array4d(dtype=Wrench), largest: wp.array4d(dtype=real),
+    ):  # fmt: skip
         """Find the largest loads across the axes of joints that turn, as of `bearings.py`.
 
         before, share: (M, F) sample before each instant of each motion, and share of the way to the next.  rate,
@@ -191,8 +170,8 @@ def dynamics_kernels() -> SimpleNamespace:
         for j in range(motion.shape[1]):
             tilting, axial, radial = real(0.0), real(0.0), real(0.0)
             if motion[arm, j] < wp.static(PRISMATIC):
-                x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
-                a = axis_of(motion[arm, j], x, y, z)
+                a = Vector3()
+                a[motion[arm, j]] = one
                 for f in range(rate.shape[0]):
                     sample, after = before[path, f], share[path, f]
                     s, ss = rate[f] / durations[arm, path], change[f] / (durations[arm, path] * durations[arm, path])

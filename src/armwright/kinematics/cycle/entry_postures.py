@@ -54,7 +54,7 @@ def entry_postures(
     samples = plan.sample()
     rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], q.shape[2])]
     flat = np.nan_to_num(q).reshape(len(arms), -1, arms.dof)
-    clearance = np.minimum(*clearances(arms, flat, obstacles, device, rules))
+    clearance = np.minimum(*clearances(arms, flat, obstacles, device, rules, most=0.0))
     clearance = np.where(np.isnan(q[..., 0]), -np.inf, clearance.reshape(q.shape[:3]))
     dropped = clearance < np.minimum(0.0, clearance.max(axis=2, keepdims=True))
     order = np.argsort(dropped, axis=2, kind="stable")[..., : (~dropped).sum(axis=2).max()]

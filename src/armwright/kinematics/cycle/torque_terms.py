@@ -10,7 +10,6 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.arms.rigid_bodies import PerArm
 from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.cycle.cycle_path import CyclePaths
-from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device, load_kernels
 
 
@@ -37,11 +36,13 @@ def torque_terms(
     """
     found: list[TorqueTerms] = []
     for group in paths.groups:
-        q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
+        q = np.concatenate([path.q for path in group.paths], axis=1)
+        of_motions = [[np.broadcast_to(path.at(path.share, n), path.q.shape) for n in (1, 2)] for path in group.paths]
+        states = np.concatenate([np.stack(each, axis=2) for each in of_motions], axis=1)
         carried = np.repeat([float(path.motion.carries) for path in group.paths], group.counts)
         whole = np.empty((len(q), q.shape[1] if wrenches else 0, 3, q.shape[2], 6))
-        torques = _terms(group.arms, q, q_s, q_ss, carried, payload, device, whole)
-        found.append(TorqueTerms(torques, np.stack([q_s, q_ss], axis=2), whole))
+        torques = _terms(group.arms, q, states[:, :, 0], states[:, :, 1], carried, payload, device, whole)
+        found.append(TorqueTerms(torques, states, whole))
     return found
 
 
@@ -65,13 +66,6 @@ def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, 
     rest = np.zeros_like(q)
     units = (np.broadcast_to(unit, q.shape) for unit in np.eye(arms.dof))
     return np.stack([_terms(arms, q, unit, rest, carried, payload, device)[:, :, 2] for unit in units], axis=-1)
-
-
-def _values(path: MotionPath, order: int) -> Array:
-    """Return (n, R, D) joint values at the samples, or their derivatives."""
-    if order == 0:
-        return path.q
-    return np.broadcast_to(path.at(path.share, order), path.q.shape)
 
 
 def _terms(
