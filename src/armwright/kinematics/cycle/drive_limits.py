@@ -10,6 +10,7 @@ share of limits that makers state at the output is 0 (`Actuation.limit_friction`
 """
 
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -128,10 +129,12 @@ def least_time(*cases: tuple[MotionLoad, Actuation], device: Device = "cpu") -> 
         fields = {name: each.reshape(*rate.shape, *each.shape[-2:]) for name, each in vars(load).items()}
         limits = {name: getattr(drives, name) for name in LIMITS}
         given.append((loaded.struct("Load", fields), loaded.struct("Limits", limits)))
-    before = np.inf
-    while np.any(rate < before):
+    left = len(given)
+    for case in cycle(given):  # until all others leave what one of them allows
         before = rate.copy()
-        for case in given:
-            loaded.launch("lower_rates", rate.shape, *case, outputs=[rate])
+        loaded.launch("lower_rates", rate.shape, *case, outputs=[rate])
+        left = len(given) - 1 if (rate < before).any() else left - 1
+        if not left:
+            break
     with np.errstate(divide="ignore", over="ignore"):
         return np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0)).reshape(of_motions)
