@@ -14,7 +14,7 @@ import pytest
 
 import armwright as aw
 from armwright.exceptions import EvaluatorError, RunConflictError, SettingsError
-from armwright.problem.objectives import length, position_error
+from armwright.problem.arm_quantities import length, position_error
 from armwright.runs.folder import read_run
 from tests.support.arms import paper_arms
 

@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError, TaskError
+from armwright.problem.arm_quantities import position_error
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, named_objectives, position_error
+from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, named_objectives
 from armwright.problem.problem import Problem
 from armwright.runs.folder import read_run
 from armwright.study.progress import StudyResult

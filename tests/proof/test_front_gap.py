@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.pareto import front_mask, hypervolume
-from armwright.problem.objectives import position_error, torque
+from armwright.problem.arm_quantities import position_error, torque
 from armwright.problem.problem import Problem
 from armwright.proof.front_gap import best_known_hypervolume, front_gap, known_front
 from armwright.spaces.design_space import builtin_spaces, default_space, paper_space

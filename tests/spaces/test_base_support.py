@@ -8,9 +8,9 @@ import pytest
 
 from armwright.exceptions import SpaceError
 from armwright.kinematics.contact.clearance import clearances
+from armwright.problem.arm_quantities import mass
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.drive_quantities import price
-from armwright.problem.objectives import mass
 from armwright.problem.problem import Problem
 from armwright.spaces.base_support import supported_space
 from armwright.spaces.design_space import DesignSpace

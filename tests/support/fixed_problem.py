@@ -9,9 +9,10 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.cycle.cycle_path import CyclePaths
 from armwright.pareto import default_reference_point
+from armwright.problem.arm_quantities import position_error
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import PAPER_OBJECTIVES, position_error
+from armwright.problem.objectives import PAPER_OBJECTIVES
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial

@@ -12,7 +12,8 @@ from playwright.sync_api import Browser
 
 from armwright.exceptions import TaskError
 from armwright.page.page import write_report
-from armwright.problem.objectives import CLEARANCES, FAR, named_objectives
+from armwright.problem.arm_quantities import CLEARANCES, FAR
+from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
 from armwright.proof.verification import verify
 from armwright.study.study import optimize

@@ -5,8 +5,9 @@ import pinocchio
 import pytest
 
 from armwright.exceptions import SettingsError, TaskError
+from armwright.problem.arm_quantities import unreached_targets
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import OBJECTIVES, named_objectives, unreached_targets
+from armwright.problem.objectives import OBJECTIVES, named_objectives
 from armwright.problem.problem import Problem
 from armwright.problem.unreached_reason import unreached_reason
 from armwright.robot.arm import Arm, Joint, uniform_link

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from armwright.problem.arm_quantities import dexterous_volume, uncovered_fraction
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import dexterous_volume, uncovered_fraction
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.spaces.design_space import paper_space

@@ -11,10 +11,11 @@ from rich.console import Console
 from armwright.cli.show_results import format_value, links_of
 from armwright.cli.streams import format_point, print_command, print_named
 from armwright.cli.tables import Column, number, print_table
+from armwright.problem.arm_quantities import TORQUE_SCALE, torque
 from armwright.problem.assumptions import assumed_values, count_assumed
 from armwright.problem.facts import describe_supply
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import QUANTITIES, TORQUE_SCALE, torque
+from armwright.problem.objectives import QUANTITIES
 from armwright.proof.cycle_faults import describe_path
 from armwright.proof.design_record import DesignRecord, facts_by_number
 from armwright.proof.selection import quantities_of_front

@@ -11,9 +11,9 @@ from rich.console import Console
 from armwright.cli.notes import payload_note, unused_parts
 from armwright.cli.streams import list_files
 from armwright.cli.tables import Column, number, print_table, text
+from armwright.problem.arm_quantities import TORQUE_SCALE, position_error, torque
 from armwright.problem.assumptions import count_assumed
 from armwright.problem.ignored_errors import describe_ignored_errors
-from armwright.problem.objectives import TORQUE_SCALE, position_error, torque
 from armwright.proof.infeasibility import describe_infeasibility
 from armwright.proof.perturbations import HEAVIER, MOVED, SUPPLY
 from armwright.proof.results import REPORT

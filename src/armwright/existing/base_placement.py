@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.existing.existing_arm import known_values
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.problem import objectives
+from armwright.problem import arm_quantities
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import POSTURES_AT_ONCE, Problem
 from armwright.robot.arm import Arm, Joint
@@ -126,7 +126,7 @@ def _losses(problem: Problem, evaluation: Evaluation) -> Array:
     missed = np.maximum(evaluation.position_error - targets.tolerance, 0.0)
     missed += targets.metres_per_radian * np.maximum(evaluation.angle_error - targets.angle_tolerance, 0.0)
     excess = missed.sum(axis=1)
-    violation, torque = _known_violation(problem, evaluation), objectives.torque(evaluation)
+    violation, torque = _known_violation(problem, evaluation), arm_quantities.torque(evaluation)
     met = np.where(violation > 0.0, 1.0 + violation / (1.0 + violation), torque / (1.0 + torque))
     return np.where(excess > 0.0, 2.0 + excess, met)
 

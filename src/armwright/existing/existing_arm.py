@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.arrays import Array, finite_or_none
+from armwright.problem.arm_quantities import cycle_time
 from armwright.problem.constraints import Constraint
 from armwright.problem.drive_quantities import dynamic_utilisation, price, speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.facts import Facts, fact_of, facts_of
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import cycle_time
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
 from armwright.text import rounded

@@ -10,9 +10,10 @@ from armwright.kinematics.ik.ik import UPDATES
 from armwright.llm.answer_format import SINGLE, module_lists
 from armwright.llm.feedback import Feedback, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
+from armwright.problem.arm_quantities import orientation_error, position_error, unreached_targets
 from armwright.problem.ignored_errors import stated_tolerance
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import QUANTITIES, orientation_error, position_error, unreached_targets
+from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History

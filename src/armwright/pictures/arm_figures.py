@@ -24,7 +24,7 @@ from armwright.kinematics.arms.forward import (
 from armwright.pictures.drawing import legend_mark
 from armwright.pictures.solids import Extent, draw_edges, draw_obstacles, draw_solid, extent_of
 from armwright.pictures.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET
-from armwright.problem.objectives import torque
+from armwright.problem.arm_quantities import torque
 from armwright.problem.problem import Problem
 from armwright.proof.design_record import DesignRecord
 from armwright.robot.arm import Arm

@@ -15,7 +15,7 @@ from armwright.arrays import Array
 from armwright.files import naming_write_errors, new_part, replace_file, replace_folder
 from armwright.pareto import front_mask
 from armwright.pictures.style import FRONT, RC
-from armwright.problem.objectives import torque
+from armwright.problem.arm_quantities import torque
 from armwright.problem.problem import Problem
 
 FAR_REFERENCE = 2.0  # times the largest value; a reference point beyond is not drawn

@@ -11,9 +11,10 @@ from typing import Literal, cast
 
 from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import TaskError, did_you_mean
+from armwright.problem.arm_quantities import CLEARANCES
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import CLEARANCES, QUANTITIES
+from armwright.problem.objectives import QUANTITIES
 from armwright.tasks.task import Task
 from armwright.units import NUMBER
 

@@ -6,17 +6,10 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.problem.arm_quantities import joints, length, mass, position_error, unreached_targets, worst_error
 from armwright.problem.drive_quantities import price, voltages
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
-from armwright.problem.objectives import (
-    OBJECTIVES,
-    joints,
-    length,
-    mass,
-    position_error,
-    unreached_targets,
-    worst_error,
-)
+from armwright.problem.objectives import OBJECTIVES
 from armwright.problem.problem import Outcomes, Problem, joined, worst_case
 from armwright.problem.scene import Scene
 

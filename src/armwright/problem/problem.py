@@ -12,12 +12,13 @@ from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
+from armwright.problem.arm_quantities import orientation_error
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.evaluators import Evaluator, Measurement
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Need, Objective
-from armwright.problem.objectives import PAPER_OBJECTIVES, QUANTITIES, named_objectives, orientation_error
+from armwright.problem.objectives import PAPER_OBJECTIVES, QUANTITIES, named_objectives
 from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import stack_designs

@@ -3,7 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armwright.problem.objectives import orientation_error, position_error, unreached_targets, worst_angle, worst_error
+from armwright.problem.arm_quantities import (
+    orientation_error,
+    position_error,
+    unreached_targets,
+    worst_angle,
+    worst_error,
+)
 from armwright.problem.problem import Problem
 
 TOLERANCES = "tolerances"  # the reason of bounds that all targets must be reached within

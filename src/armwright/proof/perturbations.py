@@ -25,12 +25,12 @@ from armwright.exceptions import UnknownQuantityError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.cycle.cycle_loads import MORE_PAYLOAD, VOLTAGE_SHARE
+from armwright.problem.arm_quantities import CLEARANCES, FAR, clearance, collision
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.constraints import Constraint
 from armwright.problem.drive_quantities import reserve
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.facts import fact_of
-from armwright.problem.objectives import CLEARANCES, FAR, clearance, collision
 from armwright.problem.problem import Problem
 from armwright.problem.scene import Scene
 from armwright.proof.cycle_faults import motion_place

@@ -12,11 +12,11 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
+from armwright.problem.arm_quantities import orientation_error, position_error, torque
 from armwright.problem.compliance_quantities import deflection
 from armwright.problem.drive_quantities import price
 from armwright.problem.facts import fact_of
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import orientation_error, position_error, torque
 from armwright.proof.perturbations import Survival, evaluate_survival
 from armwright.proof.ranking import knee_first
 from armwright.proof.simulated_run import Simulator

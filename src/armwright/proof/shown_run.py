@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.pareto import hypervolume
+from armwright.problem.arm_quantities import TORQUE_SCALE, torque
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.facts import ASKED, Facts, describe_supply
 from armwright.problem.ignored_errors import describe_ignored_errors
-from armwright.problem.objectives import QUANTITIES, TORQUE_SCALE, torque
+from armwright.problem.objectives import QUANTITIES
 from armwright.proof.cycle_faults import describe_path
 from armwright.proof.design_record import DesignRecord, bounded_numbers
 from armwright.proof.front_gap import known_front

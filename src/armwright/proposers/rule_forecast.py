@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import PRISMATIC, carrying
 from armwright.pareto import front_mask
-from armwright.problem.objectives import TORQUE_SCALE
+from armwright.problem.arm_quantities import TORQUE_SCALE
 from armwright.problem.problem import Problem
 from armwright.proposers.rule_structures import Structure, fitted_structures
 from armwright.robot.arm import GRAVITY

@@ -13,11 +13,12 @@ from itertools import product
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.problem.arm_quantities import CLEARANCES, FAR, joints, length, mass
 from armwright.problem.checks.finding import PROVEN, Finding
 from armwright.problem.constraints import Constraint
 from armwright.problem.drive_quantities import price
 from armwright.problem.estimates import motionless
-from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES, joints, length, mass
+from armwright.problem.objectives import OBJECTIVES
 from armwright.problem.problem import Problem
 from armwright.problem.scene import Scene
 from armwright.spaces.arm_builder import stack_designs

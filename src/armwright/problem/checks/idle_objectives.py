@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 
+from armwright.problem.arm_quantities import cycle_time, mass, peak_torque
 from armwright.problem.checks.finding import SUSPECTED, Finding
 from armwright.problem.drive_quantities import price
 from armwright.problem.ignored_errors import LINES, stated_tolerance
-from armwright.problem.objectives import cycle_time, mass, peak_torque
 from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import TOLERANCES, stated_bounds
 

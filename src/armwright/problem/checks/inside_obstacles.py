@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
+from armwright.problem.arm_quantities import COMFORTABLE
 from armwright.problem.checks.finding import PROVEN, SUSPECTED, Finding, describe_point, describe_targets
 from armwright.problem.checks.reach import ROUNDING, allowed_errors
-from armwright.problem.objectives import COMFORTABLE
 from armwright.problem.problem import Problem
 from armwright.tasks.obstacles import Obstacle, Solid
 
