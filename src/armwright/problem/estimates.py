@@ -17,7 +17,8 @@ from armwright.problem.objectives import (
     unreached_targets,
     worst_error,
 )
-from armwright.problem.problem import Outcomes, Problem, joined, worst_case
+from armwright.problem.outcomes import Outcomes, joined, worst_case
+from armwright.problem.problem import Problem
 from armwright.problem.scene import Scene
 
 EXACT = (price, mass, length, joints, voltages)  # quantities that an arm has without moving
