@@ -43,7 +43,8 @@ from armwright.kinematics.devices import load_kernels
 from armwright.kinematics.ik.ik import LANES, solve_postures
 from armwright.problem.evaluation import evaluate_arrays
 from armwright.problem.objectives import named_objectives
-from armwright.problem.problem import Outcomes, Problem, worst_case
+from armwright.problem.outcomes import Outcomes, worst_case
+from armwright.problem.problem import Problem
 from armwright.problem.scene import Scene
 from armwright.rotations import rotation_from_rpy
 from armwright.spaces.arm_builder import stack_designs

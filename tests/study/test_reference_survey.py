@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import armwright as aw
-from armwright.problem.problem import Outcomes, Problem
+from armwright.problem.outcomes import Outcomes
+from armwright.problem.problem import Problem
 from armwright.study.front.reference_survey import ReferenceSurvey
 
 TASK = aw.Task.model_validate(

@@ -10,7 +10,8 @@ from armwright.problem.arm_quantities import joints, length, mass, position_erro
 from armwright.problem.drive_quantities import price, voltages
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.objectives import OBJECTIVES
-from armwright.problem.problem import Outcomes, Problem, joined, worst_case
+from armwright.problem.outcomes import Outcomes, joined, worst_case
+from armwright.problem.problem import Problem
 from armwright.problem.scene import Scene
 
 EXACT = (price, mass, length, joints, voltages)  # quantities that an arm has without moving

@@ -336,7 +336,7 @@ def evaluate_arrays(
     scene: Scene,
     device: Device = "cpu",
     initial_q: ArrayLike | None = None,
-    near: Array | None = None,
+    candidates: Array | None = None,
     roughly_near: Array | None = None,
 ) -> Evaluation:
     """Evaluate stacked arms at every target of a scene, in their precision.
@@ -347,8 +347,8 @@ def evaluate_arrays(
         device: where the arms are evaluated.
         initial_q: initial joint values [rad] or [m] that broadcast to (N, T, D); None for the straight posture. The
             restarts of the targets begin elsewhere. Where the cycle stops, its postures count instead.
-        near: (N, B, D) postures at the first pose of each block of the cycle, such as those of similar arms, which the
-            arms keep as far as they can; None to choose postures.
+        candidates: (N, B, K, D) postures at the first pose of each block of the cycle to choose from; None for those
+            that the inverse kinematics finds.
         roughly_near: (N, B, D) postures near those at the first pose of each block of the cycle, from which the paths
             are estimated (`rough_paths`); None for the paths themselves.
     """
@@ -374,7 +374,9 @@ def evaluate_arrays(
     else:
         if roughly_near is None:
             heaviest = float(scene.payload.max())
-            paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=near, payload=heaviest)
+            paths = find_paths(
+                arrays, scene.plan, scene.obstacles, device=device, postures=candidates, payload=heaviest
+            )
         else:
             paths = rough_paths(arrays, scene.plan, roughly_near, scene.obstacles, device)
         q = paths.postures(len(targets))

@@ -1,6 +1,6 @@
 """The problem: a design space, a task, and the objectives to minimise."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -10,15 +10,18 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
+from armwright.kinematics.cycle.entry_postures import postures_near
+from armwright.kinematics.cycle.line_following import IndexArray
 from armwright.kinematics.devices import Device, resolve_device
-from armwright.pareto import penalised_objectives
 from armwright.problem.arm_quantities import orientation_error
+from armwright.problem.best_chain import best_chain
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.evaluators import Evaluator, Measurement
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Need, Objective
 from armwright.problem.objectives import PAPER_OBJECTIVES, QUANTITIES, named_objectives
+from armwright.problem.outcomes import Outcomes, joined, worst_case
 from armwright.problem.scene import Scene, task_scene
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import stack_designs
@@ -30,67 +33,6 @@ from armwright.tasks.task import Task
 
 POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
 NO_MEASUREMENTS: Mapping[str, Array] = {}
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Hold the result of evaluating one design."""
-
-    values: tuple[float, ...]  # the M objectives, minimised; infinite if the evaluator failed
-    violations: tuple[float, ...] = ()  # of the C constraints; satisfied at <= 0
-    failure: Failure | None = None  # why the evaluator failed; None if it did not
-    # Joint angles [rad] or strokes [m] at each target in the first case, 0 for joints that the design lacks
-    q: tuple[tuple[float, ...], ...] = ()
-
-
-@dataclass(frozen=True)
-class Outcomes:
-    """Hold the results of evaluating N designs."""
-
-    values: Array  # (N, M) objectives, minimised; infinite where the evaluator failed
-    violations: Array  # (N, C) constraint violations; satisfied at <= 0
-    failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])  # why the evaluator failed, by row
-    # (N, B, D) at the first pose of each block of the cycle in the first case [rad] or [m]; None without a cycle
-    postures: Array | None = None
-    q: Array | None = None  # (N, T, J) joint angles at the targets in the first case [rad] or [m]
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __getitem__(self, row: int) -> Outcome:
-        """Return the outcome of one design."""
-        q = () if self.q is None else tuple(tuple(map(_single, angles)) for angles in self.q[row].tolist())
-        values, violations = (tuple(array[row].tolist()) for array in (self.values, self.violations))
-        return Outcome(values, violations, self.failures.get(row), q)
-
-    def __iter__(self) -> Iterator[Outcome]:
-        return (self[row] for row in range(len(self)))
-
-    @property
-    def penalised(self) -> Array:
-        """Return (N, M) objectives that a search without constraints can compare designs by (Deb's rules)."""
-        return penalised_objectives(self.values, self.violations)
-
-
-def worst_case(outcomes: Iterable[Outcomes]) -> Outcomes:
-    """Return the largest of each objective and violation, each by itself, of the same designs in several cases."""
-    first, *others = outcomes
-    if not others:
-        return first
-    values, violations = (
-        np.max([getattr(o, name) for o in (first, *others)], axis=0) for name in ("values", "violations")
-    )
-    return Outcomes(values, violations, postures=first.postures, q=first.q)
-
-
-def joined(parts: Sequence[Outcomes]) -> Outcomes:
-    """Return the outcomes of all designs of several parts, in their order; at least one part."""
-
-    def all_of(name: str) -> Any:
-        arrays = [getattr(part, name) for part in parts]
-        return None if arrays[0] is None else np.concatenate(arrays)
-
-    return Outcomes(all_of("values"), all_of("violations"), postures=all_of("postures"), q=all_of("q"))
 
 
 @dataclass(frozen=True)
@@ -249,10 +191,7 @@ class Problem:
             columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
             measured = dict(zip(names, columns, strict=True))
         parts = [  # with only the postures of one chunk in memory at a time
-            worst_case(
-                self.outcomes(evaluation, {name: column[rows] for name, column in measured.items()})
-                for evaluation in self._variants(matrix[rows])
-            )
+            worst_case(self._variants(matrix[rows], {name: column[rows] for name, column in measured.items()}))
             for rows in self.chunks(len(matrix))
         ]
         nobody = Outcomes(np.empty((0, len(self.objectives))), np.empty((0, len(self.constraints))))
@@ -274,7 +213,7 @@ class Problem:
         """
         if not isinstance(designs, ArmArrays):
             designs = self.arms(designs if isinstance(designs, np.ndarray) else self.space.matrix(designs))
-        return evaluate_arrays(designs, self.scenes[case], self.device, near=near)
+        return self._on_best_chain(designs, self.scenes[case], near)
 
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
@@ -297,7 +236,7 @@ class Problem:
         """
         scenes = scenes or self.scenes
         for scene, postures in zip(scenes, near or [None] * len(scenes), strict=True):
-            yield evaluate_arrays(arms, scene, self.device, near=postures)
+            yield self._on_best_chain(arms, scene, postures)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of N evaluated arms; SettingsError if one is not a finite number.
@@ -319,15 +258,36 @@ class Problem:
         size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
         yield from (slice(first, first + size) for first in range(0, n, size))
 
-    def _variants(self, matrix: Array) -> Iterator[Evaluation]:
-        """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
+    def _variants(self, matrix: Array, measured: Mapping[str, Array]) -> Iterator[Outcomes]:
+        """Yield the outcomes of designs in each case of the task, exact and off by the tolerance."""
         near: list[Array | None] = []
-        for case in range(len(self.scenes)):
-            exact = self.physics(matrix, case)
-            near.append(exact.entry_postures)
-            yield exact
+        arms = self.arms(matrix)
+
+        def judge(evaluation: Evaluation, rows: IndexArray) -> Outcomes:
+            return self.outcomes(evaluation, {name: column[rows] for name, column in measured.items()})
+
+        for scene in self.scenes:
+            best = best_chain(arms, scene, self.constraints, judge, self.device)[1]
+            near.append(best.postures)
+            yield best
         for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
-            yield from self.cases(self.arms(rows), near)
+            yield from (self.outcomes(evaluation, measured) for evaluation in self.cases(self.arms(rows), near))
+
+    def _on_best_chain(self, arms: ArmArrays, scene: Scene, near: Array | None) -> Evaluation:
+        """Return the physics of N arms on their best chain of postures, or on that near postures (N, B, D)."""
+        if near is not None and scene.plan is not None:
+            candidates = postures_near(arms, scene.plan, near, self.device)
+            return evaluate_arrays(arms, scene, self.device, candidates=candidates)
+
+        def judge(evaluation: Evaluation, _: IndexArray) -> Outcomes:
+            values = [np.nan_to_num(c.violation(c.quantity.known(evaluation)[0])) for c in self.constraints]
+            violations = np.reshape(values, (-1, len(evaluation))).T
+            return Outcomes(np.empty((len(evaluation), 0)), violations, postures=evaluation.entry_postures)
+
+        first, best = best_chain(arms, scene, self.constraints, judge, self.device)
+        if best.postures is first.entry_postures or best.postures is None:
+            return first
+        return evaluate_arrays(arms, scene, self.device, candidates=best.postures[:, :, None])
 
     @cached_property
     def _postures(self) -> int:
@@ -335,11 +295,6 @@ class Problem:
         task, plan = self.task, self.scenes[0].plan
         along = 0 if plan is None else 4 * (len(plan.sample().poses) + 33 * len(plan.motions))
         return len(task.target_positions) + along + sum(region.points for region in task.workspace)
-
-
-def _single(value: float) -> float:
-    """Return a number of single precision, as the kernels compute, in as few digits as tell it from all others."""
-    return float(f"{value:.9g}")
 
 
 def _finite(columns: Sequence[Array], names: Sequence[str], n: int) -> Array:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.pareto import masked_objectives
-from armwright.problem.problem import Outcomes, Problem, worst_case
+from armwright.problem.outcomes import Outcomes, worst_case
+from armwright.problem.problem import Problem
 from armwright.proof.perturbations import MOVED, Changed, Survival, load_changes, survival_of, survivals
 from armwright.runs.history import History
 from armwright.spaces.parameters import Design

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from armwright.exceptions import ModelError, StoppedError
-from armwright.problem.problem import Outcome, Problem
+from armwright.problem.outcomes import Outcome
+from armwright.problem.problem import Problem
 from armwright.proof.results import complete_summary, discard_results, summarize, write_results
 from armwright.proof.verification import verify_front
 from armwright.proposers.proposer import Proposer

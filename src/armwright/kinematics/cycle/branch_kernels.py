@@ -3,12 +3,13 @@
 A turn by π about an axis a reverses rotations about axes b perpendicular to it: R_a(π) R_b(φ) = R_b(-φ) R_a(π). So if a
 joint about a turns by π, those about other axes up to the next joint about a are negated, and that one turns back, all
 links stay where they are, if they lie on a line along a when straight. This is how shoulders and wrists flip. After the
-last joint about a, the tool turns about itself.
+last joint about a, the tool turns about itself. Joints on one line share one turn, which has two ways round.
 
 An elbow: of a joint i and the next one m about the same axis, u leads from i to m and v from m to a joint k, in the
 plane perpendicular to the axis. Mirrored at w = u + v, k stays where it is. Joint i turns by 2 ∠(u, w), joint m by
 2 ∠(v, w) - 2 ∠(u, w), and joint k, if it is about the same axis, by -2 ∠(v, w), so that what follows stays as well. If
-k is not, or links are off the line, an image is only near another branch, and the inverse kinematics has to refine it.
+k is not, other joints are between, or links are off the line, an image is only near another branch, and the inverse
+kinematics has to refine it.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -22,7 +23,6 @@ from armwright.kinematics.arms.arm_arrays import MAX_JOINTS, PRISMATIC
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
 
-OUTSIDE = 0.7
 NARROW = 0.15  # of an arm's length, by which links may lie off the line that they are turned about
 
 
@@ -34,7 +34,7 @@ def branch_kernels() -> SimpleNamespace:
     Values = wp.types.vector(length=MAX_JOINTS, dtype=real)
     Plane = wp.types.vector(length=2, dtype=real)
     two, infinity = real(2.0), real(float("inf"))
-    pi, narrow = real(3.141592653589793), real(NARROW)
+    pi, narrow, tiny = real(3.141592653589793), real(NARROW), real(1e-9)
 
     @wp.struct
     class Chain:
@@ -62,7 +62,7 @@ def branch_kernels() -> SimpleNamespace:
 
     @wp.func
     def image_of(chain: Chain, arm: int, joint: int, is_elbow: bool, q: Values):
-        """Return the image by an elbow or a turn about the axis of a joint, and whether there is one."""
+        """Return the image by an elbow or a turn about the axis of a joint; 2 if it is exact, 1 if near, 0 if none."""
         motion = chain.motion[arm, joint]
         end, others = int(joint + 1), int(0)  # noqa: RUF046, UP018
         length = real(0.0)
@@ -73,38 +73,65 @@ def branch_kernels() -> SimpleNamespace:
             length += wp.length(chain.offset[arm, j])
         u = links_across(chain, arm, motion, joint, end)
         if not is_elbow:
+            if others == 0 and end < chain.dof:
+                q[joint] = (q[joint] + q[end]) / two
+                q[joint] = q[joint] - pi * wp.sign(q[joint])
+                q[end] = q[joint]
+                return q, wp.where(wp.length(u) < tiny, 2, 0)
             q[joint] = q[joint] + pi
             for j in range(joint + 1, end):
                 if chain.motion[arm, j] < wp.static(PRISMATIC):
                     q[j] = -q[j]
             if end < chain.dof:
                 q[end] = q[end] - pi
-            return q, others > 0 and wp.length(u) < narrow * length
+            return q, wp.where(wp.length(u) < tiny, 2, wp.where(wp.length(u) < narrow * length, 1, 0))
         wrist = int(end + 1)
         # A joint about the line of its link moves nothing up to the next one.
         while (
             wrist < chain.dof
             and chain.motion[arm, wrist] != motion
-            and wp.length(links_across(chain, arm, chain.motion[arm, wrist], wrist, wrist + 1)) < real(1e-9)
+            and wp.length(links_across(chain, arm, chain.motion[arm, wrist], wrist, wrist + 1)) < tiny
         ):
             wrist += 1
         if end == chain.dof:
-            return q, False
+            return q, 0
         bent, s, c = links_across(chain, arm, motion, end, wrist), wp.sin(q[end]), wp.cos(q[end])
         v = Plane(c * bent[0] - s * bent[1], s * bent[0] + c * bent[1])  # in the frame of u
         first, second = between(u, u + v), between(v, u + v)
         q[joint] = q[joint] + two * first
         q[end] = q[end] + two * (second - first)
+        is_exact = bool(wrist == end + 1 and wrist < chain.dof and others == 0)
         if wrist < chain.dof and chain.motion[arm, wrist] == motion:
             q[wrist] = q[wrist] - two * second
-        return q, others == 0 and wp.length(u) > real(0.0) and wp.length(v) > real(0.0)
+        else:
+            is_exact = False
+        return q, wp.where(wp.length(u) > tiny and wp.length(v) > tiny, wp.where(is_exact, 2, 1), 0)
 
     @wp.func
-    def distance(q: wp.array4d(dtype=real), arm: int, block: int, row: int, other: Values, dof: int):
-        """Return the largest difference of a joint between a posture and another one."""
-        largest = real(0.0)
-        for j in range(dof):
+    def without_turns(chain: Chain, arm: int, q: Values):
+        """Return a posture without whole turns, in which joints on one line share theirs if one is beyond its limit."""
+        for j in range(chain.dof):
+            if chain.motion[arm, j] < wp.static(PRISMATIC):
+                middle = (chain.lower[arm, j] + chain.upper[arm, j]) / two
+                q[j] = q[j] - two * pi * wp.round((q[j] - middle) / (two * pi))
+        for j in range(chain.dof - 1):
+            motion = chain.motion[arm, j]
+            if motion < wp.static(PRISMATIC) and motion == chain.motion[arm, j + 1]:
+                beyond = q[j] != wp.clamp(q[j], chain.lower[arm, j], chain.upper[arm, j])
+                if q[j + 1] != wp.clamp(q[j + 1], chain.lower[arm, j + 1], chain.upper[arm, j + 1]):
+                    beyond = True
+                if beyond and wp.length(links_across(chain, arm, motion, j, j + 1)) < tiny:
+                    q[j] = (q[j] + q[j + 1]) / two
+                    q[j + 1] = q[j]
+        return q
+
+    @wp.func
+    def distance(q: wp.array4d(dtype=real), arm: int, block: int, row: int, other: Values, dof: int, enough: real):
+        """Return the largest difference of a joint between a posture and another one, or one that is enough."""
+        largest, j = real(0.0), int(0)  # noqa: RUF046, UP018
+        while j < dof and largest < enough:
             largest = wp.max(largest, wp.abs(q[arm, block, row, j] - other[j]))
+            j += 1
         return largest
 
     @kernel
@@ -117,9 +144,10 @@ def branch_kernels() -> SimpleNamespace:
         nearness: wp.array3d(dtype=real),
         found: wp.array4d(dtype=real),
     ):
-        """Choose postures that differ, then add their images, and images of images, until there is no more room.
+        """Choose postures that differ, then add images, and images of images, the exact ones first, until it is full.
 
         The cheapest posture is chosen first, then each time the one with the least cost minus distance from those.
+        Images may be beyond joint limits: another image of them may not.
 
         q: (N, B, S, D).  cost: (N, B, S), infinite for those not to choose.  known: the number chosen at most.
         distinct: between postures, nearer ones count as the same [rad] or [m].
@@ -139,33 +167,28 @@ def branch_kernels() -> SimpleNamespace:
                     image[j] = q[arm, block, best, j]
                     found[arm, block, count, j] = image[j]
                 for row in range(q.shape[2]):
-                    off = distance(q, arm, block, row, image, chain.dof)
+                    off = distance(q, arm, block, row, image, chain.dof, real(1e9))
                     nearness[arm, block, row] = wp.min(nearness[arm, block, row], off)
                 count += 1
-        mirrored = int(0)  # noqa: RUF046, UP018
-        while mirrored < count and known < found.shape[2]:
-            for candidate in range(2 * chain.dof):
-                joint = candidate / 2
-                if chain.motion[arm, joint] < wp.static(PRISMATIC) and count < found.shape[2]:
-                    for j in range(chain.dof):
-                        image[j] = found[arm, block, mirrored, j]
-                    image, is_image = image_of(chain, arm, joint, candidate % 2 == 1, image)
-                    valid = bool(is_image)
-                    for j in range(chain.dof):
-                        if chain.motion[arm, j] < wp.static(PRISMATIC):
-                            middle = (chain.lower[arm, j] + chain.upper[arm, j]) / two
-                            image[j] = image[j] - two * pi * wp.round((image[j] - middle) / (two * pi))
-                            inside = wp.clamp(image[j], chain.lower[arm, j], chain.upper[arm, j])
-                            if wp.abs(inside - image[j]) > wp.static(real(OUTSIDE)):
-                                valid = False
-                            image[j] = inside
-                    for row in range(count):
-                        if valid and distance(found, arm, block, row, image, chain.dof) < distinct:
-                            valid = False
-                    if valid:
+        for least_exact in range(2, 0, -1):
+            mirrored = int(0)  # noqa: RUF046, UP018
+            while mirrored < count and known < found.shape[2]:
+                for candidate in range(2 * chain.dof):
+                    joint = candidate / 2
+                    if chain.motion[arm, joint] < wp.static(PRISMATIC) and count < found.shape[2]:
                         for j in range(chain.dof):
-                            found[arm, block, count, j] = image[j]
-                        count += 1
-            mirrored += 1
+                            image[j] = found[arm, block, mirrored, j]
+                        image, exact = image_of(chain, arm, joint, candidate % 2 == 1, image)
+                        image = without_turns(chain, arm, image)
+                        valid = bool(exact >= least_exact)
+                        row = int(0)  # noqa: RUF046, UP018
+                        while valid and row < count:
+                            valid = distance(found, arm, block, row, image, chain.dof, distinct) >= distinct
+                            row += 1
+                        if valid:
+                            for j in range(chain.dof):
+                                found[arm, block, count, j] = image[j]
+                            count += 1
+                mirrored += 1
 
     return SimpleNamespace(Chain=Chain, find_branches=find_branches)

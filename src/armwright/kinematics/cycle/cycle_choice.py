@@ -43,6 +43,7 @@ class ChosenPostures:
     """(N, 2) the largest step of coarse samples relative to the allowed one, along lines and along joint motions."""
     hopeless: NDArray[np.bool_]  # (N,) True if the path is so far off that more samples cannot mend it
     branches: IndexArray  # (N, B) number of candidates that follow the lines of their block
+    blocked: NDArray[np.bool_]  # (N,) True if a line or a joint motion is off, collides or is too fast
 
 
 def choose_postures(
@@ -75,17 +76,20 @@ def choose_postures(
     if arms.actuation is not None:
         times = [plan.times[plan.motions[index].step] or np.inf for index in plan.joint_motions]
         edges += cost_of(PEAK_SPEED * edges / np.array(times)[:, None, None] - 1.0)
-    choice = _avoid_collisions(arms, plan, samples, lines, blocks + loads, edges.copy(), obstacles, device)
+    block_costs, edge_costs = blocks + loads, edges.copy()
+    choice = _avoid_collisions(arms, plan, samples, lines, block_costs, edge_costs, obstacles, device)
     index, block = np.arange(len(arms), dtype=np.intp), np.arange(len(plan.blocks))
     chosen, arm = lines.choose(samples, choice, index), index[:, None]
     steps = np.abs(np.diff(chosen, axis=1))
     steps[:, samples.first[1:-1] - 1] = 0.0  # from one block to the next
     joint_motion = np.arange(len(plan.joint_motions))
-    turn = change[arm, joint_motion, choice[:, joint_motion], choice[:, (joint_motion + 1) % len(plan.blocks)]]
+    taken = (arm, joint_motion, choice[:, joint_motion], choice[:, (joint_motion + 1) % len(plan.blocks)])
+    turn = change[taken]
+    blocked = (block_costs[arm, block, choice] >= BLOCKED).any(axis=1) | (edge_costs[taken] >= BLOCKED).any(axis=1)
     allowed = np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
     ratios = [(part / allowed).max(axis=(1, 2), initial=0.0) for part in (steps, turn / JOINT_STEPS)]
     hopeless = blocks[arm, block, choice].max(axis=1) > HOPELESS * BLOCKED
-    return ChosenPostures(starts[arm, block, choice], np.stack(ratios, axis=1), hopeless, branches)
+    return ChosenPostures(starts[arm, block, choice], np.stack(ratios, axis=1), hopeless, branches, blocked)
 
 
 def _static_loads(arms: ArmArrays, plan: CyclePlan, q: Array, payload: float, device: Device) -> Array:

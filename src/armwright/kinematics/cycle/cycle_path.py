@@ -18,7 +18,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_choice import CLOSED, JOINT_STEPS, MAX_SLIDE, MAX_STEP, ON_LIMIT, choose_postures
-from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures, postures_near
+from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
 from armwright.kinematics.cycle.line_following import IndexArray, follow_lines, tool_errors
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device
@@ -67,6 +67,7 @@ class CyclePaths:
     not."""
     worst: Array  # (N, M, 3) share of the motion at which path error, angle and clearance are worst
     branches: IndexArray | None = None  # (N, B) as in `ChosenPostures`; None for rough paths
+    candidates: Array | None = None  # (N, B, K, D) postures at the first pose of each block that were to choose from
     instants: int = INSTANTS
     """F, the number of instants of a motion, equally spaced in time, at which its loads are evaluated."""
 
@@ -96,21 +97,18 @@ def find_paths(
     arms: ArmArrays,
     plan: CyclePlan,
     obstacles: Sequence[Obstacle] = (),
-    candidates: int = CANDIDATES,
+    candidates: int | None = None,
     device: Device = "cpu",
-    near: Array | None = None,
+    postures: Array | None = None,
     payload: float = 0.0,
 ) -> CyclePaths:
     """Find the joint paths of N arms through a cycle. A path that is off is a result, never an exception.
 
-    candidates: K, the number of postures at the first pose of each block to choose from.  near: (N, B, D) postures
-    there that the arms are to keep, as far as they can, instead of choosing from candidates.  payload: its mass when
-    carried [kg].
+    candidates: K, the number of postures at the first pose of each block to choose from; None for 24.  postures:
+    (N, B, K, D) those to choose from instead.  payload: its mass when carried [kg].
     """
-    if near is None:
-        postures = entry_postures(arms, plan, obstacles, candidates, device)
-    else:
-        postures = postures_near(arms, plan, near, device)
+    if postures is None:
+        postures = entry_postures(arms, plan, obstacles, candidates or CANDIDATES, device)
     chosen = choose_postures(arms, plan, postures, obstacles, device, payload)
     n, entry, ratios = len(arms), chosen.entry, chosen.step_ratios
     is_line = np.array([motion.by == "line" for motion in plan.motions])
@@ -136,7 +134,7 @@ def find_paths(
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
     found = _measure(arms, plan, entry, groups, jumps, obstacles, device)
-    return replace(found, branches=chosen.branches)
+    return replace(found, branches=chosen.branches, candidates=postures)
 
 
 def rough_paths(

@@ -20,7 +20,9 @@ from armwright.tasks.obstacles import Obstacle
 
 STARTS, START_UPDATES = 32, 30  # of the inverse kinematics at each block's first pose
 KNOWN = 16  # of the postures found there that are mirrored, those that miss the pose included
-IMAGES, IMAGE_UPDATES = 48, 20  # postures with their images
+IMAGES = 64  # postures with their images
+REFINED, IMAGE_UPDATES = 48, 20  # of these, the nearest to the pose
+OUTSIDE = 0.7  # [rad] or [m] beyond a limit from which an image may be moved to it
 CANDIDATES = 24  # that lines are followed from
 DISTINCT, APART = 0.3, 0.7  # [rad] or [m] between postures that are mirrored, and between candidates
 NEARLY = 1.5  # times the tolerance that a candidate may be off: lines begin with a refinement
@@ -40,25 +42,32 @@ def entry_postures(
     the only one; if all collide, the one that does so least.
     """
     poses = plan.poses[[block.entry for block in plan.blocks]]
+    lower, upper = (limit.astype(np.float64)[:, None, None] for limit in (arms.lower, arms.upper))
     start = arms.random_postures(STARTS).swapaxes(0, 1)[:, None]  # (N, 1, S, D)
     start[:, :, 0] = 0.0
     q, off = _solve(arms, poses, np.repeat(start, len(poses), axis=1), START_UPDATES, device)
     images = _branches(arms, q, cost_of(off - 1.0), KNOWN, IMAGES, DISTINCT, device)
-    q, off = _solve(arms, poses, images, IMAGE_UPDATES, device)
-    others = (off > NEARLY) & (off > off.min(axis=2, keepdims=True))
-    lower, upper = (limit.astype(np.float64)[:, None, None] for limit in (arms.lower, arms.upper))
-    room = np.minimum(q - lower, upper - q) / (upper - lower)
-    room = np.where((arms.motion == FIXED)[:, None, None], 1.0, room).min(axis=-1)
-    cost = np.where(others, np.inf, cost_of(off - 1.0) - room)
-    q = _branches(arms, q, cost, candidates, candidates, APART, device)
+    q = np.clip(images, lower, upper)
+    q[~(np.abs(q - images).max(axis=-1) <= OUTSIDE)] = np.nan
+    q, off = _solve(arms, poses, q, 0, device)
+    q[np.isinf(off)] = np.nan
+    nearest = np.argsort(off, axis=2, kind="stable")[..., : np.isfinite(off).sum(axis=2).max()]
+    q = np.take_along_axis(q, nearest[..., :REFINED, None], axis=2)
+    q, off = _solve(arms, poses, q, IMAGE_UPDATES, device)
+    unfit = (off > NEARLY) & (off > off.min(axis=2, keepdims=True))
+    fit_first = np.argsort(unfit, axis=2, kind="stable")[..., : (~unfit).sum(axis=2).max()]
+    q = np.take_along_axis(q, fit_first[..., None], axis=2)
+    off, unfit = (np.take_along_axis(values, fit_first, axis=2) for values in (off, unfit))
     samples = plan.sample()
     rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], q.shape[2])]
-    flat = np.nan_to_num(q).reshape(len(arms), -1, arms.dof)
-    clearance = np.minimum(*clearances(arms, flat, obstacles, device, rules, most=0.0))
-    clearance = np.where(np.isnan(q[..., 0]), -np.inf, clearance.reshape(q.shape[:3]))
-    dropped = clearance < np.minimum(0.0, clearance.max(axis=2, keepdims=True))
-    order = np.argsort(dropped, axis=2, kind="stable")[..., : (~dropped).sum(axis=2).max()]
-    return np.take_along_axis(np.where(dropped[..., None], np.nan, q), order[..., None], axis=2)
+    clearance = np.minimum(*clearances(arms, q.reshape(len(arms), -1, arms.dof), obstacles, device, rules, most=0.0))
+    clearance = clearance.reshape(off.shape)
+    clearance[unfit] = -np.inf
+    unfit |= clearance < np.minimum(0.0, clearance.max(axis=2, keepdims=True))
+    room = np.minimum(q - lower, upper - q) / (upper - lower)
+    room = np.where((arms.motion == FIXED)[:, None, None], 1.0, room).min(axis=-1)
+    q = _branches(arms, q, np.where(unfit, np.inf, cost_of(off - 1.0) - room), candidates, candidates, APART, device)
+    return q[:, :, : (~np.isnan(q[..., 0])).sum(axis=2).max()]
 
 
 def postures_near(arms: ArmArrays, plan: CyclePlan, near: Array, device: Device = "cpu") -> Array:

@@ -21,7 +21,8 @@ from scipy.spatial import KDTree
 from armwright.arrays import Array
 from armwright.pareto import feasible_mask, front_mask, total_violation
 from armwright.problem.estimates import estimates, lower_bounds
-from armwright.problem.problem import Outcomes, Problem
+from armwright.problem.outcomes import Outcomes
+from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
 from armwright.search.front.selection import Indices
 from armwright.search.front.variation import offspring

@@ -7,7 +7,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.pareto import feasible_mask, front_mask, hypervolume_history
-from armwright.problem.problem import Outcomes, Problem
+from armwright.problem.outcomes import Outcomes
+from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import MARGIN, stated_bounds, with_bounds
 from armwright.runs.history import found_reference_point
 

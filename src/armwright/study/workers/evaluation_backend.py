@@ -4,7 +4,8 @@ import json
 import time
 from dataclasses import dataclass
 
-from armwright.problem.problem import Outcome, Problem
+from armwright.problem.outcomes import Outcome
+from armwright.problem.problem import Problem
 from armwright.spaces.parameters import Design
 from armwright.study.workers.evaluation_process import EvaluationProcess, pickle_problem
 
