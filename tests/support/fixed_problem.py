@@ -1,6 +1,6 @@
 """Problems evaluated by simple formulas, equal on every machine, and their histories."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from armwright.problem.arm_quantities import position_error
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import PAPER_OBJECTIVES
+from armwright.problem.outcomes import Outcomes
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
@@ -64,6 +65,9 @@ class FixedProblem(Problem):
         ways = np.linalg.norm(sample_regions(self.task.workspace) - base[:, None], axis=-1)
         vars(evaluation)["workspace_error"] = np.maximum(0.0, ways - reach[:, None])
         return evaluation
+
+    def _variants(self, matrix: Array, measured: Mapping[str, Array]) -> Iterator[Outcomes]:
+        yield self.outcomes(self.physics(matrix), measured)
 
 
 def _fixed_paths(evaluation: Evaluation, plan: CyclePlan) -> CyclePaths:

@@ -156,7 +156,7 @@ def _avoid_collisions(
     obstacles: Sequence[Obstacle],
     device: Device,
 ) -> IndexArray:
-    """Return the (N, B) candidates with the least cost, collisions included, which are measured only if chosen."""
+    """Return the (N, B) candidates with the least cost of those whose collisions were measured, the cheapest first."""
     closed = plan.cycle.closed and not plan.is_loop
     choice = choose_candidates(blocks, edges, closed)
     index = np.arange(len(arms))
@@ -164,6 +164,8 @@ def _avoid_collisions(
     n_blocks, n_edges, candidates = blocks.shape[1], edges.shape[1], blocks.shape[2]
     joint_motions = [plan.rules(plan.motions[i], share) for i in plan.joint_motions[:n_edges]]
     rules = joined_rules([plan.sampled_rules(samples), *joint_motions])
+    best, least = choice.copy(), np.full(len(arms), np.inf)
+    free_blocks, free_edges = blocks.copy(), edges.copy()
     for _ in range(ROUNDS if candidates > 1 else 0):
         if not len(index):
             break
@@ -177,14 +179,18 @@ def _avoid_collisions(
         in_blocks = np.maximum.reduceat(depth[:, : chosen.shape[1]], samples.first[:-1], axis=1)
         in_edges = depth[:, chosen.shape[1] :].reshape(len(index), n_edges, len(share)).max(axis=2, initial=0.0)
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)
-        edge = np.arange(n_edges, dtype=np.intp)
-        blocks[index[:, None], np.arange(n_blocks), choice[index]] += cost_of(in_blocks / DEPTH)
-        following = choice[index][:, (edge + 1) % n_blocks]
-        edges[index[:, None], edge, choice[index][:, :n_edges], following] += cost_of(in_edges / DEPTH)
+        edge, block = np.arange(n_edges, dtype=np.intp), np.arange(n_blocks, dtype=np.intp)
+        of_blocks = index[:, None], block, choice[index]
+        of_edges = index[:, None], edge, choice[index][:, :n_edges], choice[index][:, (edge + 1) % n_blocks]
+        blocks[of_blocks] = free_blocks[of_blocks] + cost_of(in_blocks / DEPTH)
+        edges[of_edges] = free_edges[of_edges] + cost_of(in_edges / DEPTH)
+        cost = blocks[of_blocks].sum(axis=1) + edges[of_edges].sum(axis=1)
+        better = index[cost < least[index]]
+        best[better], least[index] = choice[better], np.minimum(cost, least[index])
         index = index[colliding]
         before, choice[index] = choice[index], choose_candidates(blocks[index], edges[index], closed)
         index = index[(before != choice[index]).any(axis=1)]  # else nothing is better
-    return choice
+    return best
 
 
 def choose_candidates(blocks: Array, edges: Array, closed: bool) -> IndexArray:

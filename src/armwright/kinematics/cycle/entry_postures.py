@@ -57,7 +57,7 @@ def entry_postures(
     unfit = (off > NEARLY) & (off > off.min(axis=2, keepdims=True))
     fit_first = np.argsort(unfit, axis=2, kind="stable")[..., : (~unfit).sum(axis=2).max()]
     q = np.take_along_axis(q, fit_first[..., None], axis=2)
-    off, unfit = (np.take_along_axis(values, fit_first, axis=2) for values in (off, unfit))
+    off, unfit = np.take_along_axis(off, fit_first, axis=2), np.take_along_axis(unfit, fit_first, axis=2)
     samples = plan.sample()
     rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], q.shape[2])]
     clearance = np.minimum(*clearances(arms, q.reshape(len(arms), -1, arms.dof), obstacles, device, rules, most=0.0))
