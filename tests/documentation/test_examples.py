@@ -71,7 +71,7 @@ def test_bound_for_the_deflection_changes_the_recommended_arm(tmp_path: Path) ->
         drives = evaluation.drives
         stiffness = Stiffness(arms.bending_stiffness, arms.torsional_stiffness, drives.joint_stiffness)
         found = [
-            frame_displacement(knee.arm, q, stiffness, float(payload[t]), np.zeros(3))
+            frame_displacement(knee.arm, q, stiffness, float(payload[t]), np.array(evaluation.load_shape.center))
             for t, q in enumerate(evaluation.q[0])
         ]
         deflections.append(float(QUANTITIES["deflection"](evaluation)[0]))
