@@ -155,7 +155,7 @@ def arm_of(task: str, space: str, evaluations: int, at: str, drag: int = 0, zoom
 def stiffness(folder: Path, page: Page, file: Path) -> None:
     """Show the recommended arms without and with a bound for the deflection, side by side."""
     views = (
-        ("8-stiffness-unbounded-task.yaml", "#design=5&target=2", "deflection unbounded: 23 mm"),
+        ("8-stiffness-unbounded-task.yaml", "#design=4&target=2", "deflection unbounded: 23 mm"),
         ("8-stiffness-task.yaml", "#design=0&target=2", "deflection at most 1 mm"),
     )
     figures = ""
