@@ -235,7 +235,7 @@ PICTURES: dict[str, Shot] = {
         "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=2&target=4", drag=90, zoom=250
     ),
     "example-obstacles.png": arm_of(
-        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=12&target=3"
+        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 4000, "#design=6&target=3"
     ),
     "example-stiffness.png": stiffness,
     "compare-arms.png": existing_arms,
