@@ -155,7 +155,7 @@ def arm_of(task: str, space: str, evaluations: int, at: str, drag: int = 0, zoom
 def stiffness(folder: Path, page: Page, file: Path) -> None:
     """Show the recommended arms without and with a bound for the deflection, side by side."""
     views = (
-        ("8-stiffness-unbounded-task.yaml", "#design=5&target=2", "deflection unbounded: 23 mm"),
+        ("8-stiffness-unbounded-task.yaml", "#design=4&target=2", "deflection unbounded: 23 mm"),
         ("8-stiffness-task.yaml", "#design=0&target=2", "deflection at most 1 mm"),
     )
     figures = ""
@@ -235,7 +235,7 @@ PICTURES: dict[str, Shot] = {
         "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=2&target=4", drag=90, zoom=250
     ),
     "example-obstacles.png": arm_of(
-        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=12&target=3"
+        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 4000, "#design=6&target=3"
     ),
     "example-stiffness.png": stiffness,
     "compare-arms.png": existing_arms,
