@@ -53,7 +53,7 @@ def test_example_tasks_that_no_page_shows_run(task: Path, tmp_path: Path) -> Non
 def knee_of(name: str, out: Path) -> tuple[FrontMember, Evaluation]:
     """The recommended arm of a direct search of an example, and its physics."""
     space = ["--space", str(EXAMPLES / "8-stiffness-space.yaml")]
-    options = ["--evaluations", "1000", "--no-figures", "--out", str(out)]
+    options = ["--evaluations", "2000", "--no-figures", "--out", str(out)]
     result = CliRunner().invoke(app, ["design", str(EXAMPLES / name), *space, *options])
     assert result.exit_code == 0, result.output
     history, (knee, *_), _ = pick_from(out)
