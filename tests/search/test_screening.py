@@ -43,7 +43,7 @@ def test_chosen_offspring_are_feasible_more_often(pool: Any) -> None:
     chosen = screened(learnt(pool), pool)
     others = offspring(pool, np.zeros(len(pool)), ENCODING, len(chosen), np.random.default_rng(1))
     shares = [feasible_mask(PROBLEM.evaluate(matrix).violations).mean() for matrix in (chosen, others)]
-    assert shares[0] > 0.85
+    assert shares[0] > 2.5 * shares[1]
     assert shares[1] < 0.6
 
 
