@@ -57,7 +57,12 @@ FOLLOWED = [page for page in PAGES if commands(page) or any(block.language == "p
 # Slow pages with independent sections; each section is tested separately.
 BY_SECTION = ("docs/examples.md",)
 FEW = "1000"  # evaluations of a search
-RARE = {"3-long-shelf": "2000", "5-obstacle": "2000", "8-stiffness": "2000", "feeder": "3000"}  # where few designs are feasible
+RARE = {
+    "3-long-shelf": "2000",
+    "5-obstacle": "2000",
+    "8-stiffness": "2000",
+    "feeder": "3000",
+}  # where few designs are feasible
 MAX_WAIT = 900.0  # [s] for a command; only one that waits forever takes this long
 
 # What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.

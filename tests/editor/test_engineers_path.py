@@ -94,7 +94,7 @@ def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEdit
     assert 1 <= len(designs) <= 3
     expect(results.locator("#recommended .card")).to_have_count(len(designs))
     assert summary["recommended"][0]["status"] == "verified"
-    expect(results.locator(f"[data-design='{designs[0]}'] .passed")).to_have_text("Drives its cycle in MuJoCo")
+    expect(results.locator(f"[data-design='{designs[0]}'] .passed").first).to_have_text("Drives its cycle in MuJoCo")
 
     card = f"[data-design='{designs[0]}']"
     results.locator(card).get_by_role("button", name="Show", exact=True).click()

@@ -77,9 +77,9 @@ def _read_points(path: Path) -> Array:
         record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
         points = np.frombuffer(data, record, offset=84)["corners"].reshape(-1, 3).astype(np.float64)
     else:
-        lines = re.findall(rb"^[ \t]*(?:vertex|v)[ \t]([^\r\n]{1,200})", data, re.MULTILINE)
+        lines = re.findall(r"^[ \t]*(?:vertex|v)[ \t]([^\r\n]{1,200})", data.decode("latin-1"), re.MULTILINE)
         try:
-            points = np.array([[float(x), float(y), float(z)] for x, y, z, *_ in map(bytes.split, lines)])
+            points = np.array([[float(x), float(y), float(z)] for x, y, z, *_ in map(str.split, lines)])
         except ValueError as fault:
             raise ValueError(f"{path}: expected three numbers for each vertex of a mesh") from fault
     if len(points) == 0 or not np.isfinite(points).all():
