@@ -77,7 +77,6 @@ def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEdit
     draw_task(tab.page)
     assert tab.ask("armwright.opened.assessed.errors") == []
     expect(tab.page.get_by_label("Budget")).to_have_value("60")
-    tab.page.get_by_label("Budget").fill("30")
     tab.page.get_by_role("button", name="Save and design arms").click()
     expect(tab.page.locator("#job-state")).to_contain_text("Designing arms into runs/shelf-1")
     expect(tab.page.locator("#job-state")).to_have_text("Finished: runs/shelf-1")
@@ -87,7 +86,7 @@ def test_from_six_points_to_a_simulated_arm(browser: Browser, editor: ServedEdit
         tab.page.get_by_role("link", name="Open the results").click()
     results = opened.value
     results.locator("#loading").wait_for(state="hidden")
-    expect(results.locator("#repeat code")).to_contain_text("armwright design --space shelf-space.yaml --budget 30s")
+    expect(results.locator("#repeat code")).to_contain_text("armwright design --space shelf-space.yaml --budget 60s")
     summary = read_summary(tmp_path / "runs/shelf-1")
     assert summary is not None
     designs = list(dict.fromkeys(one["design"] for one in summary["recommended"]))
