@@ -104,9 +104,7 @@ def studies() -> None:
     assert told
     armwright("compare", "cells", "--out", "compared")
     armwright("optimize", "mine.yaml", "--n-total", "10", "--no-figures", "--robust", "--space", "slideopt")
-    armwright("optimize", "target-1", "--print-prompt", "next")
-    by_hand = ("--proposer", "manual:asked", "--model-options", "{wait: false}", "--n-total", "20", "--out", "by-hand")
-    armwright("optimize", "target-1", *by_hand)
+    armwright("optimize", "target-1", "--print-prompt")
     assert 'pip install "armwright[llm]"' in armwright("doctor", "--model", "openai-chat:gpt-4o", code=1).stdout
     Path("script.py").write_text(PYTHON, encoding="utf-8")
     python("script.py")

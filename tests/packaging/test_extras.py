@@ -118,7 +118,7 @@ LLM = 'a language model needs anthropic, google.genai, openai and pydantic_ai: p
 WITHOUT_EXTRAS: tuple[tuple[list[str], str], ...] = (  # what each command prints
     (["check", *ASSEMBLY], NO_FIGURES),
     (["design", *ASSEMBLY, "--evaluations", "1000", "--out", "run"], NO_FIGURES),
-    (["pick", "run"], "perturbed: "),
+    (["pick", "run"], "assumed values halved or doubled, at worst"),
     (["export", "run"], "</robot>"),
     (["simulate", "run"], "pass in MuJoCo"),
     (["report", "run"], "run/report.html"),
