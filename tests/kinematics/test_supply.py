@@ -8,7 +8,7 @@ import pytest
 from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints, ratings_of
 from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_loads
 from armwright.kinematics.cycle.cycle_path import INSTANTS
-from armwright.kinematics.cycle.supply import supply_currents
+from armwright.kinematics.cycle.supply_currents import supply_currents
 from armwright.kinematics.cycle.torque_terms import torque_terms
 from armwright.robot.actuators import catalogue, value_of
 from armwright.robot.arm import Actuator

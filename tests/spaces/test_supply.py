@@ -10,7 +10,7 @@ from armwright.exceptions import SpaceError
 from armwright.robot.actuators import ActuatorRecord, catalogue, named_actuator
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
-from armwright.spaces.supply import supply_voltages
+from armwright.spaces.supply_voltages import supply_voltages
 from armwright.yaml_documents import check_document
 from tests.support.arms import LIGHT
 

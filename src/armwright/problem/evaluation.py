@@ -18,7 +18,7 @@ from armwright.kinematics.contact.clearance import clearances, straight_motor_cl
 from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_bearing_loads, cycle_loads, holding_torques
 from armwright.kinematics.cycle.cycle_path import CyclePaths, find_paths, rough_paths
 from armwright.kinematics.cycle.reserves import Reserves, bearing_reserves, holding_reserves, reserves_of
-from armwright.kinematics.cycle.supply import SupplyCurrents, supply_currents
+from armwright.kinematics.cycle.supply_currents import SupplyCurrents, supply_currents
 from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik.ik import UPDATES, Postures, solve_postures

@@ -32,7 +32,7 @@ from armwright.robot.motor_body import placed_body
 from armwright.spaces.design_columns import DesignColumns, Indices
 from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS, mounted_body
 from armwright.spaces.space_schema import SpaceSchema
-from armwright.spaces.supply import supplied, supplied_ratings, supply_voltages
+from armwright.spaces.supply_voltages import supplied, supplied_ratings, supply_voltages
 from armwright.spaces.tool_mount import mounted_tools
 from armwright.tasks.tool import NO_TOOL, Tool
 
