@@ -10,7 +10,8 @@ import pytest
 
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.cycle.cycle_loads import BETWEEN, CycleLoads, cycle_loads
-from armwright.kinematics.cycle.cycle_path import INSTANTS, find_paths
+from armwright.kinematics.cycle.cycle_path import find_paths
+from armwright.kinematics.cycle.instants import INSTANTS
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.cycle.torque_terms import torque_terms
 from armwright.robot.arm import Arm, Joint, uniform_link

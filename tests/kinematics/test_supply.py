@@ -7,7 +7,7 @@ import pytest
 
 from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints, ratings_of
 from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_loads
-from armwright.kinematics.cycle.cycle_path import INSTANTS
+from armwright.kinematics.cycle.instants import EQUAL, INSTANTS
 from armwright.kinematics.cycle.supply_currents import supply_currents
 from armwright.kinematics.cycle.torque_terms import torque_terms
 from armwright.robot.actuators import catalogue, value_of
@@ -29,7 +29,8 @@ def constant(torques: Any, speeds: Any, holding: Any, time: float = 1.0, dwell: 
     def along(values: Any) -> Array:
         return np.broadcast_to([*values, 0.0], (1, 1, INSTANTS, len(values) + 1))
 
-    return CycleLoads(np.array([[time]]), np.array([dwell]), along(torques), along(speeds), along(holding)[:, :, 0])
+    moving, weights = (along(torques), along(speeds)), np.array(EQUAL.weight)
+    return CycleLoads(np.array([[time]]), np.array([dwell]), *moving, along(holding)[:, :, 0], weights)
 
 
 @pytest.mark.parametrize("name", ["XM430-W350", "STS3215-12V", "AK60-6", "PH42-020-S300-R"])

@@ -161,7 +161,7 @@ def test_robust_values_are_the_worst_of_copies_that_keep_the_postures_of_the_arm
     problem, robust = Problem(task(), DRIVEN), Problem(task(), DRIVEN, tolerance=TOLERANCE)
     rows = DRIVEN.matrix(DRIVEN.sample(N, 0))
     exact = problem.physics(rows)
-    copies = [problem.physics(moved, near=exact.entry_postures) for moved in perturbed(DRIVEN, rows)]
+    copies = [problem.physics(moved, entry=exact.entry) for moved in perturbed(DRIVEN, rows)]
     reached = ~exact.unreached.any(axis=1)
     assert reached.any()
     for copy in copies:

@@ -80,8 +80,8 @@ def test_estimates_from_an_arms_own_postures_are_near_its_evaluation(name: str) 
     assert known is not None
     matrix = problem.space.matrix(known.designs)
     outcomes = problem.evaluate(matrix)
-    assert outcomes.postures is not None
-    found = estimates(problem, matrix, outcomes.postures)
+    assert outcomes.entry is not None
+    found = estimates(problem, matrix, outcomes.entry)
     assert found.values == pytest.approx(outcomes.values, rel=0.15)
     timed = [c.quantity.name not in ("unreached_targets", "jumps") for c in problem.constraints]
     assert np.median(np.abs(found.violations - outcomes.violations)[:, timed]) < 0.02

@@ -35,5 +35,5 @@ def test_objectives_are_the_worst_over_all_cases() -> None:
     designs = problem.space.designs(rows)
     assert np.array_equal(problem.evaluate(designs).values, values)
     assert np.any(values > each[0].values)
-    exact = verify(problem, designs[:5], values[:5], (5.0, 5.0, 1.0)).exact
+    exact = verify(problem, problem.space.matrix(designs[:5]), values[:5], (5.0, 5.0, 1.0)).exact
     assert np.all(np.abs(np.median(exact / values[:5]) - 1.0) < 0.05)  # float64 takes other ways at times

@@ -47,7 +47,7 @@ def designs() -> list[Design]:
 
 @pytest.fixture(scope="module")
 def found(designs: list[Design]) -> Verification:
-    return verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
+    return verify(PROBLEM, PROBLEM.space.matrix(designs), PROBLEM.evaluate(designs).values, BOX)
 
 
 def test_exact_values_agree_with_the_reference(designs: list[Design], found: Verification) -> None:
@@ -82,7 +82,7 @@ def test_design_near_a_flip_of_the_solver_is_sensitive() -> None:
     lucky = Problem(at_reach).space.clipped((0.0, 0.0, 0.0), "RPRP", (0.1, 0.1, 0.1, 0.1))
     easy = Problem(at_reach).space.clipped((0.2, 0.0, 0.2), "YPPP", (0.15, 0.15, 0.15, 0.15))
     problem = Problem(at_reach)
-    found = verify(problem, [lucky, easy], problem.evaluate([lucky, easy]).values, (0.1, 20.0))
+    found = verify(problem, problem.space.matrix([lucky, easy]), problem.evaluate([lucky, easy]).values, (0.1, 20.0))
     assert found.moved[0, 0] == pytest.approx(1e-3, abs=1e-6)
     assert found.robust.tolist() == [False, True]
 

@@ -37,16 +37,16 @@ def of(holds: bool) -> Survival:
     return Survival.of({HEAVIER: Left(HEAVIER, holds, "reserve 0.96 (heat of joint 1)", 0.96, None)})
 
 
-def by_height(_: Problem, designs: Sequence[Design]) -> list[Survival]:
-    return [of(float(design.params["origin_z"]) > HIGH) for design in designs]
+def by_height(history: History, numbers: Sequence[int]) -> list[Survival]:
+    return [of(float(history.trials[number].design.params["origin_z"]) > HIGH) for number in numbers]
 
 
 def test_safe_design_is_the_cheapest_that_holds(history: History, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Design] = []
 
-    def noted(problem: Problem, designs: Sequence[Design]) -> list[Survival]:
-        asked.extend(designs)
-        return by_height(problem, designs)
+    def noted(grown: History, numbers: Sequence[int]) -> list[Survival]:
+        asked.extend(grown.trials[number].design for number in numbers)
+        return by_height(grown, numbers)
 
     monkeypatch.setattr(safe_search, "survival_of", noted)
     nothing_holds = {member.number: of(False) for member in history.front}
@@ -63,7 +63,7 @@ def test_safe_design_is_the_cheapest_that_holds(history: History, monkeypatch: p
     cheapest = history.problem.evaluate([*first, trial.design]).values[:, 0]
     assert (cheapest <= trial.values[0] + 1e-6).all()
     assert find_safe_design(history, nothing_holds, lambda: 1.0, each=1.0, seed=1) is None  # there is no time
-    monkeypatch.setattr(safe_search, "survival_of", lambda _, designs: [of(False) for _ in designs])
+    monkeypatch.setattr(safe_search, "survival_of", lambda _, numbers: [of(False) for _ in numbers])
     assert find_safe_design(history, nothing_holds, lambda: math.inf, 0.0, seed=1) is None
 
 

@@ -66,7 +66,7 @@ def test_objectives_of_clearance() -> None:
     for quantity in CLEARANCES:
         least = getattr(evaluation, quantity.name).min(axis=1)
         assert np.array_equal(quantity(evaluation), np.minimum(least, FAR))
-    assert np.any(verify(problem, designs, values, (1.0, 1.0)).robust)
+    assert np.any(verify(problem, problem.space.matrix(designs), values, (1.0, 1.0)).robust)
     alone = Problem(
         Task(name="alone", targets=task.targets), objectives=named_objectives(["collision", "clearance_shortfall"])
     )

@@ -47,10 +47,10 @@ def best_chain(
         return first, best
     few, payload = paths.candidates[rows, :, :FEWER], float(scene.payload.max())
     chosen = choose_postures(first.arms[rows], paths.plan, few, scene.obstacles, device, payload)
-    is_new = (np.abs(chosen.entry - paths.entry[rows]).max(axis=(1, 2)) > SAME) & ~chosen.blocked
+    is_new = (np.abs(chosen.candidate - paths.entry[rows]).max(axis=(1, 2)) > SAME) & ~chosen.blocked
     if not is_new.any():
         return first, best
-    rows, entry = rows[is_new], chosen.entry[is_new]
+    rows, entry = rows[is_new], chosen.candidate[is_new]
     other = judge(evaluate_arrays(arms[rows], scene, device, candidates=entry[:, :, None]), rows)
     better = total_violation(other.violations) < total_violation(best.violations[rows])
     return first, best.replaced(rows[better], other, better) if better.any() else best

@@ -43,14 +43,17 @@ def lower_bounds(problem: Problem, matrix: Array) -> Outcomes:
 def estimates(problem: Problem, matrix: Array, near: Array) -> Outcomes:
     """Estimate the outcomes of designs (N, P) by rough paths through the cycle, in each case, without tolerances.
 
-    They start near the postures `near` (N, B, D) at the first pose of each block, such as those of similar designs.
+    They start near the postures `near` (N, C, B, D) at the first pose of each block, such as those of similar designs.
     """
     matrix = problem.space.normalised(matrix)
     parts: list[Outcomes] = []
     for first in range(0, len(matrix), AT_ONCE):
         rows = slice(first, first + AT_ONCE)
         arms = problem.arms(matrix[rows])
-        rough = (evaluate_arrays(arms, scene, problem.device, roughly_near=near[rows]) for scene in problem.scenes)
+        rough = (
+            evaluate_arrays(arms, scene, problem.device, roughly_near=near[rows, case])
+            for case, scene in enumerate(problem.scenes)
+        )
         parts.append(worst_case(map(problem.outcomes, rough)))
     return joined(parts)
 

@@ -71,10 +71,10 @@ class Evaluation(Scene):
         """The actuation of arms that have actuators."""
         return cast("Actuation", self.arms.actuation)
 
-    @property
-    def entry_postures(self) -> Array | None:
-        """(N, B, D) posture at the first pose of each block of the cycle [rad] or [m]; None without a cycle."""
-        return None if self.cycle_paths is None else self.cycle_paths.entry
+    @cached_property
+    def entry(self) -> Array | None:
+        """(N, 1, B, D) posture at the first pose of each block of the cycle [rad] or [m]; None without a cycle."""
+        return None if self.cycle_paths is None else self.cycle_paths.entry[:, None]
 
     @cached_property
     def torque_terms(self) -> list[TorqueTerms]:

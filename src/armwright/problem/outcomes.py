@@ -22,6 +22,8 @@ class Outcome:
     failure: Failure | None = None  # why the evaluator failed; None if it did not
     # Joint angles [rad] or strokes [m] at each target in the first case, 0 for joints that the design lacks
     q: tuple[tuple[float, ...], ...] = ()
+    # Likewise at the first pose of each block of the cycle in each case, from which its paths are found again
+    entry: tuple[tuple[tuple[float, ...], ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,8 @@ class Outcomes:
     values: Array  # (N, M) objectives, minimised; infinite where the evaluator failed
     violations: Array  # (N, C) constraint violations; satisfied at <= 0
     failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])  # why the evaluator failed, by row
-    # (N, B, D) at the first pose of each block of the cycle in the first case [rad] or [m]; None without a cycle
-    postures: Array | None = None
+    # (N, C, B, D) at the first pose of each block of the cycle in each case [rad] or [m]; None without a cycle
+    entry: Array | None = None
     q: Array | None = None  # (N, T, J) joint angles at the targets in the first case [rad] or [m]
 
     def __len__(self) -> int:
@@ -40,16 +42,16 @@ class Outcomes:
 
     def __getitem__(self, row: int) -> Outcome:
         """Return the outcome of one design."""
-        q = () if self.q is None else tuple(tuple(map(_single, angles)) for angles in self.q[row].tolist())
+        q, entry = (() if array is None else _singles(array[row].tolist()) for array in (self.q, self.entry))
         values, violations = (tuple(array[row].tolist()) for array in (self.values, self.violations))
-        return Outcome(values, violations, self.failures.get(row), q)
+        return Outcome(values, violations, self.failures.get(row), q, entry)
 
     def __iter__(self) -> Iterator[Outcome]:
         return (self[row] for row in range(len(self)))
 
     def replaced(self, rows: IndexArray, others: "Outcomes", chosen: NDArray[np.bool_]) -> "Outcomes":
         """Return the outcomes in which those chosen of others take the place of these rows."""
-        changed = {name: np.array(getattr(self, name)) for name in ("values", "violations", "postures", "q")
+        changed = {name: np.array(getattr(self, name)) for name in ("values", "violations", "entry", "q")
                    if getattr(self, name) is not None}  # fmt: skip
         for name, values in changed.items():
             values[rows] = getattr(others, name)[chosen]
@@ -62,14 +64,18 @@ class Outcomes:
 
 
 def worst_case(outcomes: Iterable[Outcomes]) -> Outcomes:
-    """Return the largest of each objective and violation, each by itself, of the same designs in several cases."""
+    """Return the largest of each objective and violation, each by itself, of the same designs in several cases.
+
+    The postures are those of the first one, at entries those of all that have some.
+    """
     first, *others = outcomes
     if not others:
         return first
     values, violations = (
         np.max([getattr(o, name) for o in (first, *others)], axis=0) for name in ("values", "violations")
     )
-    return Outcomes(values, violations, postures=first.postures, q=first.q)
+    entries = [o.entry for o in (first, *others) if o.entry is not None]
+    return Outcomes(values, violations, entry=np.concatenate(entries, axis=1) if entries else None, q=first.q)
 
 
 def joined(parts: Sequence[Outcomes]) -> Outcomes:
@@ -79,9 +85,11 @@ def joined(parts: Sequence[Outcomes]) -> Outcomes:
         arrays = [getattr(part, name) for part in parts]
         return None if arrays[0] is None else np.concatenate(arrays)
 
-    return Outcomes(all_of("values"), all_of("violations"), postures=all_of("postures"), q=all_of("q"))
+    return Outcomes(all_of("values"), all_of("violations"), entry=all_of("entry"), q=all_of("q"))
 
 
-def _single(value: float) -> float:
-    """Return a number of single precision, as the kernels compute, in as few digits as tell it from all others."""
-    return float(f"{value:.9g}")
+def _singles(values: Any) -> Any:
+    """Return numbers of single precision, as the kernels compute, in as few digits as tell each from all others."""
+    if isinstance(values, float):
+        return float(f"{values:.9g}")
+    return tuple(map(_singles, values))

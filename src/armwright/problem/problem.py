@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
-from armwright.kinematics.cycle.entry_postures import postures_near
 from armwright.kinematics.cycle.line_following import IndexArray
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.problem.arm_quantities import orientation_error
@@ -191,7 +191,7 @@ class Problem:
             columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
             measured = dict(zip(names, columns, strict=True))
         parts = [  # with only the postures of one chunk in memory at a time
-            worst_case(self._variants(matrix[rows], {name: column[rows] for name, column in measured.items()}))
+            self._worst_case(matrix[rows], {name: column[rows] for name, column in measured.items()})
             for rows in self.chunks(len(matrix))
         ]
         nobody = Outcomes(np.empty((0, len(self.objectives))), np.empty((0, len(self.constraints))))
@@ -205,38 +205,30 @@ class Problem:
         return self.evaluator.attempt(self.arm(design), self.task, design)
 
     def physics(
-        self, designs: Sequence[Design] | Array | ArmArrays, case: int = 0, near: Array | None = None
+        self, designs: Sequence[Design] | Array | ArmArrays, case: int = 0, entry: Array | None = None
     ) -> Evaluation:
         """Return the kinematics and statics of exact arms at all targets in one case, numbered as in the task.
 
-        The designs may be a matrix (N, P) with values outside the ranges of the space. `near`: as in `evaluate_arrays`.
+        The designs may be a matrix (N, P) with values outside the ranges of the space.
+
+        entry: (N, C, B, D) of their outcomes, for the same paths to the bit, or of those of similar arms, which these
+            keep as far as they can; None to choose postures.
         """
         if not isinstance(designs, ArmArrays):
             designs = self.arms(designs if isinstance(designs, np.ndarray) else self.space.matrix(designs))
-        return self._on_best_chain(designs, self.scenes[case], near)
+        scene = self.scenes[case]
+        if entry is None or scene.plan is None:
+            return self._on_best_chain(designs, scene)
+        return evaluate_arrays(designs, scene, self.device, candidates=entry[:, case, :, None])
+
+    def cases(self, designs: Sequence[Design] | Array | ArmArrays, entry: Array | None = None) -> list[Evaluation]:
+        """Return the `physics` of designs in each case of the task."""
+        return [self.physics(designs, case, entry) for case in range(len(self.scenes))]
 
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
         """Return the targets and surroundings of each case of the task."""
         return tuple(task_scene(self.task, targets, payloads) for targets, payloads in self.task.cases)
-
-    def cases(
-        self,
-        arms: ArmArrays,
-        near: Sequence[Array | None] = (),
-        scenes: Sequence[Scene] = (),
-    ) -> Iterator[Evaluation]:
-        """Yield the physics of N arms, such as changed designs, in each case of the task.
-
-        Args:
-            arms: N arms.
-            near: (N, B, D) postures of each case that the arms keep as far as they can, such as those of the unchanged
-                designs; empty to choose postures.
-            scenes: changed surroundings of each case; empty for the task's.
-        """
-        scenes = scenes or self.scenes
-        for scene, postures in zip(scenes, near or [None] * len(scenes), strict=True):
-            yield self._on_best_chain(arms, scene, postures)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of N evaluated arms; SettingsError if one is not a finite number.
@@ -246,7 +238,7 @@ class Problem:
         values = [measured[o.name] if o.name in measured else o.minimised(evaluation) for o in self.objectives]
         names = [f"objective {o.name}" for o in self.objectives]
         columns = _finite(values, names, len(evaluation))
-        return Outcomes(columns, self.violations(evaluation), postures=evaluation.entry_postures, q=evaluation.q)
+        return Outcomes(columns, self.violations(evaluation), entry=evaluation.entry, q=evaluation.q)
 
     def violations(self, evaluation: Evaluation) -> Array:
         """Return the (N, C) violations of evaluated arms; SettingsError if one is not a finite number."""
@@ -258,36 +250,33 @@ class Problem:
         size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
         yield from (slice(first, first + size) for first in range(0, n, size))
 
-    def _variants(self, matrix: Array, measured: Mapping[str, Array]) -> Iterator[Outcomes]:
-        """Yield the outcomes of designs in each case of the task, exact and off by the tolerance."""
-        near: list[Array | None] = []
+    def _worst_case(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:
+        """Return the worst outcomes of designs in each case of the task, exact and off by the tolerance."""
         arms = self.arms(matrix)
 
         def judge(evaluation: Evaluation, rows: IndexArray) -> Outcomes:
             return self.outcomes(evaluation, {name: column[rows] for name, column in measured.items()})
 
-        for scene in self.scenes:
-            best = best_chain(arms, scene, self.constraints, judge, self.device)[1]
-            near.append(best.postures)
-            yield best
-        for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
-            yield from (self.outcomes(evaluation, measured) for evaluation in self.cases(self.arms(rows), near))
+        exact = worst_case([best_chain(arms, scene, self.constraints, judge, self.device)[1] for scene in self.scenes])
+        moved = (
+            self.outcomes(evaluation, measured)
+            for rows in (perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())
+            for evaluation in self.cases(self.arms(rows), exact.entry)
+        )
+        return replace(worst_case(chain([exact], moved)), entry=exact.entry)
 
-    def _on_best_chain(self, arms: ArmArrays, scene: Scene, near: Array | None) -> Evaluation:
-        """Return the physics of N arms on their best chain of postures, or on that near postures (N, B, D)."""
-        if near is not None and scene.plan is not None:
-            candidates = postures_near(arms, scene.plan, near, self.device)
-            return evaluate_arrays(arms, scene, self.device, candidates=candidates)
+    def _on_best_chain(self, arms: ArmArrays, scene: Scene) -> Evaluation:
+        """Return the physics of N arms on their best chain of postures."""
 
         def judge(evaluation: Evaluation, _: IndexArray) -> Outcomes:
             values = [np.nan_to_num(c.violation(c.quantity.known(evaluation)[0])) for c in self.constraints]
             violations = np.reshape(values, (-1, len(evaluation))).T
-            return Outcomes(np.empty((len(evaluation), 0)), violations, postures=evaluation.entry_postures)
+            return Outcomes(np.empty((len(evaluation), 0)), violations, entry=evaluation.entry)
 
         first, best = best_chain(arms, scene, self.constraints, judge, self.device)
-        if best.postures is first.entry_postures or best.postures is None:
+        if best.entry is None or best.entry is first.entry:
             return first
-        return evaluate_arrays(arms, scene, self.device, candidates=best.postures[:, :, None])
+        return evaluate_arrays(arms, scene, self.device, candidates=best.entry[:, 0, :, None])
 
     @cached_property
     def _postures(self) -> int:

@@ -36,7 +36,6 @@ from armwright.problem.scene import Scene
 from armwright.proof.cycle_faults import motion_place
 from armwright.robot.arm import Arm
 from armwright.runs.history import History
-from armwright.spaces.parameters import Design
 from armwright.spaces.tolerance import TOLERANCE, length_columns, perturbed
 
 NOMINAL, MOVED, SUPPLY = "as designed", "base or a link 1 mm off", "90 % of the voltage"
@@ -91,10 +90,10 @@ class Changed:
     owners: NDArray[np.intp]  # (R,) index of the design that is changed, -1 if the row does not count
 
 
-def survival_of(problem: Problem, designs: Sequence[Design]) -> list[Survival]:
-    """Return the survival of designs of a task with constraints."""
-    matrix = problem.space.matrix(designs)
-    nominal = [problem.physics(matrix, case) for case in range(len(problem.scenes))]
+def survival_of(history: History, numbers: Sequence[int]) -> list[Survival]:
+    """Return the survival of designs, by trial number, of a task with constraints."""
+    problem, matrix = history.problem, history.matrix(numbers)
+    nominal = problem.cases(matrix, history.entry(numbers))
     return survivals(problem, nominal, load_changes(problem, matrix, nominal))
 
 
@@ -115,13 +114,13 @@ def load_changes(problem: Problem, matrix: Array, nominal: Sequence[Evaluation])
 
     matrix: (N, P) designs.  nominal: their evaluation in each case.
     """
-    space, near = problem.space, [evaluation.entry_postures for evaluation in nominal]
+    space, entry = problem.space, entry_of(nominal)
     names = [space.parameters[column].name for column in length_columns(space) for _ in "-+"]
     for index, (name, rows) in enumerate(zip(names, perturbed(space, matrix), strict=True)):
         owners = np.where(space.active(name, matrix), np.arange(len(matrix)), -1)
         arms = problem.arms(rows, nominal[0].arms.precision)
         text = f"{name} {'-+'[index % 2]}{1e3 * TOLERANCE:g} mm"
-        yield Changed(MOVED, [text], list(problem.cases(arms, near)), owners)
+        yield Changed(MOVED, [text], problem.cases(arms, entry), owners)
     if not problem.constraints:
         return
 
@@ -138,6 +137,12 @@ def load_changes(problem: Problem, matrix: Array, nominal: Sequence[Evaluation])
             shift = sign * OFF_CENTRE * np.eye(3)[axis]
             text = f"{'xyz'[axis]} {1e3 * sign * OFF_CENTRE:+g} mm"
             yield loaded(SHIFTED, text, [_shifted(scene, shift) for scene in problem.scenes])
+
+
+def entry_of(nominal: Sequence[Evaluation]) -> Array | None:
+    """Return (N, C, B, D) entries of designs (`Outcomes`) by their evaluation in each case; None without a cycle."""
+    entries = [evaluation.entry for evaluation in nominal if evaluation.entry is not None]
+    return np.concatenate(entries, axis=1) if entries else None
 
 
 def _shifted(scene: Scene, shift: Array) -> Scene:
@@ -219,17 +224,17 @@ def evaluate_survival(history: History, numbers: Sequence[int], known: Mapping[i
 
     known: The survival of designs without assumed values, as far as it is known.
     """
-    problem, designs = history.problem, [history.trials[number].design for number in numbers]
-    if not problem.constraints or not designs:
+    problem = history.problem
+    if not problem.constraints or not numbers:
         return {}
-    found = dict(known if known.keys() >= set(numbers) else zip(numbers, survival_of(problem, designs), strict=True))
+    found = dict(known if known.keys() >= set(numbers) else zip(numbers, survival_of(history, numbers), strict=True))
     owners, texts, arms = _with_assumed_values(history, numbers)
     if not arms:
         return {number: found[number] for number in numbers}
-    nominal = [problem.physics(designs, case) for case in range(len(problem.scenes))]
-    stacked = stack_arms(arms)
-    near = [None if q is None else q[owners, :, : stacked.dof] for q in (e.entry_postures for e in nominal)]
-    changed = Changed(ASSUMED, texts, list(problem.cases(stacked, near)), np.array(owners))
+    nominal = problem.cases(history.matrix(numbers), history.entry(numbers))
+    stacked, entry = stack_arms(arms), entry_of(nominal)
+    near = None if entry is None else entry[owners, ..., : stacked.dof]
+    changed = Changed(ASSUMED, texts, problem.cases(stacked, near), np.array(owners))
     assumed = _judged(problem, nominal, [changed])
     return {n: replace(found[n], assumed=own.get(ASSUMED)) for n, own in zip(numbers, assumed, strict=True)}
 

@@ -15,7 +15,6 @@ from armwright.problem.outcomes import Outcomes, worst_case
 from armwright.problem.problem import Problem
 from armwright.proof.perturbations import MOVED, Changed, Survival, load_changes, survival_of, survivals
 from armwright.runs.history import History
-from armwright.spaces.parameters import Design
 
 ALLOWED_SHARE = 0.05  # by which the worst case may exceed a value or the bound of a constraint
 ALLOWED_OF_REFERENCE = 0.005  # of the reference point's value; always allowed
@@ -37,9 +36,10 @@ def verify_front(history: History) -> Verification | None:
     """Verify the designs of the front; None without a reference point or front."""
     if history.reference_point is None or not history.front:
         return None
-    designs = [member.design for member in history.front]
+    numbers = [member.number for member in history.front]
     values = np.array([member.values for member in history.front])
-    return verify(history.problem, designs, values, history.reference_point)
+    entry = history.entry(numbers)
+    return verify(history.problem, history.matrix(numbers), values, history.reference_point, entry)
 
 
 def front_survival(history: History, verification: Verification | None) -> dict[int, Survival]:
@@ -50,21 +50,21 @@ def front_survival(history: History, verification: Verification | None) -> dict[
     problem, front = history.problem, history.front
     if not front or not problem.constraints or problem.evaluator is not None:
         return {}
-    designs = [member.design for member in front]
-    found = survival_of(problem, designs) if verification is None else verification.survival
-    return dict(zip((member.number for member in front), found, strict=True))
+    numbers = [member.number for member in front]
+    found = survival_of(history, numbers) if verification is None else verification.survival
+    return dict(zip(numbers, found, strict=True))
 
 
 def verify(
-    problem: Problem, designs: Sequence[Design], values: Array, reference_point: Sequence[float]
+    problem: Problem, matrix: Array, values: Array, reference_point: Sequence[float], entry: Array | None = None
 ) -> Verification:
     """Evaluate N designs again, and decide which are robust.
 
-    values: (N, M) objectives that the search found; reference_point: (M,) scale of the allowed differences.
+    matrix: (N, P) designs.  values: (N, M) objectives that the search found.  reference_point: (M,) scale of the
+    allowed differences.  entry: (N, C, B, D) postures that the search found (`Outcomes`); None to choose them anew.
     """
     problem = replace(problem, device="cpu")
-    matrix = problem.space.matrix(designs)
-    evaluations = list(problem.cases(problem.arms(matrix, "float64")))
+    evaluations = problem.cases(problem.arms(matrix, "float64"), entry)
     exact = worst_case(map(problem.outcomes, evaluations))
     copies: list[Outcomes] = []
 

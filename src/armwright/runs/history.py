@@ -191,8 +191,17 @@ class History:
         return np.array([[(*q, *[0.0] * (width - len(q))) for q in angles] for angles in rows])
 
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
-        """Evaluate the designs of these trials again; the result is equal to the bit."""
-        return self.problem.physics([self.trials[number].design for number in numbers])
+        """Evaluate the designs of these trials again in the first case; the result is equal to the bit."""
+        return self.problem.physics(self.matrix(numbers), entry=self.entry(numbers))
+
+    def matrix(self, numbers: Sequence[int]) -> Array:
+        """Return the (n, P) matrix of the designs of these trials."""
+        return self.problem.space.matrix([self.trials[number].design for number in numbers])
+
+    def entry(self, numbers: Sequence[int]) -> Array | None:
+        """Return (n, C, B, D) postures of designs as in `Outcomes`; None if those of a design are not known."""
+        rows = [self.trials[number].entry for number in numbers]
+        return np.array(rows, dtype=np.float32).astype(np.float64) if all(rows) else None  # digits of float32
 
 
 def found_reference_point(values: Array, violations: Array) -> tuple[float, ...]:

@@ -16,6 +16,7 @@ from armwright.files import replace_surrogates
 from armwright.pareto import PENALTY
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Objective
+from armwright.problem.outcomes import Outcome
 from armwright.runs.config import RunConfig
 from armwright.spaces.parameters import Design, ParameterValue
 
@@ -27,6 +28,7 @@ Count = Annotated[int, Field(ge=0, lt=2**63)]
 _Objectives = tuple[Annotated[float, Field(ge=-LARGEST_OBJECTIVE, le=LARGEST_OBJECTIVE)], ...]
 _Violations = tuple[Annotated[float, Field(ge=-PENALTY, le=PENALTY)], ...]
 _Angles = tuple[tuple[Annotated[float, Field(ge=-LONGEST, le=LONGEST)], ...], ...]
+_Entry = tuple[_Angles, ...]
 _Seconds = Mapping[str, Annotated[float, Field(ge=-LONGEST, le=LONGEST)]]
 
 _PARAMS: TypeAdapter[dict[str, ParameterValue]] = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True))
@@ -76,10 +78,16 @@ class FinishedTrial:
     seconds: _Seconds = field(default_factory=dict[str, float])  # wall time: total, proposing, sampling, evaluation
     # Attributes that the sampler set on its trial and study, needed to resume
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
-    q: _Angles = ()  # joint angles [rad] or strokes [m] at each target, as the design was evaluated
+    q: _Angles = ()  # postures as in `Outcome`
+    entry: _Entry = ()
     violations: _Violations = ()  # of each constraint; satisfied at <= 0
     failure: Failure | None = None  # why the custom evaluator gave no values, which makes the design infeasible
     screened: ScreenedOut | None = None  # proposal replaced by this design, as the surrogate expected little of it
+
+    @property
+    def outcome(self) -> Outcome:
+        """What its evaluation found."""
+        return Outcome(self.values, self.violations, self.failure, self.q, self.entry)
 
     @property
     def answer(self) -> str | None:
@@ -132,6 +140,14 @@ def parse_trial(line: bytes, number: int, config: RunConfig) -> FinishedTrial:
             raise ValueError(f"expected {len(expected)} {name}, found {len(found)}")
     if trial.q and (len(trial.q) != len(config.task.target_positions) or len(set(map(len, trial.q))) > 1):
         raise ValueError(f"q: expected as many angles for each of {len(config.task.target_positions)} targets")
+    if trial.entry:
+        scenes = config.problem.scenes
+        blocks = 0 if scenes[0].plan is None else len(scenes[0].plan.blocks)
+        lengths = {len(q) for case in trial.entry for q in case}
+        if [*map(len, trial.entry)] != [blocks] * len(scenes) or lengths != {len(q) for q in trial.q}:
+            raise ValueError(
+                f"entry: expected as many angles for each of {blocks} blocks in each of {len(scenes)} cases"
+            )
     if trial.number != number:
         raise ValueError(f"expected trial number {number}, found {trial.number}")
     if trial.failure is not None:

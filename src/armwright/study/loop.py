@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from armwright.exceptions import ModelError, StoppedError
-from armwright.problem.outcomes import Outcome
 from armwright.problem.problem import Problem
 from armwright.proof.results import complete_summary, discard_results, summarize, write_results
 from armwright.proof.verification import verify_front
@@ -202,7 +201,7 @@ class Study:
         pending.trial = replace(trial, duplicate_of=first)
         known = self._pending[first].trial if first in self._pending else self._record.trials[first]
         if known.values:
-            self._tell(pending, Evaluated(Outcome(known.values, known.violations, known.failure, known.q), 0.0))
+            self._tell(pending, Evaluated(known.outcome, 0.0))
 
     def _screened(self, slot: ProposalSlot | None, number: int) -> ProposalSlot | None:
         """Return a slot without its proposal if the surrogate expects too little of it; else the slot."""
@@ -251,10 +250,7 @@ class Study:
         }
         pending.trial = replace(
             pending.trial,
-            values=outcome.values,
-            violations=outcome.violations,
-            failure=outcome.failure,
-            q=outcome.q,
+            **vars(outcome),
             sampler_notes=notes,
             seconds={part: round(value, 6) for part, value in seconds.items()},
         )

@@ -38,7 +38,9 @@ BLOCKED = 1e3  # cost in seconds or radians of a chain that is off by its tolera
 class ChosenPostures:
     """What N arms take at the first pose of each of B blocks."""
 
-    entry: Array  # (N, B, D) the postures
+    candidate: Array  # (N, B, D) the candidates that were chosen
+    entry: Array  # (N, B, D) the postures from which lines are followed: the same, but of a loop, where it closes
+    cost: Array  # (N,) of the chain, collisions included
     step_ratios: Array
     """(N, 2) the largest step of coarse samples relative to the allowed one, along lines and along joint motions."""
     hopeless: NDArray[np.bool_]  # (N,) True if the path is so far off that more samples cannot mend it
@@ -58,11 +60,12 @@ def choose_postures(
 
     payload: its mass when carried [kg].
     """
-    samples = plan.sample()
-    lines = follow_lines(arms, samples, entry, device)
+    samples, begin = plan.sample(), entry
+    lines = follow_lines(arms, samples, begin, device)
     starts, ends = lines.ends(samples)
     for _ in range(LOOPS if plan.is_loop else 0):
-        lines = follow_lines(arms, samples, ends, device)
+        begin = ends
+        lines = follow_lines(arms, samples, begin, device)
         starts, ends = lines.ends(samples)
     speed = _speeds(arms)
     blocks = np.nan_to_num(_block_costs(arms, lines, samples, speed), nan=SPENT, posinf=SPENT)
@@ -85,11 +88,19 @@ def choose_postures(
     joint_motion = np.arange(len(plan.joint_motions))
     taken = (arm, joint_motion, choice[:, joint_motion], choice[:, (joint_motion + 1) % len(plan.blocks)])
     turn = change[taken]
-    blocked = (block_costs[arm, block, choice] >= BLOCKED).any(axis=1) | (edge_costs[taken] >= BLOCKED).any(axis=1)
+    costs = np.concatenate([block_costs[arm, block, choice], edge_costs[taken]], axis=1)
     allowed = np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
     ratios = [(part / allowed).max(axis=(1, 2), initial=0.0) for part in (steps, turn / JOINT_STEPS)]
     hopeless = blocks[arm, block, choice].max(axis=1) > HOPELESS * BLOCKED
-    return ChosenPostures(starts[arm, block, choice], np.stack(ratios, axis=1), hopeless, branches, blocked)
+    return ChosenPostures(
+        entry[arm, block, choice],
+        begin[arm, block, choice],
+        costs.sum(axis=1),
+        np.stack(ratios, axis=1),
+        hopeless,
+        branches,
+        blocked=np.any(costs >= BLOCKED, axis=1),
+    )
 
 
 def _static_loads(arms: ArmArrays, plan: CyclePlan, q: Array, payload: float, device: Device) -> Array:

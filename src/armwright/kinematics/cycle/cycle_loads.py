@@ -20,6 +20,7 @@ from armwright.kinematics.arms.bearings import bearing_offsets
 from armwright.kinematics.chunks import SAMPLES
 from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
 from armwright.kinematics.cycle.drive_limits import MotionLoad, least_time, motion_load
+from armwright.kinematics.cycle.instants import Instants
 from armwright.kinematics.cycle.torque_terms import TorqueTerms
 from armwright.kinematics.devices import Device, load_kernels
 from armwright.tasks.motions import CyclePlan
@@ -34,7 +35,7 @@ BETWEEN = 16  # times as many instants of a sharp path, of which the largest val
 
 @dataclass(frozen=True)
 class CycleLoads:
-    """N arms along the M motions of a cycle, at F instants of each, equally spaced in time.
+    """N arms along the M motions of a cycle, at F instants of each.
 
     Of sharp paths (`CycleGroup`), the largest values around each instant are kept.
     """
@@ -44,6 +45,7 @@ class CycleLoads:
     torques: Array  # (N, M, F, D) torques of the drives that count against their limits [N m], or forces [N]
     speeds: Array  # (N, M, F, D) joint speeds [rad/s] or [m/s]
     holding: Array  # (N, M, D) torques at rest after each motion [N m], or forces [N]
+    weights: Array  # (F,) of the instants in a mean over a motion
 
     @property
     def cycle_time(self) -> Array:
@@ -57,19 +59,17 @@ class CycleLoads:
 
     def mean(self, moving: Array, resting: Array) -> Array:
         """Return the (N, ...) means over the cycle of (N, M, F, ...) values in motion and (N, M, ...) after motions."""
-        weights = np.full(moving.shape[2], 1.0 / (moving.shape[2] - 1))
-        weights[[0, -1]] /= 2.0
-        total = np.einsum("nm,f,nmf...->n...", self.durations, weights, moving)
+        total = np.einsum("nm,f,nmf...->n...", self.durations, self.weights, moving)
         total += np.einsum("m,nm...->n...", self.dwells, resting)
         return (total.T / self.cycle_time).T
 
 
 def holding_torques(paths: CyclePaths, terms: Sequence[TorqueTerms]) -> Array:
     """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
-    torques = np.empty((len(paths.jumps), len(paths.plan.motions), paths.instants, paths.groups[0].arms.dof))
+    torques = np.empty((len(paths.jumps), len(paths.plan.motions), len(paths.instants), paths.groups[0].arms.dof))
     for group, own in zip(paths.groups, terms, strict=True):
         density = _density(group)
-        gravity = _at_instants(own.torques[:, :, 0], group.counts, density * (paths.instants - 1) + 1)
+        gravity = _at_instants(own.torques[:, :, 0], group.counts, paths.instants.times(density))
         torques[group.index] = _thinned(gravity, density)
     return torques
 
@@ -87,11 +87,11 @@ def cycle_loads(
     plan, n = paths.plan, len(paths.jumps)
     m, dof = len(plan.motions), paths.groups[0].arms.dof
     durations, holding = np.empty((n, m)), np.empty((n, m, dof))
-    torques, speeds = np.empty((2, n, m, paths.instants, dof))
+    torques, speeds = np.empty((2, n, m, len(paths.instants), dof))
     for group, own in zip(paths.groups, terms, strict=True):
         density, gravity = _density(group), own.torques[:, :, 0]
-        instants = density * (paths.instants - 1) + 1
-        size = max(1, 4 * SAMPLES[device] // (m * instants))
+        instants = paths.instants.times(density)
+        size = max(1, 4 * SAMPLES[device] // (m * len(instants)))
         for rows in (slice(at, at + size) for at in range(0, len(group.index), size)):
             index, arms = group.index[rows], group.arms[rows]
             load, heavier = _loads(own[rows], arms, group.counts, instants)
@@ -102,7 +102,7 @@ def cycle_loads(
         holding[group.index] = gravity[:, np.cumsum(group.counts) % gravity.shape[1]]  # as the next motion begins
         if not plan.cycle.closed:
             holding[group.index, -1] = gravity[:, -1]
-    return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding)
+    return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding, np.array(paths.instants.weight))
 
 
 def cycle_bearing_loads(
@@ -115,7 +115,7 @@ def cycle_bearing_loads(
     loaded = load_kernels("cycle.dynamics_kernels", device)
     largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
     for group, own in zip(paths.groups, terms, strict=True):
-        moments = _instants(group.counts, _density(group) * (paths.instants - 1) + 1)
+        moments = _at(group.counts, paths.instants.times(_density(group)))
         joints, found = (group.arms.motion, bearing_offsets(group.arms)), np.empty_like(largest[group.index])
         given = (*moments, durations[group.index], *joints, own.wrenches)
         loaded.launch("bearing_loads", found.shape[:2], *given, outputs=[found])
@@ -142,12 +142,12 @@ def _thinned(values: Array, density: int) -> Array:
     return np.concatenate([values[..., :1, :], between, values[..., -1:, :]], axis=-2)
 
 
-def _loads(terms: TorqueTerms, arms: ArmArrays, counts: Counts, instants: int) -> tuple[MotionLoad, MotionLoad]:
+def _loads(terms: TorqueTerms, arms: ArmArrays, counts: Counts, instants: Instants) -> tuple[MotionLoad, MotionLoad]:
     """Return the loads of all motions as they are and with a heavier payload.
 
     The drives' own inertia and friction count where they are known.
     """
-    _, _, s_t, s_tt = _instants(counts, instants)
+    _, _, s_t, s_tt = _at(counts, instants)
     rate, change = s_t[:, None], s_tt[:, None]
     torques, states = (_at_instants(each, counts, instants) for each in (terms.torques, terms.states))
     gravity, drag, push, *payload = np.ascontiguousarray(np.moveaxis(torques, 3, 0))
@@ -172,20 +172,20 @@ def quintic(t: Array) -> tuple[Array, Array, Array]:
     return s, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
 
 
-def _at_instants(values: Array, counts: Counts, instants: int) -> Array:
+def _at_instants(values: Array, counts: Counts, instants: Instants) -> Array:
     """Return (N, M, F, ...) of values at the samples of all motions (N, R, ...), interpolated at F instants of each."""
-    before, share, _, _ = _instants(counts, instants)
+    before, share, _, _ = _at(counts, instants)
     share = share.reshape(*share.shape, *(1,) * (values.ndim - 2))
     return (1.0 - share) * values[:, before] + share * values[:, before + 1]
 
 
 @cache
-def _instants(counts: Counts, instants: int) -> tuple[NDArray[np.int32], Array, Array, Array]:
+def _at(counts: Counts, instants: Instants) -> tuple[NDArray[np.int32], Array, Array, Array]:
     """Return the sample before each of F instants of M motions, the share of the way to the next (M, F), s_τ and s_ττ.
 
     counts: Samples of each motion, equally spaced in s.
     """
-    s, rate, change = quintic(np.linspace(0.0, 1.0, instants))
+    s, rate, change = quintic(np.array(instants.time))
     steps = np.array(counts)[:, None] - 1
     before = np.minimum((s * steps).astype(np.int32), steps - 1)
     return before + np.cumsum([[0], *steps[:-1] + 1], axis=0, dtype=np.int32), s * steps - before, rate, change

@@ -19,6 +19,7 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_choice import CLOSED, JOINT_STEPS, MAX_SLIDE, MAX_STEP, ON_LIMIT, choose_postures
 from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
+from armwright.kinematics.cycle.instants import EQUAL, FEW, Instants
 from armwright.kinematics.cycle.line_following import IndexArray, follow_lines, tool_errors
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device
@@ -29,10 +30,9 @@ from armwright.tasks.tip_rules import joined_rules
 MAX_REFINEMENT = 64  # of the samples
 SHARP = 4.0  # times the mean step of a line that makes its largest one a peak
 REDUCED = 0.75  # a step that twice the samples leave above this share of it is a jump
-INSTANTS = 33  # of a motion, equally spaced in time, at which its loads are evaluated
 NEAR = 0.03  # [m] clearance at samples of a joint motion, below which bodies may touch between them
 ZOOMS, BETWEEN = 3, np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # rounds of a search there; its places in quarter steps
-ROUGH, ROUGH_INSTANTS = 0.25, 5  # refinement and instants of a rough path
+ROUGH = 0.25  # refinement of a rough path
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,8 @@ class CyclePaths:
     """N arms along the M motions of a cycle."""
 
     plan: CyclePlan  # the cycle
-    entry: Array  # (N, B, D) posture at the first pose of each block
+    entry: Array
+    """(N, B, D) the candidate at the first pose of each block, from which the same paths are found again."""
     groups: tuple[CycleGroup, ...]  # the joint paths
     path_error: Array  # (N, M) largest distance of the tip from the line [m]; 0 for joint motions
     path_angle: Array  # (N, M) largest angle of the tool from its direction along the line [rad]
@@ -68,8 +69,7 @@ class CyclePaths:
     worst: Array  # (N, M, 3) share of the motion at which path error, angle and clearance are worst
     branches: IndexArray | None = None  # (N, B) as in `ChosenPostures`; None for rough paths
     candidates: Array | None = None  # (N, B, K, D) postures at the first pose of each block that were to choose from
-    instants: int = INSTANTS
-    """F, the number of instants of a motion, equally spaced in time, at which its loads are evaluated."""
+    instants: Instants = EQUAL  # of each motion, at which its loads are evaluated
 
     def of_arm(self, row: int) -> tuple[ArmArrays, tuple[MotionPath, ...]]:
         """Return an arm, as one of one, and its path along each motion."""
@@ -133,7 +133,7 @@ def find_paths(
                 groups.append(CycleGroup(index[rows], part[rows], found, kind))
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
-    found = _measure(arms, plan, entry, groups, jumps, obstacles, device)
+    found = _measure(arms, plan, chosen.candidate, groups, jumps, obstacles, device)
     return replace(found, branches=chosen.branches, candidates=postures)
 
 
@@ -150,7 +150,7 @@ def rough_paths(
     paths = _follow(arms, plan, entry, ROUGH, device)
     group = CycleGroup(np.arange(len(arms)), arms, paths, is_sharp=False)
     jumps = np.zeros((len(arms), len(paths)), dtype=bool)
-    return replace(_measure(arms, plan, entry, [group], jumps, obstacles, device, between=1), instants=ROUGH_INSTANTS)
+    return replace(_measure(arms, plan, entry, [group], jumps, obstacles, device, between=1), instants=FEW)
 
 
 def _refined(refinement: IndexArray, ratio: Array) -> IndexArray:

@@ -14,7 +14,7 @@ from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_choice import cost_of
 from armwright.kinematics.devices import Device, load_kernels
-from armwright.kinematics.ik.ik import UPDATES, solve_postures
+from armwright.kinematics.ik.ik import solve_postures
 from armwright.tasks.motions import CyclePlan, Poses
 from armwright.tasks.obstacles import Obstacle
 
@@ -68,12 +68,6 @@ def entry_postures(
     room = np.where((arms.motion == FIXED)[:, None, None], 1.0, room).min(axis=-1)
     q = _branches(arms, q, np.where(unfit, np.inf, cost_of(off - 1.0) - room), candidates, candidates, APART, device)
     return q[:, :, : (~np.isnan(q[..., 0])).sum(axis=2).max()]
-
-
-def postures_near(arms: ArmArrays, plan: CyclePlan, near: Array, device: Device = "cpu") -> Array:
-    """Return (N, B, 1, D) postures at the first pose of each block, solved from postures of similar arms (N, B, D)."""
-    poses = plan.poses[[block.entry for block in plan.blocks]]
-    return _solve(arms, poses, near[:, :, None], UPDATES, device)[0]
 
 
 def _solve(arms: ArmArrays, poses: Poses, start: Array, updates: int, device: Device) -> tuple[Array, Array]:

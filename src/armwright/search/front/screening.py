@@ -55,7 +55,7 @@ class Screen:
         self._reference_point = reference_point
         self._encoding = DesignEncoding(parameters)
         self._matrix = np.empty((0, len(parameters)))
-        self._postures = np.empty((0, len(plan.blocks), dof))
+        self._postures = np.empty((0, len(problem.scenes), len(plan.blocks), dof))
         self._feasible = np.empty(0, dtype=bool)
         self._front = np.empty((0, len(problem.objectives)))
         self._near_matrix: Array = np.empty((0, len(parameters)))
@@ -78,10 +78,10 @@ class Screen:
 
     def learn(self, matrix: Array, outcomes: Outcomes) -> None:
         """Remember evaluated designs (N, P) and their outcomes."""
-        assert outcomes.postures is not None
+        assert outcomes.entry is not None
         feasible = feasible_mask(outcomes.violations)
         self._matrix = np.vstack([self._matrix, matrix])[-REMEMBERED:]
-        self._postures = np.concatenate([self._postures, outcomes.postures])[-REMEMBERED:]
+        self._postures = np.concatenate([self._postures, outcomes.entry])[-REMEMBERED:]
         self._feasible = np.concatenate([self._feasible, feasible])[-REMEMBERED:]
         values = np.vstack([self._front, outcomes.values[feasible]])
         self._front = values[front_mask(values)]
@@ -138,7 +138,7 @@ class Screen:
         return np.concatenate([best, others[:n_near]]), others[n_near:]
 
     def _postures_near(self, matrix: Array) -> Array:
-        """Return (N, B, D) postures of the nearest remembered designs with the same joints, feasible ones if any.
+        """Return (N, C, B, D) postures of the nearest remembered designs with the same joints, feasible ones if any.
 
         Without any, they are those of a straight arm.
         """

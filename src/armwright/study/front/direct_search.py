@@ -4,6 +4,7 @@ import io
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -128,7 +129,7 @@ class DirectSearch:
         return self.folder is not None and self.plan.budget.seconds is not None
 
     def _verify(self, matrix: Array, values: Array) -> None:
-        verify(self.problem, self.problem.space.designs(matrix), values, self.survey.best_point())
+        verify(self.problem, matrix, values, self.survey.best_point())
 
     def _end_reason(self, stop_at_stall: bool) -> str:
         """Return why the search ends; empty if it goes on."""
@@ -315,7 +316,7 @@ class DirectSearch:
         values = outcomes.values if self.problem.constraints else front.values  # penalised with constraints
         designs = self.problem.space.designs(front.matrix)
         trials = [
-            FinishedTrial(n, FRONT_SEARCH, design, tuple(row), violations=outcome.violations, q=outcome.q)
+            FinishedTrial(n, FRONT_SEARCH, design, **vars(replace(outcome, values=tuple(row))))
             for n, (design, row, outcome) in enumerate(zip(designs, values.tolist(), outcomes, strict=True))
         ]
         return trials, front.found

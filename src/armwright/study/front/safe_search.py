@@ -37,9 +37,7 @@ def find_safe_design(
         children = offspring(pool, np.zeros(len(pool), dtype=np.int64), encoding, CHILDREN, rng)
         for design, one in zip(problem.space.designs(children), problem.evaluate(children), strict=True):
             if max(one.violations) <= 0.0:
-                trials.append(
-                    FinishedTrial(len(trials), FRONT_SEARCH, design, one.values, violations=one.violations, q=one.q)
-                )
+                trials.append(FinishedTrial(len(trials), FRONT_SEARCH, design, **vars(one)))
         longest = max(longest, time.monotonic() - started)
     found = History(problem, trials, 0, history.frozen_reference_point)
     numbers = [number for number, one in survival.items() if one.holds] + [*range(len(history), len(trials))]
@@ -48,7 +46,7 @@ def find_safe_design(
         started, some = time.monotonic(), order[first : first + AT_ONCE]
         if left() < longest:
             break
-        for number, one in zip(some, survival_of(problem, [trials[n].design for n in some]), strict=True):
+        for number, one in zip(some, survival_of(found, some), strict=True):
             if one.holds:
                 return replace(trials[number], number=len(history)), one
         longest = max(longest, time.monotonic() - started)
