@@ -17,11 +17,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armwright import DesignSpace, History, Problem, Task, load_task, paper_space
+from armwright.arrays import Array
+from armwright.llm import feedback
 from armwright.llm.answer import answer_schema
 from armwright.llm.feedback import Feedback
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import MAX_TOKENS, design_prompt, estimated_tokens, parameters_prompt
 from armwright.llm.prompt_values import spread
+from armwright.problem.branches import Branches
 from armwright.runs.config import Method
 from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.parameters import exact
@@ -77,6 +80,17 @@ COVERING = Task.model_validate(
     }
 )
 DESIGNS = paper_space().sample(30, seed=9)
+
+
+@pytest.fixture(autouse=True)
+def branches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same on every machine, as all that a fixed problem says."""
+    way = "the best other way, with another branch in step 2, violates collision <= 0 (0.012 m)"
+
+    def fixed(problem: Problem, matrix: Array, _: Any) -> list[Branches]:
+        return [] if problem.task.cycle is None else [Branches([1, 2], [4, 2], [], None, way)] * len(matrix)
+
+    monkeypatch.setattr(feedback, "branches_of", fixed)
 
 
 def own(n: int, problem: FixedProblem = PAPER) -> History:

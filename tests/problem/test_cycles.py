@@ -7,6 +7,7 @@ import pytest
 
 from armwright.exceptions import SettingsError
 from armwright.problem.objectives import OBJECTIVES, QUANTITIES
+from armwright.problem.outcomes import worst_case
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.tolerance import TOLERANCE, perturbed
@@ -170,3 +171,16 @@ def test_robust_values_are_the_worst_of_copies_that_keep_the_postures_of_the_arm
     found = robust.evaluate(rows)
     assert np.array_equal(found.values, np.max([one.values for one in outcomes], axis=0))
     assert np.array_equal(found.violations, np.max([one.violations for one in outcomes], axis=0))
+
+
+def test_stored_postures_give_the_same_results_to_the_bit() -> None:
+    """In each case of the task, also of arms that violate a constraint on the first chain; digits are those of runs."""
+    problem = Problem(task(payload_factors=[1.5]), DRIVEN)
+    rows = DRIVEN.matrix(DRIVEN.sample(4 * N, 0))
+    found = problem.evaluate(rows)
+    entry = np.array([outcome.entry for outcome in found], dtype=np.float32)
+    assert entry.shape == (4 * N, 2, 2, 5)
+    again = worst_case(map(problem.outcomes, problem.cases(rows, entry.astype(np.float64))))
+    assert np.array_equal(again.values, found.values)
+    assert np.array_equal(again.violations, found.violations)
+    assert np.array_equal(again.q, found.q)  # type: ignore[arg-type]

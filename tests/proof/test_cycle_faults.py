@@ -123,8 +123,8 @@ def test_via_point_is_not_made_up() -> None:
 def test_jumps_are_reported_by_step() -> None:
     evaluation = driven(SWEEP)
     evaluation.paths.jumps[0, 0] = True
-    choice = "postures to choose from where joint motions end: 4, 4"
-    assert describe_faults(evaluation, 0) == f"jump in step 2; {choice}"
+
+    assert describe_faults(evaluation, 0) == "jump in step 2"
     assert path_record(evaluation, 0)["path"]["jumps"] == [2]
 
 

@@ -10,6 +10,7 @@ import armwright as aw
 from armwright.arrays import Array
 from armwright.kinematics.cycle.cycle_loads import MIN_TIME, MORE_PAYLOAD, VOLTAGE_SHARE
 from armwright.problem.problem import Problem
+from armwright.proof.front_gap import known_front
 from armwright.proof.perturbations import (
     ASSUMED,
     HEAVIER,
@@ -21,9 +22,11 @@ from armwright.proof.perturbations import (
     Survival,
     evaluate_survival,
 )
+from armwright.proof.verification import front_survival, verify_front
 from armwright.robot.actuators import named_actuator, value_of
-from armwright.runs.history import History
-from armwright.spaces.design_space import paper_space
+from armwright.runs.history import FRONT_SEARCH, History
+from armwright.runs.trial import FinishedTrial
+from armwright.spaces.design_space import default_space, paper_space
 from armwright.spaces.tolerance import perturbed
 from armwright.tasks.task import Task
 from tests.proof.test_simulation import DESK, SPACE, Desk
@@ -141,6 +144,19 @@ def test_a_load_across_an_axis_beyond_what_the_maker_allows_names_joint_and_moti
     found = perturbation(survival_of(loaded), NOMINAL)
     assert (found.holds, found.reserve) == (False, pytest.approx(0.9, rel=STEADY))
     assert re.fullmatch(rf"reserve 0.90 \(load across the axis of joint {joint}, step \d.*\)", found.text)
+
+
+def test_feasible_designs_hold_as_designed() -> None:
+    """Verified in double precision, on the paths that the search found."""
+    problem = Problem(aw.load_task("dispensing"), default_space("dispensing"))
+    known = known_front(problem)
+    assert known is not None
+    pairs = zip(known.designs, problem.evaluate(known.designs), strict=True)
+    trials = [FinishedTrial(n, FRONT_SEARCH, design, **vars(outcome)) for n, (design, outcome) in enumerate(pairs)]
+    history = History(problem, trials, 0, known.reference_point)
+    survival = front_survival(history, verify_front(history))
+    assert len(survival) == len(history.front) > 1
+    assert all(perturbation(found, NOMINAL).holds for found in survival.values())
 
 
 def torque_and_speed(evaluation: Any) -> Array:

@@ -204,3 +204,12 @@ def test_a_lock_that_is_a_link_leaves_its_target_as_it_is(run: Path, tmp_path: P
         pass
     assert mode(target) == 0o644
     assert json.loads((run / "status.json").read_text(encoding="utf-8"))["doing"] == "finished"
+
+
+@pytest.mark.parametrize("entry", [[], [[[0.0]]], [[[0.0] * 5] * 2]])
+def test_postures_of_another_shape_are_damage(assembly: Path, tmp_path: Path, entry: Any) -> None:
+    copy = shutil.copytree(assembly, tmp_path / "run")
+    first, *others = (copy / "trials.jsonl").read_text().splitlines(keepends=True)
+    (copy / "trials.jsonl").write_text(json.dumps(json.loads(first) | {"entry": [*entry, []]}) + "\n" + "".join(others))
+    with pytest.raises(RunFolderError, match=r"line 1 is damaged .entry: expected as many angles for each of"):
+        read_run(copy)

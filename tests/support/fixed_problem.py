@@ -1,6 +1,6 @@
 """Problems evaluated by simple formulas, equal on every machine, and their histories."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,10 +28,10 @@ class FixedProblem(Problem):
     """The tip comes a part of the way to each target; joint j turns by j steps; torques fall from base to tip."""
 
     def physics(
-        self, designs: Sequence[Design] | Array | ArmArrays, case: int = 0, near: Array | None = None
+        self, designs: Sequence[Design] | Array | ArmArrays, case: int = 0, entry: Array | None = None
     ) -> Evaluation:
         if case > 0 or isinstance(designs, ArmArrays):
-            return super().physics(designs, case, near)
+            return super().physics(designs, case, entry)
         rows = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
         targets = self.task.target_positions
         built = self.space.designs(rows)
@@ -66,8 +66,8 @@ class FixedProblem(Problem):
         vars(evaluation)["workspace_error"] = np.maximum(0.0, ways - reach[:, None])
         return evaluation
 
-    def _variants(self, matrix: Array, measured: Mapping[str, Array]) -> Iterator[Outcomes]:
-        yield self.outcomes(self.physics(matrix), measured)
+    def _worst_case(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:
+        return self.outcomes(self.physics(matrix), measured)
 
 
 def _fixed_paths(evaluation: Evaluation, plan: CyclePlan) -> CyclePaths:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armwright.llm.answer import MAX_REASON_LENGTH
 from armwright.llm.answer_format import NOTHING, SINGLE, module_lists
+from armwright.problem.branches import branches_of
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import AT_LIMIT, unreached_reason
 from armwright.proof.attribution import hypervolume_gains
@@ -86,6 +87,8 @@ class Feedback:
         self.digits = Digits.of(history)
         if self._rows:
             self._evaluation = history.evaluation(list(self._rows))
+            entry = history.entry(list(self._rows))
+            self._branches = branches_of(history.problem, history.matrix(list(self._rows)), entry)
             shares = [o.shares(self._evaluation) for o in history.problem.objectives if o.is_of_targets]
             shape = (*self._evaluation.position_error.shape, 0)
             self._each = np.stack(shares, axis=-1) if shares else np.empty(shape)  # (n, T, objectives with shares)
@@ -107,6 +110,7 @@ class Feedback:
             "q_ik": points(evaluation.q[row, shown, : len(joints)], at.length),
             "tau_ik": points(evaluation.motor_torques[row, shown, : len(joints)], at.torque),
             "limits": _limits(evaluation, row, joints),
+            "branches": str(self._branches[row]) if self._branches else "",
             "load": _load(evaluation.motor_torques[row], joints),
             "e_all": _objectives(self._history.trials[number], at),
             "violated": _violated(self._history, number),

@@ -87,16 +87,12 @@ def jumping_steps(paths: CyclePaths, row: int) -> list[int]:
 
 
 def path_record(evaluation: Evaluation, row: int) -> dict[str, Any]:
-    """Return `path` for JSON: where an arm is worst along its cycle, where it jumps, and how many postures it has.
-
-    branches: postures to choose from at the first pose of each block. Empty without a cycle.
-    """
+    """Return `path` for JSON: where an arm is worst along its cycle, and where it jumps; empty without a cycle."""
     paths = evaluation.cycle_paths
     if paths is None:
         return {}
     extremes = {name: asdict(extreme) for name, extreme in path_extremes(paths, row).items()}
-    branches: list[int] = [] if paths.branches is None else paths.branches[row].tolist()
-    return {"path": {**extremes, "jumps": jumping_steps(paths, row), "branches": branches}}
+    return {"path": {**extremes, "jumps": jumping_steps(paths, row)}}
 
 
 def describe_path(path: Mapping[str, Extreme | list[int]] | None) -> str:
@@ -120,8 +116,6 @@ def describe_faults(evaluation: Evaluation, row: int) -> str:
         via, depth = _avoid(paths, row, evaluation.obstacles), -1e3 * clearance.value
         where = f"collision, {depth:.3g} mm deep" if depth > 0.0 else f"only {-depth:.2g} mm apart"
         faults.append(f"{where} ({clearance.place}): {via}")
-    if faults and paths.branches is not None:
-        faults.append(f"postures to choose from where joint motions end: {', '.join(map(str, paths.branches[row]))}")
     return "; ".join(faults)
 
 

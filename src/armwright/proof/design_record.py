@@ -9,6 +9,7 @@ designs/NNNN/trajectory.csv  with a cycle: its motion
 import json
 import shutil
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -21,6 +22,7 @@ from armwright.exceptions import UnknownQuantityError
 from armwright.files import MAX_DERIVED, read_text
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.problem.assumptions import assumed_values
+from armwright.problem.branches import branches_of
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.facts import VOLTAGE, Fact, Facts, alike, as_json, facts_of, reach_facts
 from armwright.problem.objectives import QUANTITIES
@@ -212,6 +214,8 @@ def _records(
             if number in recommended:
                 facts = {**reach_facts(reach_lines(arm, payload)[-1]), **facts}
                 extra["loads"] = _loads(arm, evaluation, row)
+                if branches := branches_of(history.problem, history.matrix([number]), history.entry([number])):
+                    extra["branches"] = asdict(branches[0])
             record = _record(history, number, arm, evaluation, row) | {"facts": as_json(facts), **extra}
             yield number, arm, evaluation, row, record
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from typing import Any, Self
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.pareto import total_violation
+from armwright.problem.branches import branches_of
 from armwright.problem.constraints import Constraint
 from armwright.proof.cycle_faults import describe_faults, path_record
 from armwright.runs.history import History
@@ -181,7 +182,7 @@ def feasibility_record(history: History, tally: ViolationTally | None = None) ->
 
     Returns:
         nearest: If no design is feasible, the one with the smallest violation, the quantities that constraints bound,
-            where along its cycle it is worst, and where it fails to follow it, in words.
+            where along its cycle it is worst, where it fails to follow it, in words, and its branches.
         conflict: If no design is feasible, the result of `conflict_record`.
     """
     constraints = history.problem.constraints
@@ -192,13 +193,15 @@ def feasibility_record(history: History, tally: ViolationTally | None = None) ->
     if not history.failed.all() and not history.feasible.any():
         (number,) = history.nearest(1)
         violations, evaluation = history.violations[number], history.evaluation([number])
+        branches = branches_of(history.problem, history.matrix([number]), history.entry([number]))
         measured = [constraint.measured(value) for constraint, value in zip(constraints, violations, strict=True)]
         nearest = {
             "number": number,
             "violation": float(total_violation(violations[None])[0]),
             "measured": dict(zip(names, measured, strict=True)),
             **path_record(evaluation, 0),
-            "faults": describe_faults(evaluation, 0),
+            "faults": "; ".join(filter(None, [describe_faults(evaluation, 0), *map(str, branches)])),
+            **({"branches": asdict(branches[0])} if branches else {}),
         }
         conflict = conflict_record(constraints, tally or ViolationTally.of(history.violations[~history.failed]))
     counts = (history.violations > 0.0).sum(axis=0).tolist()
