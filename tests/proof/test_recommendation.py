@@ -42,7 +42,7 @@ def test_a_finished_run_states_what_is_verified(run: Path) -> None:
     found = [one.pop("survival") for one in summary["recommended"]]
     assert summary["recommended"] == [
         {"role": role, "design": 0, "status": "verified", "demoted": [], "costs": ""}
-        for role in ("knee", "least peak_torque", "least length", "least price")
+        for role in ("knee", "least peak torque", "least length", "least price")
     ]
     assert [list(survival) for survival in found] == [["holds", "verdict", "perturbations", "assumed"]] * 4
     names = [one["name"] for one in found[0]["perturbations"]]
@@ -134,8 +134,8 @@ def history() -> History:
 
 def test_failing_designs_are_demoted_with_their_reason(history: History) -> None:
     order = candidates(history)
-    assert list(order) == ["knee", "least position_error", "least torque"]
-    for index, role in enumerate(("least position_error", "least torque")):
+    assert list(order) == ["knee", "least position error", "least torque"]
+    for index, role in enumerate(("least position error", "least torque")):
         assert history.values[order[role][0], index] == min(member.values[index] for member in history.front)
     knee, second = order["knee"][:2]
     chosen = {one.role: one for one in recommend(history, {}, cast("Simulator", Verdicts({knee})))}

@@ -104,7 +104,7 @@ def anisotropy(e: Evaluation) -> Array:
     return 1.0 - e.dexterity
 
 
-@quantity("m³", over="min", symbol="manipulability", bound_only=True)
+@quantity("m³", over="min", symbol="manipulability", more_is_better=True)
 def manipulability(e: Evaluation) -> Array:
     """The square root of det(J J^T) in the kept posture, with the position Jacobian J."""
     return e.manipulability
@@ -129,7 +129,7 @@ def clearance_shortfall(e: Evaluation) -> Array:
     return np.maximum(0.0, COMFORTABLE - e.clearance)
 
 
-@quantity("m", over="min", needs=("clearance", "motions"), symbol="clearance", bound_only=True)
+@quantity("m", over="min", needs=("clearance", "motions"), symbol="clearance", more_is_better=True)
 def clearance(e: Evaluation) -> Array:
     """How far the arm in the kept posture is from obstacles and from itself; below 0 it is in it, and 1 where there is
     nothing near.
@@ -137,13 +137,13 @@ def clearance(e: Evaluation) -> Array:
     return np.minimum(e.clearance, FAR)
 
 
-@quantity("m", over="min", needs=("clearance", "motions"), symbol="self_clearance", bound_only=True)
+@quantity("m", over="min", needs=("clearance", "motions"), symbol="self_clearance", more_is_better=True)
 def self_clearance(e: Evaluation) -> Array:
     """How far the arm in the kept posture is from itself; below 0 it is in it, and 1 where there is nothing near."""
     return np.minimum(e.self_clearance, FAR)
 
 
-@quantity("m", over="min", needs=("clearance", "motions"), symbol="obstacle_clearance", bound_only=True)
+@quantity("m", over="min", needs=("clearance", "motions"), symbol="obstacle_clearance", more_is_better=True)
 def obstacle_clearance(e: Evaluation) -> Array:
     """How far the arm in the kept posture is from obstacles; below 0 it is in it, and 1 where there is nothing near."""
     return np.minimum(e.obstacle_clearance, FAR)
@@ -210,7 +210,7 @@ def undexterous_fraction(e: Evaluation) -> Array:
     return 1.0 - e.dexterous_volume
 
 
-@quantity("fraction", over="arm", needs=("directions",), symbol="dexterous_volume", bound_only=True)
+@quantity("fraction", over="arm", needs=("directions",), symbol="dexterous_volume", more_is_better=True)
 def dexterous_volume(e: Evaluation) -> Array:
     """The share of the workspace's points at which the tool reaches the stated share of the directions asked for."""
     return e.dexterous_volume

@@ -48,7 +48,7 @@ def friction_error(e: Evaluation) -> Array:
     return tip_errors(e.arms, e.frames, friction / e.drives.position_gain[:, None])
 
 
-@quantity("kg", over="min", ratings=("peak",), symbol="payload_capacity", bound_only=True)
+@quantity("kg", over="min", ratings=("peak",), symbol="payload_capacity", more_is_better=True)
 def payload_capacity(e: Evaluation) -> Array:
     """The largest payload that all actuators hold in the kept posture, with the safety factor, and that tilts no joint
     beyond what the maker of its actuator allows, or beyond the strongest actuator's torque if none is stated.

@@ -93,7 +93,7 @@ def bearing_utilisation(e: Evaluation) -> Array:
     return np.nan_to_num(e.bearing_loads / bearing_limits(e.drives)[:, None]).max(axis=(-2, -1))
 
 
-@quantity("x load", over="arm", needs=("motions", "durations"), ratings=LIMITS, symbol="reserve", bound_only=True)
+@quantity("x load", over="arm", needs=("motions", "durations"), ratings=LIMITS, symbol="reserve", more_is_better=True)
 def reserve(e: Evaluation) -> Array:
     """How many times the torque, mean torque, speed or load across the axis that the cycle takes of any actuator its
     maker allows, without safety factor; below 1 it cannot. Without a cycle, what holds the arm at the targets.
@@ -121,7 +121,7 @@ def mean_current(e: Evaluation) -> Array:
     return e.supply.mean
 
 
-@quantity("voltages", over="arm", ratings=("voltage",), bound_only=True)
+@quantity("voltages", over="arm", ratings=("voltage",))
 def voltages(e: Evaluation) -> Array:
     """The least number of supplies that the voltages of the actuators allow."""
     voltage = np.sort(e.drives.voltage, axis=1)  # (N, J) [V]; 0 for fixed joints

@@ -47,7 +47,7 @@ class Objective:
     excess: Callable[[Evaluation], Array] | None = None
     needs: tuple[Need, ...] = ()
     ratings: tuple[str, ...] = ()  # of `Actuation` that every actuator has to state
-    bound_only: bool = False  # True if more of it is better, or if it only counts: constraints bound it
+    more_is_better: bool = False  # objectives minimise what is less then, so it is only bounded
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", self.label or self.name.replace("_", " ").capitalize())
@@ -150,7 +150,7 @@ def quantity(
     symbol: str = "",
     label: str = "",
     excess: Callable[[Evaluation], Array] | None = None,
-    bound_only: bool = False,
+    more_is_better: bool = False,
 ) -> Callable[[Callable[[Evaluation], Array]], Objective]:
     """Make an objective of the function of its values, with the name and the docstring of that function.
 
@@ -161,7 +161,7 @@ def quantity(
         text = " ".join((each.__doc__ or "").split()).rstrip(".")
         description = text[:1].lower() + text[1:]
         name = each.__name__
-        own = Objective(name, unit, description, each, over, label, symbol, excess, needs, ratings, bound_only)
+        own = Objective(name, unit, description, each, over, label, symbol, excess, needs, ratings, more_is_better)
         QUANTITIES[name] = own
         return own
 

@@ -76,8 +76,13 @@ def candidates(history: History) -> dict[str, list[int]]:
     if {price.name, deflection.name} <= set(known) and history.problem.task.cycle is not None:
         roles = [name for name in roles if name not in BY_DEFAULT]
     roles += [quantity.name for quantity in (price, deflection) if quantity.name in known]
-    ranked = {f"least {name}": np.argsort(known[name], kind="stable") for name in roles}
+    ranked = {least(name): np.argsort(known[name], kind="stable") for name in roles}
     return {"knee": numbers, **{role: [numbers[row] for row in rows] for role, rows in ranked.items()}}
+
+
+def least(name: str) -> str:
+    """Return the role of the design with the least of a quantity."""
+    return f"least {name.replace('_', ' ')}"
 
 
 def _known(history: History, numbers: Sequence[int]) -> dict[Objective, Array]:
@@ -131,8 +136,8 @@ def recommend(
     failing = unsafe_roles(history, survival)
     holding = cheapest_first(history, [number for number, one in survival.items() if one.holds])
     if failing and holding:
-        cost = price.name if f"least {price.name}" in roles else history.problem.objectives[0].name
-        on_front = {role: [n for n in roles[role] if n in holding and role != f"least {cost}"] for role in failing}
+        cost = price.name if least(price.name) in roles else history.problem.objectives[0].name
+        on_front = {role: [n for n in roles[role] if n in holding and role != least(cost)] for role in failing}
         roles = {role: numbers for role, numbers in (roles | on_front).items() if numbers} | {SAFE: holding}
     if history.problem.evaluator is not None:
         return [Recommendation(role, numbers[0], BY_EVALUATOR) for role, numbers in roles.items()]

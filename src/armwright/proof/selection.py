@@ -54,7 +54,7 @@ def pick(
     Args:
         history: The trials.
         where: Conditions. Quantities that the run did not evaluate are evaluated now, in the task's first case.
-        by: The quantity to sort by, smallest first.
+        by: The quantity to sort by, smallest first; largest first if more of it is better, as of `reserve`.
         numbers: The trials to select from, such as those that hold; None for all.
         facts: What is known of the designs by number; None to compute it if needed.
 
@@ -84,7 +84,8 @@ def pick(
     if not left:
         raise FailureError(_describe_unmet(where, list(quantities.values())))
     if by is not None:
-        return sorted(left, key=lambda member: quantities[member.number][by])
+        sign = -1.0 if by in QUANTITIES and QUANTITIES[by].more_is_better else 1.0
+        return sorted(left, key=lambda member: sign * quantities[member.number][by])
     return knee_first(history, left)
 
 

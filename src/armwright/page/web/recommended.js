@@ -6,7 +6,7 @@ import { listen, set, state } from "./state.js";
 import { $, element, millimetres, onTheme, plural, quantity, why } from "./format.js";
 
 const ROLES = {
-  knee: "Best compromise", safe: "Safe", "least price": "Cheapest", "least deflection": "Stiffest", "least cycle_time": "Fastest", "least mass": "Lightest",
+  knee: "Best compromise", safe: "Safe", "least price": "Cheapest", "least deflection": "Stiffest", "least cycle time": "Fastest", "least mass": "Lightest",
 };
 
 let content = null;
