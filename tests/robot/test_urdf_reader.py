@@ -225,6 +225,8 @@ REFUSED = {
     one_joint(inside='<axis xyz="0 1"/><limit lower="-1" upper="1"/>'): 'xyz: expected 3 finite numbers, got "0 1"',
     one_joint(inside='<axis xyz="0 1 1"/><limit lower="-1" upper="1"/>'): r"the axis \(0.000, 0.707, 0.707\)",
     one_joint(inside='<limit lower="${-pi}" upper="1"/>'): "is xacro, not URDF; try",
+    one_joint(more="<xacro:include filename='ur.xacro'/>"): "<xacro:include> is xacro, not URDF; try `xacro FILE",
+    one_joint().replace('<link name="b"/>', '<link name="b"><xacro:rod mass="4"/></link>'): "<xacro:rod> is xacro",
     one_joint().replace('<link name="b"/>', '<link name="b"><inertial><mass value="-1"/></inertial></link>'): "-1 kg",
     one_joint().replace(
         '<link name="b"/>', '<link name="b"><inertial/></link>'
@@ -242,6 +244,12 @@ def test_damaged_and_hostile_files_are_refused_in_one_line(file: Path, number: i
     assert "\n" not in str(refusal.value)
     assert str(file) in str(refusal.value)
     assert len(str(refusal.value)) < 500 + len(str(file))
+
+
+def test_unused_xacro_properties_are_ignored(file: Path) -> None:
+    """Old converters leave them behind, with all values in place."""
+    file.write_text(one_joint(more='<xacro:property name="pi" value="3.14"/>'), encoding="utf-8")
+    assert read_urdf(file).joints == ("j",)
 
 
 def test_missing_and_oversized_files_are_refused(file: Path) -> None:

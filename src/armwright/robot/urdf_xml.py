@@ -20,6 +20,7 @@ from armwright.rotations import rotation_from_rpy
 
 MAX_FILE = 4 * 1024 * 1024  # [bytes]; the largest of 60 common robots has 0.2 MB
 DEEPEST = 50  # nested elements; a URDF needs 6
+EXPAND = "is xacro, not URDF; try `xacro FILE > arm.urdf`"
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
@@ -108,6 +109,8 @@ def _parsed(data: bytes, where: str) -> ElementTree.Element:
         depth += 1
         if depth > DEEPEST:
             raise ArmError(f"{where} has more than {DEEPEST} nested elements; that is not a URDF")
+        if tag.startswith("xacro:") and tag != "xacro:property":
+            raise ArmError(f"{where}: <{_short(tag)}> {EXPAND}")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -192,7 +195,7 @@ def _pose(element: ElementTree.Element | None, of: str) -> Pose:
 def _numbers(element: ElementTree.Element | None, key: str, n: int, of: str) -> list[float]:
     text = "" if element is None else element.get(key, "")
     if "$" in text:
-        raise ArmError(f'{of}: {key} = "{_short(text)}" is xacro, not URDF; try `xacro FILE > arm.urdf`')
+        raise ArmError(f'{of}: {key} = "{_short(text)}" {EXPAND}')
     try:
         values = [float(part) for part in text.split()]
     except ValueError:
