@@ -7,7 +7,6 @@ the world by rotating that one.
 """
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,28 +16,28 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
 from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Vector
+from armwright.robot.arm_tip import find_tip
 from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document
 from armwright.rotations import rotation_about
 
 SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
 MAX_ANGLE = 2 * math.pi  # [rad]
+NAMED = 6  # joints that are left out and named
 RADIUS = 0.04  # [m], for drawings, if the file has no cylinder
-FINGERS = 2  # longest chain of joints of a branch that counts as a finger
-GRIPPER = re.compile("grip|jaw|finger", re.IGNORECASE)  # names of a last joint that belongs to a gripper
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfArm:
-    """An arm read from a URDF, with its base link at the world's origin."""
+    """An arm read from a URDF, with its base link at the world's origin, turned as it is under the root."""
 
     name: str  # of the robot
     arm: Arm
-    base_link: str
+    base_link: str  # the link whose origin is the world's
     tip: str  # the link whose origin is the tip
     joints: tuple[str, ...]  # names of the moving joints, from base to tip
     signs: tuple[float, ...]  # value q of a joint of the arm is signs * q + zeros in the URDF
     zeros: tuple[float, ...]  # value of each joint in the URDF at 0 of the arm [rad] or [m]
-    notes: tuple[str, ...] = ()  # choices, changes and missing data, as sentences for the user
+    notes: tuple[str, ...] = ()  # the tip, its joints and what is left out; choices, changes and missing data
 
     def values_in_urdf(self, q: Sequence[float] | Array) -> Array:
         """Return the values (..., J) of the URDF's joints for those of the arm (..., J) [rad] or [m]."""
@@ -55,7 +54,7 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
     Args:
         path: The URDF file.
         tip: The link whose origin should reach the targets; by default the last one before a gripper.
-        base_link: The link that is fixed to the ground; by default the root of the robot.
+        base_link: The link that is fixed to the ground, turned as under the root; by default the root of the robot.
 
     Raises:
         ArmError: If the file is not a URDF, or has no serial arm that can be computed.
@@ -63,7 +62,7 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
     document = read_document(Path(path))
     tree = _LinkTree(document, str(path))
     base = tree.root if base_link is None else tree.check_link(base_link, "base link")
-    last = tree.default_tip(base) if tip is None else tree.check_link(tip, "tip")
+    last = find_tip(base, list(tree.below(base)), str(path)) if tip is None else tree.check_link(tip, "tip")
     chain = tree.chain(base, last)
     moving = [joint for joint in chain if joint.kind != "fixed"]
     if not moving:
@@ -131,12 +130,17 @@ def _check_joint(joint: UrdfJoint, where: str) -> None:
 
 
 def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, moving: Sequence[UrdfJoint]) -> list[str]:
-    """Return the notes on the choice of a chain."""
-    notes = [] if tip is not None else [f'the tip is the link "{last}" (--tip names another)']
-    others = sum(joint.kind != "fixed" for joint in tree.below(base)) - len(moving)
-    if others:
-        notes.append(f"{others} {'other joint stays' if others == 1 else 'other joints stay'} at 0, such as fingers")
-    return notes
+    """Return the notes on the choice of a chain and how it is mounted."""
+    others = [joint.name for joint in tree.below(base) if joint.kind != "fixed" and joint not in moving]
+    more = f" and {len(others) - NAMED} more" if len(others) > NAMED else ""
+    left_out = f"; left out, at 0: {', '.join(others[:NAMED])}{more}" if others else ""
+    named = "" if tip is not None else " (--tip names another)"
+    joints = ", ".join(joint.name for joint in moving)
+    down = ", ".join(f"{value:.4g}" for value in (-tree.orientation(base)[2]).round(6) + 0.0)
+    return [
+        f'the tip is the link "{last}"{named}; joints from "{base}": {joints}{left_out}',
+        f'the axes of the world are those of "{tree.root}"; gravity points along ({down}) in the frame of "{base}"',
+    ]
 
 
 def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list[str]) -> Joint:
@@ -220,15 +224,6 @@ class _LinkTree:
         self.root = roots[0]
         if len(list(self.below(self.root))) < len(document.joints):
             raise ArmError(f"{where}: some joints form a cycle; expected a tree")
-        self._deepest: dict[str, int] = {}  # moving joints of the longest chain below each link
-        self._longest: dict[str, int] = {}  # links of the longest chain below each link
-        for joint in reversed(list(self.below(self.root))):
-            self._deepest[joint.parent] = max(self._deepest.get(joint.parent, 0), self._moving(joint))
-            self._longest[joint.parent] = max(self._longest.get(joint.parent, 0), 1 + self._longest.get(joint.child, 0))
-
-    def _moving(self, joint: UrdfJoint) -> int:
-        """Return the number of moving joints of the longest chain from this joint on."""
-        return joint.moves + self._deepest.get(joint.child, 0)
 
     def below(self, link: str) -> Iterator[UrdfJoint]:
         """Yield all joints beyond a link, parents first."""
@@ -258,35 +253,19 @@ class _LinkTree:
             link = self._parent[link].parent
         return chain[::-1]
 
-    def default_tip(self, base: str) -> str:
-        """Return the end of the only chain: the last link before a gripper, or before no joint moves any more.
-
-        From there it follows the longest chain of fixed joints.
-        """
-        link, moved = base, 0
-        while branches := [joint for joint in self._children[link] if self._moving(joint)]:
-            if moved and all(self._is_gripper(joint) for joint in branches):
-                break
-            if len(branches) > 1:
-                arms = [joint for joint in branches if self._moving(joint) > FINGERS]
-                if len(arms) > 1 or not (arms or moved):
-                    names = ", ".join(joint.child for joint in branches)
-                    raise ArmError(f'{self._where} branches at the link "{link}" to {names}; name the tip (--tip LINK)')
-                if not arms:
-                    break
-                branches = arms
-            link, moved = branches[0].child, moved + branches[0].moves
-        while fixed := [joint for joint in self._children[link] if not self._moving(joint) and joint.kind == "fixed"]:
-            link = max(fixed, key=lambda joint: self._longest.get(joint.child, 0)).child
-        return link
-
-    def _is_gripper(self, joint: UrdfJoint) -> bool:
-        """Return True if a last joint is named like those of grippers."""
-        return self._moving(joint) == 1 and GRIPPER.search(f"{joint.name} {joint.child}") is not None
+    def orientation(self, link: str) -> Array:
+        """Return the rotation (3, 3) of a link in the world, which is the root's frame, with all joints at 0."""
+        rotation = np.eye(3)
+        for joint in self.chain(self.root, link):
+            rotation = rotation @ joint.origin.rotation
+        return rotation
 
     def poses(self, base: str, values: Mapping[str, float]) -> dict[str, Pose]:
-        """Return the pose of every link in the base frame; values: joint angles by name [rad], by default 0."""
-        poses = {base: Pose(np.eye(3), np.zeros(3))}
+        """Return the pose of every link beyond the base, whose origin is that of the world.
+
+        values: joint angles by name [rad], by default 0.
+        """
+        poses = {base: Pose(self.orientation(base), np.zeros(3))}
         for joint in self.below(base):
             motion = Pose(rotation_about(joint.axis, values.get(joint.name, 0.0)), np.zeros(3))
             poses[joint.child] = poses[joint.parent] @ joint.origin @ motion
