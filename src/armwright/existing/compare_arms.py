@@ -251,7 +251,7 @@ def _compared(
 
 
 def _reach(problem: Problem, arm: Arm) -> Facts:
-    return reach_facts(reach_lines(arm, float(problem.task.payloads.max()))[-1])
+    return reach_facts(arm, reach_lines(arm, float(problem.task.payloads.max()))[-1])
 
 
 def _chosen_designs(history: History) -> Iterator[ComparedArm]:

@@ -79,6 +79,8 @@ def _arm(
     poses = tree.poses(base, zeros)
     bodies = tree.bodies(base, [joint.child for joint in moving])  # names of links, per body
     positions = [poses[joint.child].position for joint in moving] + [poses[tip].position]
+    moved = {joint.child for joint in tree.document.joints if joint.kind != "fixed"}
+    any_mass = any(tree.document.links[name].mass for body in bodies[1:] for name in body)
     joints: list[Joint] = []
     links: list[Link] = []
     signs: list[float] = []
@@ -95,14 +97,13 @@ def _arm(
         )
         com = moments / mass - positions[i] if mass > 0.0 else np.zeros(3)
         radius = max((link.radius for link in body if link.radius is not None), default=RADIUS)
-        links.append(Link(_vector(positions[i + 1] - positions[i]), mass, _vector(com), radius))
+        unknown = tuple(link.name for link in body if link.name in moved and not (link.has_mass and any_mass))
+        links.append(Link(_vector(positions[i + 1] - positions[i]), mass, _vector(com), radius, without_mass=unknown))
     if snapped > 1e-9:
         notes.append(f"axes are taken to lie along x, y or z; they are off by up to {snapped:.1g} rad")
     shifted = [f"{name} by {value:.4g} rad" for name, value in zeros.items() if value]
     if shifted:
         notes.append(f"zero is moved, so that all axes lie along x, y or z: {', '.join(shifted)}")
-    if not any(link.mass for link in links):
-        notes.append("no link states a mass; torques are those of the payload alone")
     if any(joint.actuator is None for joint in joints):
         notes.append("not every joint states an effort, so how much of it is used is not known")
     rotation = poses[tip].rotation
@@ -113,6 +114,8 @@ def _arm(
         tool=MountedTool(axis=_vector(rotation[:, 2]), side=_vector(rotation[:, 0])),
         base_mass=sum(tree.document.links[name].mass for name in bodies[0]),
     )
+    if arm.no_mass:
+        notes.append(f"{arm.no_mass}, so masses, torques and payloads are not known")
     names = tuple(joint.name for joint in moving)
     values = tuple(zeros[name] for name in names)
     return UrdfArm(tree.document.name, arm, base, tip, names, tuple(signs), values, tuple(notes))

@@ -40,9 +40,10 @@ class UrdfLink:
     """A link of a URDF."""
 
     name: str
-    mass: float  # [kg]
+    mass: float  # [kg]; 0 if not stated
     com: Array  # (3,) its centre of mass in the link frame [m]
     radius: float | None  # of its thickest cylinder [m]; None if it has none
+    has_mass: bool  # whether it states a mass
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +144,9 @@ def _link(element: ElementTree.Element, where: str) -> UrdfLink:
             raise ArmError(f"{of}: expected a mass of 0 kg or more, got {mass:g} kg")
         com = _pose(inertial.find("origin"), of).position
     shapes = [_numbers(shape, "radius", 1, of)[0] for shape in element.iter("cylinder")]
-    return UrdfLink(name, mass, com, max((radius for radius in shapes if radius > 0.0), default=None))
+    return UrdfLink(
+        name, mass, com, max((radius for radius in shapes if radius > 0.0), default=None), inertial is not None
+    )
 
 
 def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
