@@ -8,6 +8,7 @@ from armwright.exceptions import ArmError
 from armwright.robot.axes import AXES, Axis, Vector
 from armwright.robot.motor_body import ActuatorShape, MotorBody
 from armwright.robot.tubes import section_square
+from armwright.text import listed
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
 
@@ -257,7 +258,7 @@ class Arm:
     def no_mass(self) -> str:
         """Why its mass is not known; empty if it is."""
         names = [name for link in self.links for name in link.without_mass]
-        return f"no mass is stated for {', '.join(names)}" if names else ""
+        return f"no mass is stated for {listed(names)}" if names else ""
 
     @property
     def structure_price(self) -> float:

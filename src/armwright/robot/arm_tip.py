@@ -85,20 +85,17 @@ class _Tree:
         if self._beyond(joint) > 1 or joint.kind == "fixed":
             return False
         beside, beyond = self.frames[joint.parent], self.frames[joint.child]
-        lower, upper = joint.lower or 0.0, joint.upper or 0.0
-        across = len(before) >= FEWEST and abs(float(axis @ joint.axis)) < ACROSS and beyond[0] < 1
-        slides = joint.kind == "prismatic" and upper - lower <= STROKE
-        opens = joint.kind == "revolute" and min(-lower, upper) <= SHUT * (upper - lower) <= SHUT * OPENING
+        lower, upper, slides = joint.lower or 0.0, joint.upper or 0.0, joint.kind == "prismatic"
+        travel = math.inf if joint.kind == "continuous" else upper - lower
+        is_jaw = travel <= STROKE if slides else min(-lower, upper) <= SHUT * travel <= SHUT * OPENING
+        is_across = len(before) >= FEWEST and abs(float(axis @ joint.axis)) < ACROSS
         signs = {
             "its name": GRIPPER.search(_names(joint)) and not GRIPPER.search(_names(before[-1])),
-            "its motion": across and (slides or opens),
+            "its motion": is_jaw and is_across and beyond[0] < 1,
             "the finger beside it": any(one.mimics == joint.name for one in self._joints[joint.parent]),
             f'"{beside[2]}" beside it': min(beside[:2]) > 0,
         }
-        others = {
-            f'"{beyond[2]}" beyond it': beyond[0] > 0,
-            "its range": joint.kind == "continuous" or (joint.kind == "revolute" and upper - lower > WIDEST),
-        }
+        others = {f'"{beyond[2]}" beyond it': beyond[0] > 0, "its range": not slides and travel > WIDEST}
         gripper, arm = (" and ".join(sign for sign, holds in kind.items() if holds) for kind in (signs, others))
         if gripper and arm:
             raise ArmError(

@@ -17,12 +17,13 @@ from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
 from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Vector
 from armwright.robot.arm_tip import find_tip
+from armwright.robot.plausibility import implausible
 from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document
 from armwright.rotations import rotation_about
+from armwright.text import listed
 
 SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
 MAX_ANGLE = 2 * math.pi  # [rad]
-NAMED = 6  # joints that are left out and named
 RADIUS = 0.04  # [m], for drawings, if the file has no cylinder
 
 
@@ -116,6 +117,7 @@ def _arm(
     )
     if arm.no_mass:
         notes.append(f"{arm.no_mass}, so masses, torques and payloads are not known")
+    notes += implausible(arm, [[tree.document.links[name] for name in body] for body in bodies[1:]])
     names = tuple(joint.name for joint in moving)
     values = tuple(zeros[name] for name in names)
     return UrdfArm(tree.document.name, arm, base, tip, names, tuple(signs), values, tuple(notes))
@@ -135,8 +137,7 @@ def _check_joint(joint: UrdfJoint, where: str) -> None:
 def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, moving: Sequence[UrdfJoint]) -> list[str]:
     """Return the notes on the choice of a chain and how it is mounted."""
     others = [joint.name for joint in tree.below(base) if joint.kind != "fixed" and joint not in moving]
-    more = f" and {len(others) - NAMED} more" if len(others) > NAMED else ""
-    left_out = f"; left out, at 0: {', '.join(others[:NAMED])}{more}" if others else ""
+    left_out = f"; left out, at 0: {listed(others)}" if others else ""
     named = "" if tip is not None else " (--tip names another)"
     joints = ", ".join(joint.name for joint in moving)
     down = ", ".join(f"{value:.4g}" for value in (-tree.orientation(base)[2]).round(6) + 0.0)
@@ -222,7 +223,7 @@ class _LinkTree:
             self._children[joint.parent].append(joint)
         roots = [name for name in document.links if name not in self._parent]
         if len(roots) != 1:
-            names = ", ".join(roots[:5]) or "none: the joints form a cycle"
+            names = listed(roots) or "none: the joints form a cycle"
             raise ArmError(f"{where}: expected one root link, found {len(roots)} ({names})")
         self.root = roots[0]
         if len(list(self.below(self.root))) < len(document.joints):
