@@ -20,7 +20,7 @@ STROKE, OPENING, WIDEST = 0.1, 2.1, 1.5 * math.pi  # of a jaw that slides [m], t
 SHUT = 0.15  # of the range of a jaw that turns: 0 is at most that far from one of its limits
 ACROSS = 0.5  # largest cosine of the angle between the axes of a jaw and of the joint before it
 FEWEST = 3  # joints of an arm before a joint that is a jaw by its motion
-GRIPPER = re.compile(r"jaw|finger|( |_|joint)grip(per)?(_?joint)?\d*$", re.IGNORECASE)  # in names of its joints
+GRIPPER = re.compile(r"jaw|finger|( |_|joint)grip(per)?(_?joint)?\d*$", re.IGNORECASE)  # in names of link and joint
 FRAMES = re.compile(r"(^|_)(tool\d*|tcp|tip|eef?|end_effector|flange|frame)(_|$)", re.IGNORECASE)  # names of a tool's
 OTHERS = re.compile("jaw|finger|camera|optical|depth|imu|sensor", re.IGNORECASE)  # in names of other frames
 
@@ -89,8 +89,9 @@ class _Tree:
         travel = math.inf if joint.kind == "continuous" else upper - lower
         is_jaw = travel <= STROKE if slides else min(-lower, upper) <= SHUT * travel <= SHUT * OPENING
         is_across = len(before) >= FEWEST and abs(float(axis @ joint.axis)) < ACROSS
+        last, own = (GRIPPER.search(f"{one.child} {one.name}") for one in (before[-1], joint))
         signs = {
-            "its name": GRIPPER.search(_names(joint)) and not GRIPPER.search(_names(before[-1])),
+            "its name": own and not last,
             "its motion": is_jaw and is_across and beyond[0] < 1,
             "the finger beside it": any(one.mimics == joint.name for one in self._joints[joint.parent]),
             f'"{beside[2]}" beside it': min(beside[:2]) > 0,
@@ -103,7 +104,3 @@ class _Tree:
                 f"tip: --tip {self.frames[before[-1].child][2]} without this joint, --tip {beyond[2]} with it"
             )
         return bool(gripper)
-
-
-def _names(joint: UrdfJoint) -> str:
-    return f"{joint.child} {joint.name}"

@@ -129,7 +129,10 @@ def _check_joint(joint: UrdfJoint, where: str) -> None:
     if joint.kind in ("floating", "planar"):
         raise ArmError(f"{of} is {joint.kind}; between base and tip only revolute and prismatic joints can be computed")
     if joint.mimics is not None:
-        raise ArmError(f'{of} mimics "{joint.mimics}"; between base and tip each joint must move independently')
+        raise ArmError(
+            f'{of} mimics "{joint.mimics}"; between base and tip each joint must move independently; for the part '
+            f"before it, try --tip {joint.parent}"
+        )
     if joint.kind != "continuous" and not (joint.lower or 0.0) < (joint.upper or 0.0):
         raise ArmError(f"{of}: expected limits lower < upper, got {joint.lower or 0.0:g} and {joint.upper or 0.0:g}")
 
