@@ -62,6 +62,15 @@ ENDS = {  # joints, how many of them are the arm's, tip
         4,
         "tool0",
     ),
+    "fingers on a bar with a frame": (
+        (
+            *(*OF_JAW, ("e", "l4", "/ee_arm_link"), ("gripper", "/ee_arm_link", "prop", (1, 0, 0), None)),
+            *(("b", "/ee_arm_link", "bar"), ("a", "bar", "left", Y, SLIDE), ("c", "bar", "right", Y, SLIDE, "a")),
+            ("t", "bar", "/ee_gripper_link"),
+        ),
+        4,
+        "/ee_gripper_link",
+    ),
     "jaw by its name": ((*ARM, ("grip_joint", "l3", "l4", Y, BOTH)), 3, "l3"),
     "jaw by its link": ((*ARM, ("6", "l3", "Moving_Jaw", Y, BOTH)), 3, "l3"),
     "jaw by its motion": ((*OF_JAW, ("6", "l4", "l5", Y, JAW)), 4, "l4"),
@@ -71,6 +80,7 @@ ENDS = {  # joints, how many of them are the arm's, tip
     "gripper_roll": ((*ARM, ("gripper_roll", "l3", "gripper", Z, TURN), ("t", "gripper", "tcp")), 4, "tcp"),
     "rigid gripper": ((*ARM, ("j4", "l3", "gripper_base_link", Z, TURN), ("t", "gripper_base_link", "tcp")), 4, "tcp"),
     "slide of a SCARA": ((*ARM, ("j4", "l3", "l4", Y, TURN), ("lift", "l4", "l5", Y, SLIDE)), 5, "l5"),
+    "collision link": ((*ARM, ("c", "l3", "l3_sc"), ("f", "l3", "l4")), 3, "l4"),
     "camera on a bracket": ((*ARM, ("c", "l3", "c"), ("d", "c", "camera_frame"), ("t", "l3", "tool0")), 3, "tool0"),
     "arm called finger": (tuple((f"finger_{n}", *rest) for n, *rest in ARM), 3, "l3"),
 }

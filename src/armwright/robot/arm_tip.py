@@ -21,8 +21,10 @@ SHUT = 0.15  # of the range of a jaw that turns: 0 is at most that far from one 
 ACROSS = 0.5  # largest cosine of the angle between the axes of a jaw and of the joint before it
 FEWEST = 3  # joints of an arm before a joint that is a jaw by its motion
 GRIPPER = re.compile(r"jaw|finger|( |_|joint)grip(per)?(_?joint)?\d*$", re.IGNORECASE)  # in names of link and joint
-FRAMES = re.compile(r"(^|_)(tool\d*|tcp|tip|eef?|end_effector|flange|frame)(_|$)", re.IGNORECASE)  # names of a tool's
-OTHERS = re.compile("jaw|finger|camera|optical|depth|imu|sensor", re.IGNORECASE)  # in names of other frames
+FRAMES = re.compile(r"(^|[_/])(tool\d*|tcp|tip|eef?|end_?effector|flange|frame)(_|$)", re.IGNORECASE)  # of a tool
+OTHERS = re.compile(
+    "jaw|finger|camera|optical|depth|imu|sensor|collision|_sc$", re.IGNORECASE
+)  # in names of other links
 
 
 def find_tip(base: str, below: Sequence[UrdfJoint], where: str) -> str:
@@ -74,7 +76,7 @@ class _Tree:
         if not joints:  # but perhaps one that is coupled to a joint of the arm
             return [joint for joint in self._joints[link] if joint.mimics in [one.name for one in before]]
         arms = [joint for joint in joints if self._beyond(joint) > FINGERS]
-        tools = [joint for joint in joints if self.frames[joint.child][0] > 0]
+        tools = [joint for joint in joints if joint.kind != "fixed" and self.frames[joint.child][0] > 0]
         if len(arms) > 1 or (len(joints) > 1 and not arms and (tools or not before)):
             names = ", ".join(joint.child for joint in joints)
             raise ArmError(f'{self._where} branches at the link "{link}" to {names}; name the tip (--tip LINK)')
