@@ -7,7 +7,7 @@ disagree, the user has to name the tip.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -27,13 +27,13 @@ OTHERS = re.compile(
 )  # in names of other links
 
 
-def find_tip(base: str, below: Sequence[UrdfJoint], where: str) -> str:
-    """Return the link at the end of the only chain of a URDF from the base on; below: all joints, parents first.
+def find_tip(base: str, joints: Mapping[str, Sequence[UrdfJoint]], where: str) -> str:
+    """Return the link at the end of the only chain of a URDF from the base on; joints: those on each link.
 
     Raises:
         ArmError: If there are several chains, or it is not clear whether the last joint moves a gripper.
     """
-    tree = _Tree(base, below, where)
+    tree = _Tree(base, joints, where)
     link, axis = base, np.zeros(3)
     before: list[UrdfJoint] = []
     while branches := tree.branches(link, before):
@@ -51,18 +51,18 @@ def find_tip(base: str, below: Sequence[UrdfJoint], where: str) -> str:
 class _Tree:
     """The links beyond a base."""
 
-    def __init__(self, base: str, below: Sequence[UrdfJoint], where: str) -> None:
-        self._where = where
-        self._joints: dict[str, list[UrdfJoint]] = {link: [] for link in (base, *(joint.child for joint in below))}
-        for joint in below:
-            self._joints[joint.parent].append(joint)
+    def __init__(self, base: str, joints: Mapping[str, Sequence[UrdfJoint]], where: str) -> None:
+        self._joints, self._where = joints, where
         self._deepest: dict[str, int] = {}  # independent joints of the longest chain beyond each link
         self.frames: dict[str, tuple[int, int, str]] = {}
         """What is fixed to each link: 1 for a frame of a tool, -1 for one of something else, how far, its name."""
-        for link, joints in reversed(self._joints.items()):
-            self._deepest[link] = max(map(self._beyond, joints), default=0)
+        links = [base]
+        for link in links:
+            links += [joint.child for joint in joints[link]]
+        for link in reversed(links):
+            self._deepest[link] = max(map(self._beyond, joints[link]), default=0)
             own = -1 if OTHERS.search(link) else int(FRAMES.search(link) is not None)
-            fixed = (self.frames[joint.child] for joint in joints if joint.kind == "fixed")
+            fixed = (self.frames[joint.child] for joint in joints[link] if joint.kind == "fixed")
             ends = [(own, 0, link), *((rank, n + 1, name) for rank, n, name in fixed)]
             self.frames[link] = max(ends, key=lambda end: end[:2])
 

@@ -63,7 +63,7 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
     document = read_document(Path(path))
     tree = _LinkTree(document, str(path))
     base = tree.root if base_link is None else tree.check_link(base_link, "base link")
-    last = find_tip(base, list(tree.below(base)), str(path)) if tip is None else tree.check_link(tip, "tip")
+    last = find_tip(base, tree.joints, str(path)) if tip is None else tree.check_link(tip, "tip")
     chain = tree.chain(base, last)
     moving = [joint for joint in chain if joint.kind != "fixed"]
     if not moving:
@@ -217,13 +217,13 @@ class _LinkTree:
 
     def __init__(self, document: UrdfDocument, where: str) -> None:
         self.document, self._where = document, where
-        self._children: dict[str, list[UrdfJoint]] = {name: [] for name in document.links}
+        self.joints: dict[str, list[UrdfJoint]] = {name: [] for name in document.links}  # on each link, in its order
         self._parent: dict[str, UrdfJoint] = {}
         for joint in document.joints:
             if joint.child in self._parent:
                 raise ArmError(f'{where}: the link "{joint.child}" has two parents; expected a tree')
             self._parent[joint.child] = joint
-            self._children[joint.parent].append(joint)
+            self.joints[joint.parent].append(joint)
         roots = [name for name in document.links if name not in self._parent]
         if len(roots) != 1:
             names = listed(roots) or "none: the joints form a cycle"
@@ -236,7 +236,7 @@ class _LinkTree:
         """Yield all joints beyond a link, parents first."""
         waiting = [link]
         while waiting:
-            joints = self._children[waiting.pop()]
+            joints = self.joints[waiting.pop()]
             yield from joints
             waiting += [joint.child for joint in joints]
 
