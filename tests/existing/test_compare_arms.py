@@ -264,6 +264,9 @@ def test_arm_whose_masses_are_all_zero_is_of_unknown_mass(tmp_path: Path) -> Non
     file.write_text(re.sub(r'<mass value="[^"]*"', '<mass value="0"', UR5.read_text("utf-8")), encoding="utf-8")
     read = read_urdf(file).arm
     assert read.no_mass.startswith("no mass is stated for shoulder_link, upper_arm_link")
+    file.write_text(aw.to_urdf(read), encoding="utf-8")
+    again = "no mass is stated for link_1, link_2, link_3, link_4, link_5, link_6"
+    assert read_urdf(file).arm.no_mass == again
 
 
 @pytest.mark.slow

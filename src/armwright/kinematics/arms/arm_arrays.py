@@ -161,7 +161,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         stiffness[:, i, own] = np.transpose([_stiffness(link) for link in arm.links])
         for part in fields(Bodies):
             getattr(bodies, part.name)[i, own] = [getattr(link, part.name) for link in arm.links]
-    no_mass = np.array([arm.no_mass for arm in arms])
+    no_mass = [arm.no_mass for arm in arms]
     return exact_arms(
         precision,
         base=np.array([arm.base for arm in arms]),
@@ -181,7 +181,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         base_mass=np.array([arm.standing_mass for arm in arms]),
         structure_price=np.array([arm.structure_price for arm in arms]),
         bodies=bodies,
-        no_mass=no_mass if no_mass.any() else None,
+        no_mass=np.array(no_mass) if any(no_mass) else None,
         actuation=actuation_of(arms, travel),
         motor_bodies=stack_bodies(arms, dof, precision),
         columns=stack_columns(
