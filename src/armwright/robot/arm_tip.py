@@ -89,7 +89,8 @@ class _Tree:
         beside, beyond = self.frames[joint.parent], self.frames[joint.child]
         lower, upper, slides = joint.lower or 0.0, joint.upper or 0.0, joint.kind == "prismatic"
         travel = math.inf if joint.kind == "continuous" else upper - lower
-        is_jaw = travel <= STROKE if slides else min(-lower, upper) <= SHUT * travel <= SHUT * OPENING
+        is_shut = slides or min(-lower, upper) <= SHUT * travel  # at 0
+        is_jaw = is_shut and 0.0 < travel <= (STROKE if slides else OPENING)
         is_across = len(before) >= FEWEST and abs(float(axis @ joint.axis)) < ACROSS
         last, own = (GRIPPER.search(f"{one.child} {one.name}") for one in (before[-1], joint))
         signs = {
