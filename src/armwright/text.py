@@ -3,7 +3,7 @@
 import math
 import re
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 _ESCAPE = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]")  # terminal colours and other escape sequences
@@ -21,6 +21,12 @@ def visible(text: str) -> str:
     """Replace control characters by blanks and drop characters without width."""
     kinds = ((letter, unicodedata.category(letter)) for letter in _ESCAPE.sub("", text))
     return "".join(" " if kind == "Cc" else letter for letter, kind in kinds if kind not in ("Cf", "Cs"))
+
+
+def listed(names: Sequence[str], most: int = 6) -> str:
+    """Return names with commas; of many, the first ones and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
 
 
 def rounded(value: float | None, digits: int = 3) -> str:

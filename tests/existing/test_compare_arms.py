@@ -1,6 +1,7 @@
 """Compare existing arms with the designs of a run."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -25,7 +26,7 @@ from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.page.page import write_report
 from armwright.pictures.figures import draw_front, write_figures
 from armwright.pictures.style import RC
-from armwright.problem.objectives import named_objectives
+from armwright.problem.objectives import QUANTITIES, named_objectives
 from armwright.robot.actuators import named_actuator
 from armwright.robot.mounting import Mounting
 from armwright.robot.robot_descriptions import find_urdf
@@ -218,6 +219,54 @@ def table(tab: Tab) -> dict[str, dict[str, str]]:
         "[...document.querySelectorAll('#existing tbody tr')].map((r) => [...r.cells].map((c) => c.innerText))"
     )
     return {row[0]: dict(zip(heads, row, strict=True)) for row in rows}
+
+
+def test_arm_of_unknown_mass_has_no_torque_and_is_not_compared(run: Path, history: History, tmp_path: Path) -> None:
+    """One link without a mass leaves all masses, torques and payloads open, but neither reach nor speeds."""
+    file, cycle = tmp_path / "light.urdf", {"time": 2.0, "steps": [{"to": 1}, {"to": 2}]}
+    file.write_text(
+        re.sub(
+            r'(<link name="forearm_link">.*?)<inertial>.*?</inertial>', r"\1", UR5.read_text("utf-8"), flags=re.DOTALL
+        ),
+        encoding="utf-8",
+    )
+    whole, light = compare_arms(TASK, [UR5, file], run, base=(-0.2, 0.0, 0.0)).arms
+    loads = {name for name, quantity in QUANTITIES.items() if "masses" in quantity.needs}
+    assert light.values[1] is light.dominates is light.dominated_by is None
+    for name in {"payload_at_full_reach", *loads}:
+        assert light.value(name) is None
+        assert whole.value(name) is None or light.facts[name].reason == "no mass is stated for forearm_link"
+    for name in light.facts.keys() - {"payload_at_full_reach", *loads}:
+        assert light.value(name) == whole.value(name)
+    assert "no mass is stated for forearm_link, so masses, torques and payloads are not known" in light.notes
+    searched = compare_arms(TASK, [file], space=SPACE).arms[0]
+    assert searched.value("unreached_targets") == 0
+    moving = TASK.model_copy(update={"cycle": Task(name="c", targets=TASK.targets, cycle=cycle).cycle})  # type: ignore[arg-type]
+    there = placed(aw.Problem(moving, WITH_MOTORS), read_urdf(file), 0, Mounting((-0.2, 0.0, 0.0)))
+    job = Job(aw.Problem(moving, WITH_MOTORS), there.mounting, there.description)
+    with_task, alone = urdf_sheet(there.described, job), urdf_sheet(read_urdf(file))
+    assert all(joint.torque is joint.peak_utilisation is joint.tilting_moment is None for joint in with_task.joints)
+    assert all(joint.speed_utilisation for joint in with_task.joints[:1])
+    assert with_task.violated == ()
+    for sheet in (with_task, alone):
+        assert [link.mass is None for link in sheet.links] == [False, False, True, False, False, False]
+        assert sheet.masses == ()
+        assert {line.payload for line in sheet.over_reach} == {None}
+        assert sheet.facts["mass"].text == "not stated (no mass is stated for forearm_link)"
+    with pytest.raises(
+        ArmError, match="payload: expected an arm of known mass, but no mass is stated for forearm_link"
+    ):
+        aw.reach_map(read_urdf(file), spacing=0.5, payload=0.1)
+
+
+def test_arm_whose_masses_are_all_zero_is_of_unknown_mass(tmp_path: Path) -> None:
+    file = tmp_path / "nothing.urdf"
+    file.write_text(re.sub(r'<mass value="[^"]*"', '<mass value="0"', UR5.read_text("utf-8")), encoding="utf-8")
+    read = read_urdf(file).arm
+    assert read.no_mass.startswith("no mass is stated for shoulder_link, upper_arm_link")
+    file.write_text(aw.to_urdf(read), encoding="utf-8")
+    again = "no mass is stated for link_1, link_2, link_3, link_4, link_5, link_6"
+    assert read_urdf(file).arm.no_mass == again
 
 
 @pytest.mark.slow

@@ -144,14 +144,17 @@ def test_commercial_robots_agree_with_pinocchio(name: str) -> None:
 def test_tip_is_chosen_and_reported() -> None:
     panda = robot("panda")
     assert read_urdf(panda).tip == "panda_hand_tcp"
-    assert 'the tip is the link "panda_hand_tcp" (--tip names another)' in read_urdf(panda).notes
+    seven = ", ".join(f"panda_joint{n}" for n in range(1, 8))
+    assert read_urdf(panda).notes[0] == (
+        f'the tip is the link "panda_hand_tcp" (--tip names another); joints from "panda_link0": {seven}; '
+        "left out, at 0: panda_finger_joint1, panda_finger_joint2"
+    )
     finger = read_urdf(panda, tip="panda_leftfinger")
     assert len(finger.joints) == 8
     assert finger.arm.joints[-1].kind == "prismatic"
     part = read_urdf(panda, base_link="panda_link2", tip="panda_link4")
     assert part.joints == ("panda_joint3", "panda_joint4")
     assert part.arm.base_mass == pytest.approx(0.646926)  # of panda_link2 in the file
-    assert "1 other joint stays at 0, such as fingers" in read_urdf(robot("so101")).notes
     with pytest.raises(ArmError, match='is not beyond "panda_link4"'):
         read_urdf(panda, base_link="panda_link4", tip="panda_link2")
     with pytest.raises(ArmError, match=r'no link "panda_hnd" \(tip\). Did you mean "panda_hand"'):
@@ -159,6 +162,22 @@ def test_tip_is_chosen_and_reported() -> None:
     with pytest.raises(ArmError, match="branches at the link"):
         read_urdf(robot("tiago_dual"))
     assert len(read_urdf(robot("tiago_dual"), tip="arm_left_7_link").joints) == 8
+
+
+def test_base_link_keeps_its_orientation_under_the_root(file: Path) -> None:
+    """An arm at the side of a torso hangs from it as in the whole robot."""
+    mount = '<origin xyz="0.1 0.2 0.7" rpy="-1.5707963267948966 0 0"/>'
+    torso = f'<link name="torso"/><joint name="side" type="fixed"><parent link="torso"/><child link="world"/>{mount}'
+    text = to_urdf(any_arm(3, ("revolute", "prismatic")))
+    file.write_text(text.replace("</robot>", f"{torso}</joint></robot>"), encoding="utf-8")
+    read = read_urdf(file, base_link="world")
+    assert read.notes[1] == (
+        'the axes of the world are those of "torso"; gravity points along (0, 1, 0) in the frame of "world"'
+    )
+    q = random_values(read.arm, 20, 3)
+    (tips, torques), (seen, _, held) = seen_by_kernels(read.arm, q, 1.5), seen_by_pinocchio(file, read, q, 1.5)
+    assert np.allclose(tips, seen - (0.1, 0.2, 0.7), atol=1e-9)
+    assert np.allclose(torques, held, atol=1e-9)
 
 
 def one_joint(joint: str = 'type="revolute"', inside: str = '<limit lower="-1" upper="1"/>', more: str = "") -> str:
@@ -225,6 +244,8 @@ REFUSED = {
     one_joint(inside='<axis xyz="0 1"/><limit lower="-1" upper="1"/>'): 'xyz: expected 3 finite numbers, got "0 1"',
     one_joint(inside='<axis xyz="0 1 1"/><limit lower="-1" upper="1"/>'): r"the axis \(0.000, 0.707, 0.707\)",
     one_joint(inside='<limit lower="${-pi}" upper="1"/>'): "is xacro, not URDF; try",
+    one_joint(more="<xacro:include filename='ur.xacro'/>"): "<xacro:include> is xacro, not URDF; try `xacro FILE",
+    one_joint().replace('<link name="b"/>', '<link name="b"><xacro:rod mass="4"/></link>'): "<xacro:rod> is xacro",
     one_joint().replace('<link name="b"/>', '<link name="b"><inertial><mass value="-1"/></inertial></link>'): "-1 kg",
     one_joint().replace(
         '<link name="b"/>', '<link name="b"><inertial/></link>'
@@ -242,6 +263,12 @@ def test_damaged_and_hostile_files_are_refused_in_one_line(file: Path, number: i
     assert "\n" not in str(refusal.value)
     assert str(file) in str(refusal.value)
     assert len(str(refusal.value)) < 500 + len(str(file))
+
+
+def test_unused_xacro_properties_are_ignored(file: Path) -> None:
+    """Old converters leave them behind, with all values in place."""
+    file.write_text(one_joint(more='<xacro:property name="pi" value="3.14"/>'), encoding="utf-8")
+    assert read_urdf(file).joints == ("j",)
 
 
 def test_missing_and_oversized_files_are_refused(file: Path) -> None:

@@ -38,6 +38,7 @@ def datasheet(
     from armwright.sheet.design_sheet import design_sheet
     from armwright.sheet.writer import sheet_record, write_datasheet
 
+    read = ""
     if Path(source).is_dir():
         of_urdf = {"--task": task, "--space": space, "--base": base, "--price": price,
                    "--tip": tip, "--base-link": base_link, "--seed": seed}  # fmt: skip
@@ -64,11 +65,11 @@ def datasheet(
                 problem = load_problem(task, space)
                 placement = placed(problem, described, seed or 0, parse_base(base))
                 described, job = placement.described, Job(problem, placement.mounting, placement.description)
-            sheet = urdf_sheet(described, job, price)
+            sheet, read = urdf_sheet(described, job, price), f"{described.name}: {described.notes[0]}"
         folder = Path(f"{Path(source).stem}-datasheet")
     files = write_datasheet(sheet, folder if out is None else out)
     if json_:
         print_json(sheet_record(sheet))
         return
-    for file in files:
-        print_text(str(file))
+    for line in filter(None, (read, *files)):
+        print_text(str(line))

@@ -26,7 +26,7 @@ Parameters:
     base (X,Y,Z[,YAW]): Where base links stand [m], and how far they are turned about the vertical [°].
         Default: searched.
     base_link: Link of the URDF at the base. Default: the root.
-    tip: Link of the URDF at the tip. Default: the last one.
+    tip: Link of the URDF at the tip. Default: the last one before a gripper.
 
 Task:
     objectives: Objectives to minimise instead of the task's: names with commas, see docs/method.md, 3.

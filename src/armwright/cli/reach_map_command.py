@@ -67,7 +67,8 @@ def reach_map(
         raise SettingsError(f"--obstacles: expected {where}")
     console = open_console(json_)
     if not json_:
-        console.print(f"mapping the reach of {mapped.title} ...")
+        for line in filter(None, (mapped.read, f"mapping the reach of {mapped.title} ...")):
+            console.print(line)
     found = reach_map(
         mapped.arm,
         box=None if numbers is None else (numbers[:3], numbers[3:]),

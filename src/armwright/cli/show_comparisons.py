@@ -99,6 +99,8 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     shown = [*comparison.arms, *comparison.designs]
     names = [objective.name for objective in objectives]
     task = comparison.problem.task
+    for arm in comparison.arms:
+        console.print(f"{arm.name}: {arm.notes[0]}")
     console.print("; ".join(filter(None, (f"Arms on {task.name}", payload_note(task)))))
     known = [name for name in ASKED if name not in names and any(arm.value(name) is not None for arm in shown)]
     columns = [
@@ -126,7 +128,7 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
         elif comparison.run is not None:
             note = f"; {_describe_dominance(arm, comparison.front)} ({', '.join(names)})"
         console.print(f"{arm.name}: {Mounting(arm.base, arm.yaw).description}{note}")
-        for line in arm.notes:
+        for line in arm.notes[1:]:
             console.print(f"  {line}")
     if drawn:
         console.print(f"redrawn: {', '.join(map(str, drawn))}")

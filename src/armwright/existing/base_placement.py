@@ -126,7 +126,8 @@ def _losses(problem: Problem, evaluation: Evaluation) -> Array:
     missed = np.maximum(evaluation.position_error - targets.tolerance, 0.0)
     missed += targets.metres_per_radian * np.maximum(evaluation.angle_error - targets.angle_tolerance, 0.0)
     excess = missed.sum(axis=1)
-    violation, torque = _known_violation(problem, evaluation), arm_quantities.torque(evaluation)
+    violation = _known_violation(problem, evaluation)
+    torque = np.nan_to_num(known_values(arm_quantities.torque, evaluation)[0])
     met = np.where(violation > 0.0, 1.0 + violation / (1.0 + violation), torque / (1.0 + torque))
     return np.where(excess > 0.0, 2.0 + excess, met)
 

@@ -47,7 +47,7 @@ class ComparedArm:
     facts: what is known of it; the price of an existing arm as stated.
     dominates, dominated_by: numbers of designs on the run's front, see `dominance_counts`; None without a run.
     violated: constraints of the task that it violates. Such an arm is not compared with feasible designs.
-    notes: assumptions, changes and missing data.
+    notes: of an existing arm its tip and its joints; then assumptions, changes and missing data.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -251,7 +251,7 @@ def _compared(
 
 
 def _reach(problem: Problem, arm: Arm) -> Facts:
-    return reach_facts(reach_lines(arm, float(problem.task.payloads.max()))[-1])
+    return reach_facts(arm, reach_lines(arm, float(problem.task.payloads.max()))[-1])
 
 
 def _chosen_designs(history: History) -> Iterator[ComparedArm]:

@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arrays import Array, finite_or_none
 from armwright.problem.arm_quantities import cycle_time
 from armwright.problem.constraints import Constraint
-from armwright.problem.drive_quantities import dynamic_utilisation, price, speed_utilisation
+from armwright.problem.drive_quantities import dynamic_torque, dynamic_utilisation, price, speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.facts import Facts, fact_of, facts_of
 from armwright.problem.objective import Objective
@@ -69,6 +69,7 @@ class ExistingArm:
         torque = drives.safety_factor[0] * np.abs(loads.torques[0]).max(axis=(0, 1)) / drives.peak[0]
         speed = np.abs(loads.speeds[0]).max(axis=(0, 1)) / drives.no_load_speed[0]
         decided = dynamic_utilisation in bounded and self.value(dynamic_utilisation) is not None
+        decided |= self.value(dynamic_torque) is None
         if np.nanmax(torque, initial=0.0) > 1.0 and not decided:
             yield f"an effort of its file (along the cycle it needs {np.nanmax(torque):.0%}, safety factor included)"
         if np.nanmax(speed, initial=0.0) > 1.0 and speed_utilisation not in bounded:

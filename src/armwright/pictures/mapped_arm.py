@@ -25,6 +25,11 @@ class MappedArm:
         return self.arm.arm if isinstance(self.arm, UrdfArm) else self.arm
 
     @property
+    def read(self) -> str:
+        """The tip and the joints that were read from a URDF; empty for a design."""
+        return f"{self.title}: {self.arm.notes[0]}" if isinstance(self.arm, UrdfArm) else ""
+
+    @property
     def targets(self) -> Array | None:
         """(T, 3) targets [m]; the horizontal slice is at their mean height."""
         return None if self.task is None else self.task.target_positions

@@ -57,19 +57,19 @@ def worst_angle(e: Evaluation) -> Array:
 # Torques at rest
 
 
-@quantity(f"N m x {TORQUE_SCALE:g}")
+@quantity(f"N m x {TORQUE_SCALE:g}", needs=("masses",))
 def torque(e: Evaluation) -> Array:
     """40 times the Euclidean norm of the joint torques [N m] that hold the kept posture up against gravity."""
     return TORQUE_SCALE * np.linalg.norm(e.motor_torques, axis=-1)
 
 
-@quantity("N m", over="max", needs=("motions",), symbol="E_peak")
+@quantity("N m", over="max", needs=("motions", "masses"), symbol="E_peak")
 def peak_torque(e: Evaluation) -> Array:
     """The largest of the joint torques' absolute values [N m] that hold the kept posture up against gravity."""
     return e.worst_torques(lambda torques: np.abs(torques).max(axis=-1))
 
 
-@quantity("N m", over="rms", symbol="E_rms", label="RMS torque")
+@quantity("N m", over="rms", needs=("masses",), symbol="E_rms", label="RMS torque")
 def rms_torque(e: Evaluation) -> Array:
     """The Euclidean norm of the joint torques [N m] that hold the kept posture up against gravity."""
     return np.linalg.norm(e.motor_torques, axis=-1)
@@ -78,7 +78,7 @@ def rms_torque(e: Evaluation) -> Array:
 # The arm itself
 
 
-@quantity("kg", over="arm")
+@quantity("kg", over="arm", needs=("masses",))
 def mass(e: Evaluation) -> Array:
     """The mass of the arm, its actuators and tool included, without its payload."""
     return e.arms.mass.sum(axis=1, dtype=np.float64) + e.arms.base_mass

@@ -39,7 +39,8 @@ def best_chain(
     paths = first.cycle_paths
     if paths is None or paths.candidates is None:
         return first, best
-    is_fixed = [one.quantity.over == "arm" and not one.quantity.needs for one in constraints]  # by the design alone
+    own = ((), ("masses",))  # needs of quantities that are fixed by the design alone
+    is_fixed = [one.quantity.over == "arm" and one.quantity.needs in own for one in constraints]
     is_open = np.ones(len(arms), dtype=bool) if paths.branches is None else (paths.branches > 0).all(axis=1)
     violated = best.violations > 0.0
     rows = np.flatnonzero(is_open & violated.any(axis=1) & ~violated[:, is_fixed].any(axis=1))

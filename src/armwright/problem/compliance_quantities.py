@@ -18,7 +18,7 @@ from armwright.problem.objective import quantity
 from armwright.tasks.moments import MAX_MASS
 
 
-@quantity("m", over="max", needs=("sections",), ratings=("joint_stiffness",))
+@quantity("m", over="max", needs=("sections", "masses"), ratings=("joint_stiffness",))
 def deflection(e: Evaluation) -> Array:
     """How far the arm's own weight and the payload move the tip in the kept posture, because links bend and twist and
     joints yield.
@@ -39,7 +39,7 @@ def backlash_error(e: Evaluation) -> Array:
     return backlash_errors(e.arms, e.frames, e.drives.backlash)
 
 
-@quantity("m", over="max", ratings=("coulomb", "load_friction", "position_gain"), symbol="E_friction")
+@quantity("m", "max", needs=("masses",), ratings=("coulomb", "load_friction", "position_gain"), symbol="E_friction")
 def friction_error(e: Evaluation) -> Array:
     """How far the friction of all actuators together may stop the tip at most from where their position control and
     gravity compensation send it in the kept posture, on arrival from below; above it, less.
@@ -48,7 +48,7 @@ def friction_error(e: Evaluation) -> Array:
     return tip_errors(e.arms, e.frames, friction / e.drives.position_gain[:, None])
 
 
-@quantity("kg", over="min", ratings=("peak",), symbol="payload_capacity", more_is_better=True)
+@quantity("kg", over="min", needs=("masses",), ratings=("peak",), symbol="payload_capacity", more_is_better=True)
 def payload_capacity(e: Evaluation) -> Array:
     """The largest payload that all actuators hold in the kept posture, with the safety factor, and that tilts no joint
     beyond what the maker of its actuator allows, or beyond the strongest actuator's torque if none is stated.

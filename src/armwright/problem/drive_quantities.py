@@ -7,12 +7,14 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.bearings import bearing_limits
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objective import quantity
+from armwright.problem.objective import Need, quantity
 
+CYCLE: tuple[Need, ...] = ("cycle", "durations", "masses")  # of loads along the cycle
+MOTIONS: tuple[Need, ...] = ("motions", "durations", "masses")  # of loads at rest and along it
 LIMITS = ("peak", "continuous", "corner_speed", "no_load_speed")  # of actuators, that reserves are measured from
 
 
-@quantity("of allowed", over="max", needs=("motions",), ratings=("peak",), symbol="E_util")
+@quantity("of allowed", over="max", needs=("motions", "masses"), ratings=("peak",), symbol="E_util")
 def torque_utilisation(e: Evaluation) -> Array:
     """The largest share of its actuator's peak torque that any joint needs to hold the kept posture up against
     gravity, times the safety factor; above 1 the arm does not hold it with this factor.
@@ -27,7 +29,7 @@ def price(e: Evaluation) -> Array:
     return e.drives.price + e.arms.structure_price
 
 
-@quantity("N m", over="max", needs=("cycle", "durations"), symbol="E_dynamic")
+@quantity("N m", over="max", needs=CYCLE, symbol="E_dynamic")
 def dynamic_torque(e: Evaluation) -> Array:
     """The largest absolute torque of any motor on the way to the target, gravity and inertia included."""
     travel = e.arms.travel[:, None]
@@ -37,7 +39,7 @@ def dynamic_torque(e: Evaluation) -> Array:
 @quantity(
     "of allowed",
     over="max",
-    needs=("cycle", "durations"),
+    needs=CYCLE,
     ratings=("peak", "corner_speed", "no_load_speed"),
     symbol="E_dynutil",
 )
@@ -55,7 +57,7 @@ def speed_utilisation(e: Evaluation) -> Array:
     return e.worst_loads(lambda _, speeds: np.abs(speeds / speed).max(axis=-1))
 
 
-@quantity("of allowed", over="arm", needs=("cycle", "durations"), ratings=("continuous",), symbol="E_thermal")
+@quantity("of allowed", over="arm", needs=CYCLE, ratings=("continuous",), symbol="E_thermal")
 def thermal_utilisation(e: Evaluation) -> Array:
     """The largest share of any actuator's continuous torque that its torque takes, as a root mean square over the
     cycle with its dwells, times the safety factor; above 1 it overheats.
@@ -63,7 +65,7 @@ def thermal_utilisation(e: Evaluation) -> Array:
     return e.drives.safety_factor * (e.loads.rms_torques / e.drives.continuous).max(axis=1)
 
 
-@quantity("N m", over="max", needs=("motions", "durations"), ratings=("bearing_offset",), symbol="E_tilting")
+@quantity("N m", over="max", needs=MOTIONS, ratings=("bearing_offset",), symbol="E_tilting")
 def tilting_moment(e: Evaluation) -> Array:
     """The largest moment across the axis of any joint that turns, about the bearing of its actuator, at rest and on
     the way to the target.
@@ -71,19 +73,19 @@ def tilting_moment(e: Evaluation) -> Array:
     return e.bearing_loads[..., 0].max(axis=-1)
 
 
-@quantity("N", over="max", needs=("motions", "durations"), ratings=("bearing_offset",), symbol="E_axial")
+@quantity("N", over="max", needs=MOTIONS, ratings=("bearing_offset",), symbol="E_axial")
 def axial_force(e: Evaluation) -> Array:
     """The largest force along the axis of any joint that turns, at rest and on the way to the target."""
     return e.bearing_loads[..., 1].max(axis=-1)
 
 
-@quantity("N", over="max", needs=("motions", "durations"), ratings=("bearing_offset",), symbol="E_radial")
+@quantity("N", over="max", needs=MOTIONS, ratings=("bearing_offset",), symbol="E_radial")
 def radial_force(e: Evaluation) -> Array:
     """The largest force across the axis of any joint that turns, at rest and on the way to the target."""
     return e.bearing_loads[..., 2].max(axis=-1)
 
 
-@quantity("of allowed", over="max", needs=("motions", "durations"), ratings=("peak",), symbol="E_bearing")
+@quantity("of allowed", over="max", needs=MOTIONS, ratings=("peak",), symbol="E_bearing")
 def bearing_utilisation(e: Evaluation) -> Array:
     """The largest share of what the maker of an actuator allows across its shaft, of moment, axial and radial force,
     that any joint takes at rest and on the way to the target; 0 where no maker states a limit.
@@ -93,7 +95,7 @@ def bearing_utilisation(e: Evaluation) -> Array:
     return np.nan_to_num(e.bearing_loads / bearing_limits(e.drives)[:, None]).max(axis=(-2, -1))
 
 
-@quantity("x load", over="arm", needs=("motions", "durations"), ratings=LIMITS, symbol="reserve", more_is_better=True)
+@quantity("x load", over="arm", needs=MOTIONS, ratings=LIMITS, symbol="reserve", more_is_better=True)
 def reserve(e: Evaluation) -> Array:
     """How many times the torque, mean torque, speed or load across the axis that the cycle takes of any actuator its
     maker allows, without safety factor; below 1 it cannot. Without a cycle, what holds the arm at the targets.
@@ -101,7 +103,7 @@ def reserve(e: Evaluation) -> Array:
     return e.reserves.least
 
 
-@quantity("of allowed", over="arm", needs=("motions", "durations"), ratings=LIMITS)
+@quantity("of allowed", over="arm", needs=MOTIONS, ratings=LIMITS)
 def limit_use(e: Evaluation) -> Array:
     """The largest share of any actuator's limit of torque, mean torque, speed or load across the axis that the cycle
     takes, without safety factor: 1 / reserve.
@@ -109,13 +111,13 @@ def limit_use(e: Evaluation) -> Array:
     return 1.0 / e.reserves.least
 
 
-@quantity("A", over="arm", needs=("cycle", "durations"), ratings=("peak", "voltage", "current"), symbol="I_peak")
+@quantity("A", over="arm", needs=CYCLE, ratings=("peak", "voltage", "current"), symbol="I_peak")
 def peak_current(e: Evaluation) -> Array:
     """The largest current that all actuators together draw from the supply along the cycle."""
     return e.supply.peak
 
 
-@quantity("A", over="arm", needs=("cycle", "durations"), ratings=("peak", "voltage", "current"), symbol="I_mean")
+@quantity("A", over="arm", needs=CYCLE, ratings=("peak", "voltage", "current"), symbol="I_mean")
 def mean_current(e: Evaluation) -> Array:
     """The mean current that all actuators together draw from the supply over the cycle with its dwells."""
     return e.supply.mean

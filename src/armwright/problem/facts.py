@@ -87,17 +87,23 @@ def facts_of(
     return [
         {
             **{q.name: fact_of(q, finite_or_none(values[row]), reason) for q, values, reason in columns},
-            "mass": fact_of(QUANTITIES["mass"], arm.mass),  # which arrays have in the precision of the kernels
+            "mass": mass_fact(arm),  # which arrays have in the precision of the kernels
             VOLTAGE: _voltage(evaluation, row),
         }
         for row, arm in enumerate(arms)
     ]
 
 
-def reach_facts(farthest: ReachLine) -> Facts:
+def mass_fact(arm: Arm) -> Fact:
+    """Return the mass of an arm, exact to the last digit."""
+    return fact_of(QUANTITIES["mass"], None if arm.no_mass else arm.mass, arm.no_mass)
+
+
+def reach_facts(arm: Arm, farthest: ReachLine) -> Facts:
     """Return what an arm reaches and holds there, from the last of its `reach_lines`."""
     held = farthest.payload
-    reason = "" if held is not None else "no posture was found there, or the torque of an actuator is not known"
+    found = "no posture was found there, or the torque of an actuator is not known"
+    reason = "" if held is not None else arm.no_mass or found
     return {
         REACH: Fact("Reach", "m", FARTHEST, farthest.distance),
         PAYLOAD_AT_FULL_REACH: Fact(

@@ -17,7 +17,7 @@ from armwright.robot.actuators import UNITS
 
 # What a quantity depends on: `motions` if the worst of targets and motions counts, `durations` of the steps of a cycle
 Need = Literal[
-    "orientation", "clearance", "motions", "cycle", "durations", "workspace", "directions", "sections"
+    "orientation", "clearance", "motions", "cycle", "durations", "workspace", "directions", "sections", "masses"
 ]  # fmt: skip
 Over = Literal["sum", "max", "min", "rms", "arm"]
 _OVER: Mapping[Over, str] = {
@@ -89,6 +89,9 @@ class Objective:
                 "{tubes: [[0.03, 0.002]], material: aluminium} in the space file",
                 "no section and material of the links are stated",
             )
+        if "masses" in self.needs and arms.no_mass is not None:
+            reason = str(max(arms.no_mass))
+            raise UnknownQuantityError(f"objective {self.name} needs the masses of all links, but {reason}", reason)
         for need in self.needs:
             scene.require(need)
         if "durations" in self.needs and scene.plan is not None:

@@ -29,7 +29,8 @@ def reach_lines(arm: Arm, payload: float) -> tuple[ReachLine, ...]:
     postures = postures_over_reach(arm, FRACTIONS)
     nothing = np.full(len(FRACTIONS), np.nan)
     drives = postures.arms.actuation
-    held = nothing if drives is None or np.isnan(drives.peak).any() else np.array(held_payloads(postures).payloads)
+    unknown = drives is None or arm.no_mass or np.isnan(drives.peak).any()
+    held = nothing if unknown else np.array(held_payloads(postures).payloads)
     play = nothing if drives is None else backlash_over_reach(postures, drives.backlash)
     columns = zip(FRACTIONS, held, _deflections(postures, payload), play, strict=True)
     return tuple(

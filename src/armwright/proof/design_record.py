@@ -212,7 +212,7 @@ def _records(
         for row, (number, arm, facts) in enumerate(zip(group, arms, facts_of(evaluation, arms), strict=True)):
             extra: dict[str, Any] = {}
             if number in recommended:
-                facts = {**reach_facts(reach_lines(arm, payload)[-1]), **facts}
+                facts = {**reach_facts(arm, reach_lines(arm, payload)[-1]), **facts}
                 extra["loads"] = _loads(arm, evaluation, row)
                 if branches := branches_of(history.problem, history.matrix([number]), history.entry([number])):
                     extra["branches"] = asdict(branches[0])

@@ -8,6 +8,7 @@ from armwright.exceptions import ArmError
 from armwright.robot.axes import AXES, Axis, Vector
 from armwright.robot.motor_body import ActuatorShape, MotorBody
 from armwright.robot.tubes import section_square
+from armwright.text import listed
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
 
@@ -115,6 +116,7 @@ class Link:
     torsional_stiffness: float | None = None  # shear modulus times the polar second moment of area, GJ [N m²]; likewise
     wall: float | None = None  # wall thickness of its tube [m], at most the radius; None if unknown
     price: float = 0.0  # price of its tube [USD]
+    without_mass: tuple[str, ...] = ()  # names of its parts whose mass is not known, and counts as 0
 
     def __post_init__(self) -> None:
         values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass, *self.end_shift, self.price)
@@ -251,6 +253,12 @@ class Arm:
     def mass(self) -> float:
         """The total mass, including what stands below the arm and the tool [kg]."""
         return self.standing_mass + sum(link.total_mass for link in self.links) + self.tool.mass
+
+    @property
+    def no_mass(self) -> str:
+        """Why its mass is not known; empty if it is."""
+        names = [name for link in self.links for name in link.without_mass]
+        return f"no mass is stated for {listed(names)}" if names else ""
 
     @property
     def structure_price(self) -> float:

@@ -7,7 +7,6 @@ the world by rotating that one.
 """
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,28 +16,29 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
 from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Vector
+from armwright.robot.arm_tip import find_tip
+from armwright.robot.plausibility import implausible
 from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document
 from armwright.rotations import rotation_about
+from armwright.text import listed
 
 SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
 MAX_ANGLE = 2 * math.pi  # [rad]
 RADIUS = 0.04  # [m], for drawings, if the file has no cylinder
-FINGERS = 2  # longest chain of joints of a branch that counts as a finger
-GRIPPER = re.compile("grip|jaw|finger", re.IGNORECASE)  # names of a last joint that belongs to a gripper
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfArm:
-    """An arm read from a URDF, with its base link at the world's origin."""
+    """An arm read from a URDF, with its base link at the world's origin, turned as it is under the root."""
 
     name: str  # of the robot
     arm: Arm
-    base_link: str
+    base_link: str  # the link whose origin is the world's
     tip: str  # the link whose origin is the tip
     joints: tuple[str, ...]  # names of the moving joints, from base to tip
     signs: tuple[float, ...]  # value q of a joint of the arm is signs * q + zeros in the URDF
     zeros: tuple[float, ...]  # value of each joint in the URDF at 0 of the arm [rad] or [m]
-    notes: tuple[str, ...] = ()  # choices, changes and missing data, as sentences for the user
+    notes: tuple[str, ...] = ()  # the tip, its joints and what is left out; choices, changes and missing data
 
     def values_in_urdf(self, q: Sequence[float] | Array) -> Array:
         """Return the values (..., J) of the URDF's joints for those of the arm (..., J) [rad] or [m]."""
@@ -55,7 +55,7 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
     Args:
         path: The URDF file.
         tip: The link whose origin should reach the targets; by default the last one before a gripper.
-        base_link: The link that is fixed to the ground; by default the root of the robot.
+        base_link: The link that is fixed to the ground, turned as under the root; by default the root of the robot.
 
     Raises:
         ArmError: If the file is not a URDF, or has no serial arm that can be computed.
@@ -63,7 +63,7 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
     document = read_document(Path(path))
     tree = _LinkTree(document, str(path))
     base = tree.root if base_link is None else tree.check_link(base_link, "base link")
-    last = tree.default_tip(base) if tip is None else tree.check_link(tip, "tip")
+    last = find_tip(base, tree.joints, str(path)) if tip is None else tree.check_link(tip, "tip")
     chain = tree.chain(base, last)
     moving = [joint for joint in chain if joint.kind != "fixed"]
     if not moving:
@@ -80,6 +80,8 @@ def _arm(
     poses = tree.poses(base, zeros)
     bodies = tree.bodies(base, [joint.child for joint in moving])  # names of links, per body
     positions = [poses[joint.child].position for joint in moving] + [poses[tip].position]
+    moved = {joint.child for joint in tree.document.joints if joint.kind != "fixed"}
+    any_mass = any(tree.document.links[name].mass for body in bodies[1:] for name in body)
     joints: list[Joint] = []
     links: list[Link] = []
     signs: list[float] = []
@@ -96,14 +98,13 @@ def _arm(
         )
         com = moments / mass - positions[i] if mass > 0.0 else np.zeros(3)
         radius = max((link.radius for link in body if link.radius is not None), default=RADIUS)
-        links.append(Link(_vector(positions[i + 1] - positions[i]), mass, _vector(com), radius))
+        unknown = tuple(link.name for link in body if link.name in moved and not (link.has_mass and any_mass))
+        links.append(Link(_vector(positions[i + 1] - positions[i]), mass, _vector(com), radius, without_mass=unknown))
     if snapped > 1e-9:
         notes.append(f"axes are taken to lie along x, y or z; they are off by up to {snapped:.1g} rad")
     shifted = [f"{name} by {value:.4g} rad" for name, value in zeros.items() if value]
     if shifted:
         notes.append(f"zero is moved, so that all axes lie along x, y or z: {', '.join(shifted)}")
-    if not any(link.mass for link in links):
-        notes.append("no link states a mass; torques are those of the payload alone")
     if any(joint.actuator is None for joint in joints):
         notes.append("not every joint states an effort, so how much of it is used is not known")
     rotation = poses[tip].rotation
@@ -114,6 +115,9 @@ def _arm(
         tool=MountedTool(axis=_vector(rotation[:, 2]), side=_vector(rotation[:, 0])),
         base_mass=sum(tree.document.links[name].mass for name in bodies[0]),
     )
+    if arm.no_mass:
+        notes.append(f"{arm.no_mass}, so masses, torques and payloads are not known")
+    notes += implausible(arm, [[tree.document.links[name] for name in body] for body in bodies[1:]])
     names = tuple(joint.name for joint in moving)
     values = tuple(zeros[name] for name in names)
     return UrdfArm(tree.document.name, arm, base, tip, names, tuple(signs), values, tuple(notes))
@@ -125,18 +129,25 @@ def _check_joint(joint: UrdfJoint, where: str) -> None:
     if joint.kind in ("floating", "planar"):
         raise ArmError(f"{of} is {joint.kind}; between base and tip only revolute and prismatic joints can be computed")
     if joint.mimics is not None:
-        raise ArmError(f'{of} mimics "{joint.mimics}"; between base and tip each joint must move independently')
+        raise ArmError(
+            f'{of} mimics "{joint.mimics}"; between base and tip each joint must move independently; for the part '
+            f"before it, try --tip {joint.parent}"
+        )
     if joint.kind != "continuous" and not (joint.lower or 0.0) < (joint.upper or 0.0):
         raise ArmError(f"{of}: expected limits lower < upper, got {joint.lower or 0.0:g} and {joint.upper or 0.0:g}")
 
 
 def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, moving: Sequence[UrdfJoint]) -> list[str]:
-    """Return the notes on the choice of a chain."""
-    notes = [] if tip is not None else [f'the tip is the link "{last}" (--tip names another)']
-    others = sum(joint.kind != "fixed" for joint in tree.below(base)) - len(moving)
-    if others:
-        notes.append(f"{others} {'other joint stays' if others == 1 else 'other joints stay'} at 0, such as fingers")
-    return notes
+    """Return the notes on the choice of a chain and how it is mounted."""
+    others = [joint.name for joint in tree.below(base) if joint.kind != "fixed" and joint not in moving]
+    left_out = f"; left out, at 0: {listed(others)}" if others else ""
+    named = "" if tip is not None else " (--tip names another)"
+    joints = ", ".join(joint.name for joint in moving)
+    down = ", ".join(f"{value:.4g}" for value in (-tree.orientation(base)[2]).round(6) + 0.0)
+    return [
+        f'the tip is the link "{last}"{named}; joints from "{base}": {joints}{left_out}',
+        f'the axes of the world are those of "{tree.root}"; gravity points along ({down}) in the frame of "{base}"',
+    ]
 
 
 def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list[str]) -> Joint:
@@ -206,35 +217,26 @@ class _LinkTree:
 
     def __init__(self, document: UrdfDocument, where: str) -> None:
         self.document, self._where = document, where
-        self._children: dict[str, list[UrdfJoint]] = {name: [] for name in document.links}
+        self.joints: dict[str, list[UrdfJoint]] = {name: [] for name in document.links}  # on each link, in its order
         self._parent: dict[str, UrdfJoint] = {}
         for joint in document.joints:
             if joint.child in self._parent:
                 raise ArmError(f'{where}: the link "{joint.child}" has two parents; expected a tree')
             self._parent[joint.child] = joint
-            self._children[joint.parent].append(joint)
+            self.joints[joint.parent].append(joint)
         roots = [name for name in document.links if name not in self._parent]
         if len(roots) != 1:
-            names = ", ".join(roots[:5]) or "none: the joints form a cycle"
+            names = listed(roots) or "none: the joints form a cycle"
             raise ArmError(f"{where}: expected one root link, found {len(roots)} ({names})")
         self.root = roots[0]
         if len(list(self.below(self.root))) < len(document.joints):
             raise ArmError(f"{where}: some joints form a cycle; expected a tree")
-        self._deepest: dict[str, int] = {}  # moving joints of the longest chain below each link
-        self._longest: dict[str, int] = {}  # links of the longest chain below each link
-        for joint in reversed(list(self.below(self.root))):
-            self._deepest[joint.parent] = max(self._deepest.get(joint.parent, 0), self._moving(joint))
-            self._longest[joint.parent] = max(self._longest.get(joint.parent, 0), 1 + self._longest.get(joint.child, 0))
-
-    def _moving(self, joint: UrdfJoint) -> int:
-        """Return the number of moving joints of the longest chain from this joint on."""
-        return joint.moves + self._deepest.get(joint.child, 0)
 
     def below(self, link: str) -> Iterator[UrdfJoint]:
         """Yield all joints beyond a link, parents first."""
         waiting = [link]
         while waiting:
-            joints = self._children[waiting.pop()]
+            joints = self.joints[waiting.pop()]
             yield from joints
             waiting += [joint.child for joint in joints]
 
@@ -258,35 +260,19 @@ class _LinkTree:
             link = self._parent[link].parent
         return chain[::-1]
 
-    def default_tip(self, base: str) -> str:
-        """Return the end of the only chain: the last link before a gripper, or before no joint moves any more.
-
-        From there it follows the longest chain of fixed joints.
-        """
-        link, moved = base, 0
-        while branches := [joint for joint in self._children[link] if self._moving(joint)]:
-            if moved and all(self._is_gripper(joint) for joint in branches):
-                break
-            if len(branches) > 1:
-                arms = [joint for joint in branches if self._moving(joint) > FINGERS]
-                if len(arms) > 1 or not (arms or moved):
-                    names = ", ".join(joint.child for joint in branches)
-                    raise ArmError(f'{self._where} branches at the link "{link}" to {names}; name the tip (--tip LINK)')
-                if not arms:
-                    break
-                branches = arms
-            link, moved = branches[0].child, moved + branches[0].moves
-        while fixed := [joint for joint in self._children[link] if not self._moving(joint) and joint.kind == "fixed"]:
-            link = max(fixed, key=lambda joint: self._longest.get(joint.child, 0)).child
-        return link
-
-    def _is_gripper(self, joint: UrdfJoint) -> bool:
-        """Return True if a last joint is named like those of grippers."""
-        return self._moving(joint) == 1 and GRIPPER.search(f"{joint.name} {joint.child}") is not None
+    def orientation(self, link: str) -> Array:
+        """Return the rotation (3, 3) of a link in the world, which is the root's frame, with all joints at 0."""
+        rotation = np.eye(3)
+        for joint in self.chain(self.root, link):
+            rotation = rotation @ joint.origin.rotation
+        return rotation
 
     def poses(self, base: str, values: Mapping[str, float]) -> dict[str, Pose]:
-        """Return the pose of every link in the base frame; values: joint angles by name [rad], by default 0."""
-        poses = {base: Pose(np.eye(3), np.zeros(3))}
+        """Return the pose of every link beyond the base, whose origin is that of the world.
+
+        values: joint angles by name [rad], by default 0.
+        """
+        poses = {base: Pose(self.orientation(base), np.zeros(3))}
         for joint in self.below(base):
             motion = Pose(rotation_about(joint.axis, values.get(joint.name, 0.0)), np.zeros(3))
             poses[joint.child] = poses[joint.parent] @ joint.origin @ motion

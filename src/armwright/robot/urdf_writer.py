@@ -109,8 +109,9 @@ def _add_inertial(element: Element, com: Vector, rpy: Vector, mass: float, momen
 def _add_link(robot: Element, segment: Segment) -> None:
     link = segment.link
     element = SubElement(robot, "link", name=segment.name)
-    # Written for a mass of 0, too: otherwise MuJoCo assumes the density of water and scikit-robot 1 g.
-    _add_inertial(element, link.total_com, inertia_rpy(link), link.total_mass, inertia_moments(link))
+    # Also written for a mass of 0; without it, MuJoCo assumes the density of water and scikit-robot 1 g.
+    if not link.without_mass:
+        _add_inertial(element, link.total_com, inertia_rpy(link), link.total_mass, inertia_moments(link))
     if link.length > 0.0:
         cylinder = {"radius": number(link.radius), "length": number(link.length)}
         _add_solid(element, "link", midpoint(link), rpy_along(link.offset), "cylinder", cylinder)

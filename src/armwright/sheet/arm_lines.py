@@ -36,8 +36,9 @@ def arm_lines(arm: Arm, payload: float, targets: Array, zeros: Sequence[float] |
 def _link_line(arm: Arm, number: int) -> LinkLine:
     """Return the line of a link, from 1; its tube is stated if its wall is known."""
     link = arm.links[number - 1]
+    mass = None if link.without_mass else link.mass
     diameter = None if link.wall is None or link.length == 0.0 else 2.0 * link.radius
-    return LinkLine(number, link.length, diameter, None if diameter is None else link.wall, link.mass)
+    return LinkLine(number, link.length, diameter, None if diameter is None else link.wall, mass)
 
 
 def _drawing(arm: Arm, targets: Array, zeros: Sequence[float]) -> Drawing:

@@ -58,7 +58,7 @@ def sheet_of(history: History, member: FrontMember, facts: Facts, verdict: Mappi
         violated=_violated(history, member.number),
         objectives=_objectives(history, member),
         payload=payload or None,
-        facts={**reach_facts(lines["over_reach"][-1]), **facts},
+        facts={**reach_facts(arm, lines["over_reach"][-1]), **facts},
         joints=joint_lines(arm, evaluation),
         masses=mass_lines(arm),
         parts=parts,

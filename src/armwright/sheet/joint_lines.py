@@ -23,6 +23,8 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
     lines: list[JointLine] = []
     moving = [j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"]
     need = {} if evaluation is None else _needs(evaluation)
+    if arm.no_mass:
+        need = {name: values for name, values in need.items() if name == "speed_utilisation"}
     for k, j in enumerate(moving):
         joint = arm.joints[j]
         used = None if evaluation is None else _used(evaluation, j)

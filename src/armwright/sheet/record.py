@@ -57,7 +57,7 @@ class LinkLine:
     length: float  # its length
     outer_diameter: float | None  # of its tube, if it has one
     wall: float | None  # wall thickness of its tube
-    mass: float  # its mass, without what it carries
+    mass: float | None  # its mass, without what it carries
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class DataSheet:
     facts: Facts  # what is known of the arm by quantity, or why it is not
     joints: tuple[JointLine, ...]  # the joints that move
     links: tuple[LinkLine, ...]  # the links
-    masses: tuple[MassLine, ...]  # the parts of the mass, which sum up to it
+    masses: tuple[MassLine, ...]  # the parts of the mass, which sum up to it; none if it is not known
     over_reach: tuple[ReachLine, ...]  # payload and errors over the reach
     drawing: Drawing  # the drawing
     base_position: tuple[float, float, float] | None = None

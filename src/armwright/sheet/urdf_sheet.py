@@ -8,7 +8,7 @@ import numpy as np
 from armwright.exceptions import SettingsError
 from armwright.existing.existing_arm import ExistingArm
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.problem.facts import VOLTAGE, Fact, Facts, fact_of, reach_facts
+from armwright.problem.facts import VOLTAGE, Fact, Facts, fact_of, mass_fact, reach_facts
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
@@ -59,7 +59,7 @@ def urdf_sheet(described: UrdfArm, job: Job | None = None, price: float | None =
         name=described.name if job is None else f"{described.name} on {job.problem.task.name}",
         design=None,
         joint_letters="",
-        facts={**_facts(arm, existing, price), **reach_facts(lines["over_reach"][-1])},
+        facts={**_facts(arm, existing, price), **reach_facts(arm, lines["over_reach"][-1])},
         joints=_joints(described, existing),
         masses=_masses(arm),
         assumptions=assumptions,
@@ -103,7 +103,9 @@ def _in_urdf(line: JointLine, sign: float, zero: float) -> JointLine:
 
 
 def _masses(arm: Arm) -> tuple[MassLine, ...]:
-    """Return the parts of the mass; empty if the URDF states none."""
+    """Return the parts of the mass; none if it is not known."""
+    if arm.no_mass:
+        return ()
     lines = [MassLine("base", arm.base_mass)]
     lines += [MassLine(f"link {n}", link.mass) for n, link in enumerate(arm.links, start=1)]
     lines.append(MassLine("tool", arm.tool.mass))
@@ -113,13 +115,11 @@ def _masses(arm: Arm) -> tuple[MassLine, ...]:
 def _facts(arm: Arm, existing: ExistingArm | None, price: float | None) -> Facts:
     """Return what is known of an arm; without a task, its mass and its price."""
     if existing is not None:
-        facts = dict(existing.facts(arm))
-    else:
-        facts = {name: fact_of(quantity, None, NO_TASK) for name, quantity in QUANTITIES.items()}
-        facts[VOLTAGE] = Fact("Supply voltage", "V", "The voltage of all actuators.", None, NO_TASK)
-        facts["price"] = fact_of(QUANTITIES["price"], price, "" if price is not None else NO_PRICE)
-    mass = arm.mass or None
-    return facts | {"mass": fact_of(QUANTITIES["mass"], mass, "" if mass else "no link of the URDF states a mass")}
+        return existing.facts(arm)
+    facts = {name: fact_of(quantity, None, NO_TASK) for name, quantity in QUANTITIES.items()}
+    facts[VOLTAGE] = Fact("Supply voltage", "V", "The voltage of all actuators.", None, NO_TASK)
+    facts["price"] = fact_of(QUANTITIES["price"], price, "" if price is not None else NO_PRICE)
+    return facts | {"mass": mass_fact(arm)}
 
 
 def _assumptions(described: UrdfArm, safety_factor: float, job: Job | None) -> dict[str, str]:

@@ -58,6 +58,7 @@ class ArmArrays(PerArm):
     base_mass: Array  # (N,) mass that does not move, the column included [kg]
     structure_price: Array  # (N,) of all links and of the column [USD]
     bodies: Bodies  # without tools; for dynamics alone
+    no_mass: NDArray[np.str_] | None = None  # (N,) why a mass is not known and counts as 0; None if all are known
     actuation: Actuation | None = None  # None unless all moving joints have actuators
     motor_bodies: MotorBodies | None = None  # None if the bodies of actuators do not count
     columns: Floats | None = None
@@ -160,6 +161,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         stiffness[:, i, own] = np.transpose([_stiffness(link) for link in arm.links])
         for part in fields(Bodies):
             getattr(bodies, part.name)[i, own] = [getattr(link, part.name) for link in arm.links]
+    no_mass = [arm.no_mass for arm in arms]
     return exact_arms(
         precision,
         base=np.array([arm.base for arm in arms]),
@@ -179,6 +181,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         base_mass=np.array([arm.standing_mass for arm in arms]),
         structure_price=np.array([arm.structure_price for arm in arms]),
         bodies=bodies,
+        no_mass=np.array(no_mass) if any(no_mass) else None,
         actuation=actuation_of(arms, travel),
         motor_bodies=stack_bodies(arms, dof, precision),
         columns=stack_columns(

@@ -210,6 +210,8 @@ def _conditions(
         raise SettingsError(f"payload = {payload}: expected 0 to {MAX_MASS:g} kg")
     if payload is not None and arm.actuation is None:
         raise ArmError("payload: expected an arm with actuators or efforts at all joints; without, leave it out")
+    if payload is not None and arm.no_mass is not None:
+        raise ArmError(f"payload: expected an arm of known mass, but {arm.no_mass[0]}; leave it out")
     if clearance is not None and not 0.0 <= clearance < math.inf:
         raise SettingsError(f"clearance = {clearance}: expected 0 m or more")
     if obstacles and clearance is None:
