@@ -118,7 +118,7 @@ function paint() {
     link: solid(colour("arm")), base: solid(shown("#111111")), joints: ["x", "y", "z"].map((axis) => solid(joint[axis])),
     motors: ["x", "y", "z"].map((axis) => ({ face: faint(joint[axis], 0.3), edge: new THREE.LineBasicMaterial({ color: joint[axis] }) })),
     ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45), comparedMotor: { face: faint(target, 0.2), edge: new THREE.LineBasicMaterial({ color: target }) },
-    reached: solid(HIT), missed: solid(target), now: solid(NOW),
+    reached: solid(HIT), missed: solid(missed), now: solid(NOW),
     column: { face: faint(colour("arm"), 0.3), edge: new THREE.LineBasicMaterial({ color: colour("arm") }) },
     obstacle: { face: faint(obstacle, 0.3), edge: new THREE.LineBasicMaterial({ color: obstacle }) },
     gap: new THREE.LineDashedMaterial({ color: missed, dashSize: 0.02, gapSize: 0.012 }),
@@ -129,10 +129,13 @@ function paint() {
 function legend() {
   const { joint } = content.head.colours, labels = content.head.joint_labels;
   const parts = [...["x", "y", "z"].map((axis) => [joint[axis], labels[axis]]),
-    [NOW, "current target"], [HIT, "reached"], [content.head.colours.target, "missed; compared design"]];
+    [NOW, "current target"], [HIT, "reached"], [content.head.colours.missed, "missed"]];
   if (content.obstacles.length) parts.push([content.head.colours.obstacle, "obstacle"]);
-  if (content.head.bodies.length) parts.push([content.head.colours.target, "tool, payload at targets"]);
-  if (content.head.lines.length) parts.push([content.head.colours.target, "line of the cycle"]);
+  const ofTask = [
+    ...(content.head.bodies.length ? ["tool and payload at targets"] : []), ...(content.head.lines.length ? ["lines of the cycle"] : []),
+    "compared design",
+  ];
+  parts.push([content.head.colours.target, ofTask.join(", ")]);
   if (content.head.workspace.length) parts.push([colour("soft"), "workspace (edges)"]);
   $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
     const dot = element("span", { class: "dot" });
