@@ -17,6 +17,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -46,7 +47,7 @@ STARTS, APART, NEIGHBOURS = 1000, 1.0, 4  # starts; [rad] between branches; bran
 BETWEEN = np.linspace(0.0, 1.0, 9)[1:-1, None]  # shares of the way to a neighbour
 NEAR = 0.02  # of the range of a length
 AT_ONCE = 20  # designs
-ALIKE = 0.02  # [rad] between a solution of EAIK and the candidate that is it
+ALIKE = 0.02  # [rad] between a solution of EAIK and the candidate that is the same
 
 
 @dataclass(frozen=True)
@@ -132,11 +133,12 @@ def near_front(problem: Problem, n: int) -> Array:
 
 
 def ur5(poses: int = 500) -> None:
-    """Print the share of the free solutions of EAIK for the UR5 at random poses that candidates are, but for turns."""
+    """Print the share of EAIK's free solutions for the UR5 at random poses that candidates are near, but for turns."""
     from eaik.IK_URDF import UrdfRobot
 
     file = robot("ur5_robot")
-    arm, peer = aw.read_urdf(file, tip="ee_link"), UrdfRobot(str(file))
+    arm = aw.read_urdf(file, tip="ee_link")
+    peer: Any = UrdfRobot(str(file))
     arms = stack_arms([arm.arm], "float64")
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (poses, arms.dof))
     model = pin.buildModelFromUrdf(str(file))
@@ -152,14 +154,15 @@ def ur5(poses: int = 500) -> None:
     targets = [{"position": t[:3, 3].tolist(), "orientation": a.tolist()} for t, a in zip(tips, angles, strict=True)]
     steps = [{"to": number} for number in range(1, poses + 1)]
     task = Task.model_validate({"name": "poses", "targets": targets, "cycle": {"closed": False, "steps": steps}})
-    candidates, total, found = entry_postures(arms, task.plan(task.target_positions))[0], 0, 0
+    candidates, gaps = entry_postures(arms, task.plan(task.target_positions))[0], list[Array]()
     for own, answer in zip(candidates, peer.IK_batched(tips @ from_tip, num_worker_threads=1), strict=True):
-        exact = np.reshape(answer.Q, (-1, 6))[~np.array(answer.is_LS, dtype=bool)]
-        peers = arm.values_in_arm(exact)
+        peers = arm.values_in_arm(np.reshape(answer.Q, (-1, 6))[~np.array(answer.is_LS, dtype=bool)])
         peers = peers[clearances(arms, peers[None])[0][0] >= 0.0]
         turn = np.angle(np.exp(1j * (peers[:, None] - own[~np.isnan(own[:, 0])])))
-        total, found = total + len(peers), found + int((np.abs(turn).max(axis=2) < ALIKE).any(axis=1).sum())
-    print(f"{'UR5':20}{'random poses':16}{found / total:8.2%} of {total:6} branches that EAIK finds", flush=True)
+        gaps.append(np.abs(turn).max(axis=2).min(axis=1))
+    gap = np.concatenate(gaps)
+    print(f"{'UR5':20}{'random poses':16}{(gap < APART).mean():8.2%} of {len(gap):6} solutions of EAIK", end="")
+    print(f", {(gap < ALIKE).mean():.2%} within {ALIKE} rad", flush=True)
 
 
 if __name__ == "__main__":

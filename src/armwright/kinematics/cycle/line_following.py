@@ -37,7 +37,10 @@ class BlockPaths:
 def follow_lines(
     arms: ArmArrays, samples: LineSamples, entry: Array, device: Device = "cpu", aside_by: float = 0.0
 ) -> BlockPaths:
-    """Follow all lines of N arms from `entry`: (N, B, K, D) candidate postures at the first sample of each block."""
+    """Follow all lines of N arms from `entry`: (N, B, K, D) candidate postures at the first sample of each block.
+
+    aside_by: share of the joints' ranges by which random self-motions at each sample move them.
+    """
     loaded = load_kernels("cycle.path_kernels", device)
     n, b, k, dof = entry.shape
     s = len(samples.poses)

@@ -5,6 +5,9 @@ posture of the sample before by damped least-norm updates (Nakamura & Hanafusa 1
 line requires, so the joint path converges as samples are added. Unlike the inverse kinematics of `ik_kernels`, nothing
 pulls joints to the middle of their range, since that would move the arm while the tool stands still.
 
+On request the first updates also move the joints at random, by w less what moves the tool: J# (e - J w) + w (Liégeois
+1977). Each candidate has its own w, the same for all arms and blocks.
+
 A joint that an update would take beyond its limit stays at the limit for the rest of the sample.
 """
 
@@ -52,7 +55,8 @@ def path_kernels() -> SimpleNamespace:
     ):
         """Follow the samples of a block.
 
-        entry: (N, B K, D) postures at the first sample of each block.  q_path: (N, K, S, D) [rad] or [m].
+        entry: (N, B K, D) postures at the first sample of each block.  aside_by: standard deviation of w, as a share
+        of each joint's range.  q_path: (N, K, S, D) [rad] or [m].
         position_error: (N, K, S) [m].  angle_error: (N, K, S) [rad].
         """
         arm, thread = wp.tid()
