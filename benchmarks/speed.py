@@ -10,8 +10,6 @@ real-arms     axis targets, clearance and motors beside the paper's objectives
 cycles        candidates, path, clearance, durations and torques along seven lines; and designs with `--robust`, whose
               copies keep the postures of the design, beside copies that choose theirs
 motor-bodies  the same cycles with and without motor bodies and a column
-branches      of the branches that 1,000 random starts reach without a collision where blocks of a
-              cycle begin, the share that its candidates are from; and how many random designs are feasible
 reach-map     about 2,000 points with 50 directions each, and of 1,000 poses the share that is missed of those that 60
               random restarts of `aw.solve` find
 
@@ -31,14 +29,12 @@ from pathlib import Path
 
 import numpy as np
 from one_core import on_one_core
-from scipy.cluster.hierarchy import fcluster, linkage
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import armwright as aw
 from armwright.arrays import Array
 from armwright.kinematics.contact.clearance import clearances
-from armwright.kinematics.cycle.entry_postures import entry_postures
 from armwright.kinematics.devices import load_kernels
 from armwright.kinematics.ik.ik import LANES, solve_postures
 from armwright.problem.evaluation import evaluate_arrays
@@ -59,8 +55,6 @@ from tests.support.robots import robot
 N, ROUNDS = 4000, 7
 N_CYCLES, CYCLE_ROUNDS = 256, 5
 POSES, RESTARTS = 1000, 60
-JOBS = ("desk-sorting", "box-palletising", "lathe-tending", "screwing", "casting-inspection", "dispensing")
-N_BRANCHES, BRANCH_STARTS, APART = 500, 1000, 1.0  # [rad] between postures of different branches
 POINTS = load_task("target-1")
 OBSTACLES = [
     {"kind": "ground", "z": -0.6},
@@ -251,33 +245,6 @@ def motor_bodies() -> None:
             compare(rates, f"{motor}: {name}", f"{motor}: {other}")
 
 
-def branches() -> None:
-    print("Branches found, and feasible designs")
-    for name in JOBS:
-        problem = Problem(load_task(name), aw.load_space(name))
-        matrix, scene = problem.space.matrix(problem.space.sample(N_BRANCHES, seed=1)), problem.scenes[0]
-        arms, plan = problem.arms(matrix), scene.plan
-        assert plan is not None
-        poses = plan.poses[[block.entry for block in plan.blocks]]
-        found = hit = 0
-        candidates = entry_postures(arms, plan, scene.obstacles)
-        starts = arms.random_postures(BRANCH_STARTS)
-        for block in range(len(poses)):
-            each = poses[[block] * len(starts)]
-            one = solve_postures(arms, each.position, initial_q=starts.swapaxes(0, 1), target_arrays=each.arrays)
-            free = np.minimum(*clearances(arms, one.q.astype(np.float64), scene.obstacles)) >= 0.0
-            reached = free & (one.distance(each.position) < each.tolerance) & (one.angle < each.angle_tolerance)
-            for row in np.flatnonzero(reached.sum(axis=1) > 1):
-                q, own = one.q[row][reached[row]], candidates[row, block]
-                label = fcluster(linkage(q, "single", "chebyshev"), APART, "distance")
-                distance = np.nan_to_num(np.abs(q[:, None] - own), nan=np.inf).max(axis=-1).min(axis=1)
-                found, hit = found + label.max(), hit + len(set(label[distance < APART]))
-        feasible = (problem.evaluate(matrix).violations <= 0.0).all(axis=1).sum()
-        print(
-            f"  {name:18} {hit} of {found} ({hit / max(found, 1):.1%}), {feasible} of {N_BRANCHES} feasible", flush=True
-        )
-
-
 def reach_map() -> None:
     arms: dict[str, aw.UrdfArm | aw.Arm] = {name: aw.read_urdf(robot(name)) for name in ("ur5_robot", "panda")}
     arms["random, 6 joints"] = paper_arms(1, 6, 3)[0]
@@ -305,7 +272,6 @@ PARTS = {
     "real-arms": real_arms,
     "cycles": cycles,
     "motor-bodies": motor_bodies,
-    "branches": branches,
     "reach-map": reach_map,
 }
 

@@ -10,6 +10,7 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle import cycle_path
 from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
+from armwright.kinematics.cycle.line_following import follow_lines
 from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.problem import Problem
 from armwright.proof.front_gap import known_front
@@ -17,7 +18,7 @@ from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.spaces.design_space import load_space
 from armwright.spaces.parameters import FloatParameter
 from armwright.tasks.catalogue import load_task
-from armwright.tasks.motions import CyclePlan
+from armwright.tasks.motions import CyclePlan, LineSamples
 from armwright.tasks.task import Task
 
 STARTS = 300
@@ -48,7 +49,10 @@ def test_branches_of_many_random_starts_are_found(name: str) -> None:
     start = np.random.default_rng(1).uniform(size=(len(arms), len(plan.blocks), STARTS, arms.dof))
     lower, upper = (limit.astype(np.float64)[:, None, None] for limit in (arms.lower, arms.upper))
     q, is_near = reached(arms, plan, lower + start * (upper - lower))
-    known = np.nan_to_num(entry_postures(arms, plan), nan=np.inf)
+    candidates = entry_postures(arms, plan)
+    assert np.array_equal(candidates, candidates.astype(np.float32), equal_nan=True)
+    assert not ((candidates < lower) | (candidates > upper)).any()
+    known = np.nan_to_num(candidates, nan=np.inf)
     branches = hit = 0
     for row in np.ndindex(q.shape[:2]):
         if is_near[row].sum() > 1:
@@ -91,3 +95,19 @@ def test_more_candidates_lose_no_design_that_three_make_feasible(monkeypatch: py
         feasible.append((given.evaluate(rows).violations <= 0.0).all(axis=1))
     assert feasible[0].any()
     assert all(more[feasible[0]].all() for more in feasible)
+
+
+def test_self_motions_keep_the_tool_where_it_is() -> None:
+    given = problem("casting-inspection")
+    arms, plan = given.arms(given.space.matrix(given.space.sample(20, 1))), given.scenes[0].plan
+    assert plan is not None
+    poses = plan.poses[[block.entry for block in plan.blocks]]
+    entry = entry_postures(arms, plan)
+    samples = LineSamples(poses, np.arange(len(poses) + 1), ())
+    start, moved = follow_lines(arms, samples, entry), follow_lines(arms, samples, entry, aside_by=0.03)
+    reached = (start.position_error < 1e-6) & (start.angle_error < 1e-6)
+    assert reached.sum() > 20
+    change = np.abs(moved.q - start.q)[reached].max(axis=-1)
+    assert np.median(change) > 0.05
+    kept = (moved.position_error < 1e-4) & (moved.angle_error < 1e-3)
+    assert kept[reached].mean() > 0.8

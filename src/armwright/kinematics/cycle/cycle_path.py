@@ -104,7 +104,7 @@ def find_paths(
 ) -> CyclePaths:
     """Find the joint paths of N arms through a cycle. A path that is off is a result, never an exception.
 
-    candidates: K, the number of postures at the first pose of each block to choose from; None for 24.  postures:
+    candidates: K, the number of postures at the first pose of each block to choose from; None for 32.  postures:
     (N, B, K, D) those to choose from instead.  payload: its mass when carried [kg].
     """
     if postures is None:

@@ -34,8 +34,13 @@ class BlockPaths:
         return self.q[:, :, first].swapaxes(1, 2), self.q[:, :, last].swapaxes(1, 2)
 
 
-def follow_lines(arms: ArmArrays, samples: LineSamples, entry: Array, device: Device = "cpu") -> BlockPaths:
-    """Follow all lines of N arms from `entry`: (N, B, K, D) candidate postures at the first sample of each block."""
+def follow_lines(
+    arms: ArmArrays, samples: LineSamples, entry: Array, device: Device = "cpu", aside_by: float = 0.0
+) -> BlockPaths:
+    """Follow all lines of N arms from `entry`: (N, B, K, D) candidate postures at the first sample of each block.
+
+    aside_by: share of the joints' ranges by which random self-motions at each sample move them.
+    """
     loaded = load_kernels("cycle.path_kernels", device)
     n, b, k, dof = entry.shape
     s = len(samples.poses)
@@ -43,7 +48,7 @@ def follow_lines(arms: ArmArrays, samples: LineSamples, entry: Array, device: De
 
     def solve(chunk: slice) -> None:
         start, found = entry[chunk].reshape(-1, b * k, dof), [values[chunk] for values in vars(paths).values()]
-        loaded.launch("follow", start.shape[:2], _path(arms[chunk], samples, loaded), start, outputs=found)
+        loaded.launch("follow", start.shape[:2], _path(arms[chunk], samples, loaded), start, aside_by, outputs=found)
 
     in_chunks(solve, n, max(1, SAMPLES[device] // (s * k)), device)
     return paths

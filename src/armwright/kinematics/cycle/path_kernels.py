@@ -5,6 +5,9 @@ posture of the sample before by damped least-norm updates (Nakamura & Hanafusa 1
 line requires, so the joint path converges as samples are added. Unlike the inverse kinematics of `ik_kernels`, nothing
 pulls joints to the middle of their range, since that would move the arm while the tool stands still.
 
+On request the first updates also move the joints at random, by w less what moves the tool: J# (e - J w) + w (Liégeois
+1977). Each candidate has its own w, the same for all arms and blocks.
+
 A joint that an update would take beyond its limit stays at the limit for the rest of the sample.
 """
 
@@ -15,13 +18,14 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from armwright.kinematics.arms.arm_arrays import MAX_JOINTS, PRISMATIC
+from armwright.kinematics.arms.arm_arrays import FIXED, MAX_JOINTS, PRISMATIC
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
 from armwright.kinematics.cycle.path_math import path_math
 
 UPDATES = 6  # at most, of a sample
 CONVERGED = 1e-7  # [m], [rad]
+MOVES = 2  # the first updates, that move aside as well
 MAX_ROTATION = 0.3  # [rad] of any joint in one update
 HOPELESS, HOPELESS_ANGLE = 0.02, 0.2  # [m], [rad] off at the first sample: the rest gets one update a sample
 
@@ -44,23 +48,28 @@ def path_kernels() -> SimpleNamespace:
     def follow(
         path: Path,
         entry: wp.array3d(dtype=real),
+        aside_by: real,
         q_path: wp.array4d(dtype=real),
         position_error: wp.array3d(dtype=real),
         angle_error: wp.array3d(dtype=real),
     ):
         """Follow the samples of a block.
 
-        entry: (N, B K, D) postures at the first sample of each block.  q_path: (N, K, S, D) [rad] or [m].
+        entry: (N, B K, D) postures at the first sample of each block.  aside_by: standard deviation of w, as a share
+        of each joint's range.  q_path: (N, K, S, D) [rad] or [m].
         position_error: (N, K, S) [m].  angle_error: (N, K, S) [rad].
         """
         arm, thread = wp.tid()
         n_candidates = q_path.shape[1]
         block = thread / n_candidates
         candidate = thread % n_candidates
-        q, free = Values(), Values()
+        q, free, aside = Values(), Values(), Values()
         columns = Columns()
+        random = wp.rand_init(0, candidate)
         for j in range(path.dof):
             q[j] = entry[arm, thread, j]
+            if path.motion[arm, j] < wp.static(FIXED):
+                aside[j] = aside_by * (path.upper[arm, j] - path.lower[arm, j]) * real(wp.randn(random))
         updates = int(UPDATES)
         if wp.isnan(q[0]):  # no candidate
             updates = int(0)  # noqa: RUF046, UP018
@@ -81,7 +90,8 @@ def path_kernels() -> SimpleNamespace:
                         columns[j, i + 3] = axis[i]
                 e, turn, angle, tool_x, tool_y, tool_z = tool_error(path, arm, sample, p, x, y, z)
                 distance = wp.length(e)
-                if update >= updates or (distance < converged and angle < converged):
+                moves = aside_by > zero and update < wp.static(MOVES)
+                if update >= updates or (distance < converged and angle < converged and not moves):
                     break
                 # Rows: the position, then the rotation about the tool's own x, y and, for a frame, z.
                 error = Row(e[0], e[1], e[2], wp.dot(turn, tool_x), wp.dot(turn, tool_y), wp.dot(turn, tool_z))
@@ -103,6 +113,9 @@ def path_kernels() -> SimpleNamespace:
                         columns[j, 4] = wp.dot(angular, tool_y)
                     if kind > 2:
                         columns[j, 5] = wp.dot(angular, tool_z)
+                    if moves:
+                        for row in range(6):
+                            error[row] -= columns[j, row] * aside[j]
                     if free[j] > zero:
                         for row in range(6):
                             for col in range(row + 1):
@@ -110,7 +123,7 @@ def path_kernels() -> SimpleNamespace:
                 update_by = solve_damped(square, error, kind)
                 largest = real(0.0)
                 for j in range(path.dof):
-                    change = real(0.0)
+                    change = wp.where(moves, aside[j], zero)
                     for row in range(6):
                         change += columns[j, row] * update_by[row]
                     columns[j, 0] = free[j] * change
