@@ -78,7 +78,7 @@ def test_huge_files_are_not_read_whole(run: Path, name: str) -> None:
 def assembly(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder, examples = tmp_path_factory.mktemp("assembly") / "run", ROOT / "examples"
     space = load_space(examples / "2-assembly-space.yaml")
-    find_front(Problem(load_task(examples / "2-assembly-task.yaml"), space), evaluations=600, out=folder)
+    find_front(Problem(load_task(examples / "2-assembly-task.yaml"), space), evaluations=200, out=folder)
     return folder
 
 
