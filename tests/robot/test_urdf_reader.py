@@ -8,6 +8,7 @@ import pytest
 
 from armwright.exceptions import ArmError
 from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.cycle.torque_terms import inertia_matrices
 from armwright.kinematics.ik.ik import solve_postures
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import SNAP, UrdfArm, read_urdf
@@ -139,6 +140,18 @@ def test_commercial_robots_agree_with_pinocchio(name: str) -> None:
             assert (joint.lower, joint.upper) == (-2 * np.pi, 2 * np.pi)
         effort = model.effortLimit[seen_joint.idx_v]
         assert joint.effort == (pytest.approx(effort) if 0.0 < effort < np.inf else None)
+
+
+def test_inertia_is_that_of_the_file(file: Path) -> None:
+    """A carousel about its centre of mass, where no cylinder of its mass would have any inertia to speak of."""
+    inertia = '<inertia ixx="0.15" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.05"/>'
+    inertial = f'<inertial><origin rpy="1.5707963267948966 0 0"/><mass value="5"/>{inertia}</inertial>'
+    turn = one_joint(inside='<axis xyz="0 0 1"/><limit lower="-2" upper="2"/>')
+    file.write_text(turn.replace('<link name="b"/>', f'<link name="b">{inertial}</link>'), encoding="utf-8")
+    arms = stack_arms([read_urdf(file).arm], "float64")
+    assert inertia_matrices(arms, np.full((1, 1, 1), 0.3), np.zeros(1), 0.0) == pytest.approx(0.2, rel=1e-12)
+    file.write_text(file.read_text(encoding="utf-8").replace(inertia, ""), encoding="utf-8")
+    assert "links without inertia count as points: b" in read_urdf(file).notes
 
 
 def test_tip_is_chosen_and_reported() -> None:

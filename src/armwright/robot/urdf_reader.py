@@ -9,19 +9,21 @@ the world by rotating that one.
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
-from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Vector
-from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document
+from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Tensor, Vector
+from armwright.robot.link_inertia import point_inertia
+from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, UrdfLink, read_document
 from armwright.rotations import rotation_about
 
 SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
 MAX_ANGLE = 2 * math.pi  # [rad]
+NOWHERE = (0.0, 0.0, 0.0)
 RADIUS = 0.04  # [m], for drawings, if the file has no cylinder
 FINGERS = 2  # longest chain of joints of a branch that counts as a finger
 GRIPPER = re.compile("grip|jaw|finger", re.IGNORECASE)  # names of a last joint that belongs to a gripper
@@ -90,19 +92,20 @@ def _arm(
         snapped = max(snapped, deviation)
         joints.append(_as_joint(joint, axis, sign, zeros[joint.name], notes))
         body = [tree.document.links[name] for name in bodies[i + 1]]
-        mass = sum(link.mass for link in body)
-        moments = sum(
-            (link.mass * (poses[link.name] @ Pose(np.eye(3), link.com)).position for link in body), np.zeros(3)
-        )
-        com = moments / mass - positions[i] if mass > 0.0 else np.zeros(3)
+        mass, centre, inertia = _merged(body, poses)
         radius = max((link.radius for link in body if link.radius is not None), default=RADIUS)
-        links.append(Link(_vector(positions[i + 1] - positions[i]), mass, _vector(com), radius))
+        link = Link(_vector(positions[i + 1] - positions[i]), 0.0, NOWHERE, radius)
+        # A file states nothing of a tube, so all mass is what the link carries.
+        shift = _vector(centre - positions[i + 1])
+        links.append(replace(link, end_mass=mass, end_shift=shift, end_inertia=_tensor(inertia)))
     if snapped > 1e-9:
         notes.append(f"axes are taken to lie along x, y or z; they are off by up to {snapped:.1g} rad")
     shifted = [f"{name} by {value:.4g} rad" for name, value in zeros.items() if value]
     if shifted:
         notes.append(f"zero is moved, so that all axes lie along x, y or z: {', '.join(shifted)}")
-    if not any(link.mass for link in links):
+    if points := [name for name, link in tree.document.links.items() if link.mass and not link.inertia.any()]:
+        notes.append(f"links without inertia count as points: {', '.join(points)}")
+    if not any(link.total_mass for link in links):
         notes.append("no link states a mass; torques are those of the payload alone")
     if any(joint.actuator is None for joint in joints):
         notes.append("not every joint states an effort, so how much of it is used is not known")
@@ -117,6 +120,17 @@ def _arm(
     names = tuple(joint.name for joint in moving)
     values = tuple(zeros[name] for name in names)
     return UrdfArm(tree.document.name, arm, base, tip, names, tuple(signs), values, tuple(notes))
+
+
+def _merged(links: Sequence[UrdfLink], poses: Mapping[str, Pose]) -> tuple[float, Array, Array]:
+    """Return mass [kg], centre [m] and inertia about it [kg m²] of links that are one rigid body, in the base frame."""
+    masses = np.array([link.mass for link in links])
+    centres = np.array([(poses[link.name] @ Pose(np.eye(3), link.com)).position for link in links])
+    mass = float(masses.sum())
+    centre = masses @ centres / (mass or 1.0)
+    rotations = np.array([poses[link.name].rotation for link in links])
+    tensors = rotations @ [link.inertia for link in links] @ rotations.swapaxes(1, 2)
+    return mass, centre, (tensors + point_inertia(masses, centres - centre)).sum(axis=0)
 
 
 def _check_joint(joint: UrdfJoint, where: str) -> None:
@@ -198,6 +212,11 @@ def _nearest_axis(direction: Array) -> tuple[int, float, float]:
 
 def _vector(values: Array) -> Vector:
     x, y, z = values.tolist()
+    return x, y, z
+
+
+def _tensor(rows: Array) -> Tensor:
+    x, y, z = map(_vector, rows)
     return x, y, z
 
 

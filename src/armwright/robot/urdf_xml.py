@@ -16,6 +16,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError
 from armwright.files import read_bytes
+from armwright.robot.link_geometry import TENSOR_INDICES
 from armwright.rotations import rotation_from_rpy
 
 MAX_FILE = 4 * 1024 * 1024  # [bytes]; the largest of 60 common robots has 0.2 MB
@@ -41,6 +42,7 @@ class UrdfLink:
     name: str
     mass: float  # [kg]
     com: Array  # (3,) its centre of mass in the link frame [m]
+    inertia: Array  # (3, 3) about that centre, along the axes of the link frame [kg m²]
     radius: float | None  # of its thickest cylinder [m]; None if it has none
 
 
@@ -133,14 +135,24 @@ def _link(element: ElementTree.Element, where: str) -> UrdfLink:
     name = _name(element, "link", where)
     of = f'{where}: link "{_short(name)}"'
     inertial = element.find("inertial")
-    mass, com = 0.0, np.zeros(3)
+    mass, com, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
     if inertial is not None:
         mass = _numbers(inertial.find("mass"), "value", 1, of)[0]
         if mass < 0.0:
             raise ArmError(f"{of}: expected a mass of 0 kg or more, got {mass:g} kg")
-        com = _pose(inertial.find("origin"), of).position
+        frame = _pose(inertial.find("origin"), of)
+        com, inertia = frame.position, frame.rotation @ _tensor(inertial, of) @ frame.rotation.T
     shapes = [_numbers(shape, "radius", 1, of)[0] for shape in element.iter("cylinder")]
-    return UrdfLink(name, mass, com, max((radius for radius in shapes if radius > 0.0), default=None))
+    return UrdfLink(name, mass, com, inertia, max((radius for radius in shapes if radius > 0.0), default=None))
+
+
+def _tensor(inertial: ElementTree.Element, of: str) -> Array:
+    """Return the (3, 3) tensor of an <inertial> in its own frame [kg m²]; what it does not state is 0."""
+    element, tensor = inertial.find("inertia"), np.zeros((3, 3))
+    for key, place in TENSOR_INDICES.items():
+        if element is not None and element.get(key) is not None:
+            tensor[place] = tensor[place[::-1]] = _numbers(element, key, 1, of)[0]
+    return tensor
 
 
 def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:

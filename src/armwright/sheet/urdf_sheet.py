@@ -50,6 +50,7 @@ def urdf_sheet(described: UrdfArm, job: Job | None = None, price: float | None =
         existing = ExistingArm(job.problem, job.problem.physics(stack_arms([arm])), price)
         payload, targets = float(job.problem.task.payloads.max()), existing.evaluation.targets
     lines = arm_lines(arm, payload, targets, described.values_in_arm(np.zeros(len(arm.joints))).tolist())
+    lines["links"] = tuple(replace(line, mass=arm.links[line.number - 1].total_mass) for line in lines["links"])
     assumptions = _assumptions(described, arm.safety_factor, job)
     if existing is not None and existing.undecided:
         assumptions["constraints"] = f"unknown whether it meets {', '.join(existing.undecided)}"
@@ -105,7 +106,7 @@ def _in_urdf(line: JointLine, sign: float, zero: float) -> JointLine:
 def _masses(arm: Arm) -> tuple[MassLine, ...]:
     """Return the parts of the mass; empty if the URDF states none."""
     lines = [MassLine("base", arm.base_mass)]
-    lines += [MassLine(f"link {n}", link.mass) for n, link in enumerate(arm.links, start=1)]
+    lines += [MassLine(f"link {n}", link.total_mass) for n, link in enumerate(arm.links, start=1)]
     lines.append(MassLine("tool", arm.tool.mass))
     return tuple(line for line in lines if line.mass > 0.0)
 
