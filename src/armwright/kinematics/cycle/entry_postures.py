@@ -104,7 +104,7 @@ def _branches(arms: ArmArrays, q: Array, cost: Array, known: int, count: int, di
     found = np.full((n, b, count, dof), np.nan)
 
     def find(chunk: slice) -> None:
-        values = {name: getattr(arms[chunk], name) for name in ("dof", "motion", "offset", "lower", "upper")}
+        values = {name: getattr(arms[chunk], name) for name in ("dof", "motion", "axis", "offset", "lower", "upper")}
         chain, part, nearness = loaded.struct("Chain", values), found[chunk], np.full((*cost[chunk].shape,), np.inf)
         loaded.launch(
             "find_branches", part.shape[:2], chain, q[chunk], cost[chunk], known, distinct, nearness, outputs=[part]
