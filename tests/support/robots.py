@@ -36,18 +36,6 @@ def any_arm(seed: int, kinds: tuple[str, ...] = ("revolute", "prismatic", "fixed
     return Arm(_vector(rng, 1.0), joints, links)
 
 
-def six_oblique_axes(seed: int) -> Arm:
-    """An arm of six turning joints about axes in any direction."""
-    rng = np.random.default_rng([seed, 79])
-    axes = [tuple(axis.tolist()) for axis in map(_unit, rng.standard_normal((6, 3)))]
-    joints = tuple(Joint("revolute", axis, -2.8, 2.8) for axis in axes)  # type: ignore[arg-type]
-    return Arm((0.0, 0.0, 0.0), joints, tuple(_general_link(rng) for _ in axes))
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
-
-
 def with_frames_anyhow(arm: Arm, seed: int, off: float = 0.0) -> str:
     """The URDF of an arm, its links' frames turned anyhow, and some axes with them, so that they point the other way.
 

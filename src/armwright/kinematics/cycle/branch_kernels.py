@@ -17,6 +17,7 @@ others have no images.
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
+import math
 from functools import cache
 from types import SimpleNamespace
 
@@ -26,7 +27,7 @@ from armwright.kinematics.arms.arm_arrays import MAX_JOINTS, PRISMATIC
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
 
-PARALLEL = 5e-3  # [rad] by which axes may miss what images assume, which the inverse kinematics refines
+AXES_OFF = 5e-3  # [rad] by which axes may miss what images assume, which the inverse kinematics refines
 NARROW = 0.15  # of an arm's length, by which links may lie off the line that they are turned about
 
 
@@ -37,7 +38,8 @@ def branch_kernels() -> SimpleNamespace:
     real, Vector3 = base.real, base.Vector3
     Values = wp.types.vector(length=MAX_JOINTS, dtype=real)
     zero, two, infinity = real(0.0), real(2.0), real(float("inf"))
-    pi, narrow, tiny, parallel = real(3.141592653589793), real(NARROW), real(1e-9), real(PARALLEL)
+    pi, narrow, tiny = real(math.pi), real(NARROW), real(1e-9)
+    off, parallel = real(AXES_OFF), real(math.cos(AXES_OFF))
 
     @wp.struct
     class Chain:
@@ -58,10 +60,10 @@ def branch_kernels() -> SimpleNamespace:
     @wp.func
     def sense(chain: Chain, arm: int, j: int, a: Vector3):
         """Return 1 for a joint that turns about an axis, -1 for one about the opposite one, 0 for any other."""
-        b = chain.axis[arm, j]
-        if chain.motion[arm, j] >= wp.static(PRISMATIC) or wp.length(wp.cross(a, b)) > parallel:
+        cosine = wp.dot(a, chain.axis[arm, j])
+        if chain.motion[arm, j] >= wp.static(PRISMATIC) or wp.abs(cosine) < parallel:
             return zero
-        return wp.sign(wp.dot(a, b))
+        return wp.sign(cosine)
 
     @wp.func
     def links_across(chain: Chain, arm: int, a: Vector3, first: int, end: int):
@@ -80,7 +82,7 @@ def branch_kernels() -> SimpleNamespace:
         while end < chain.dof and sense(chain, arm, end, a) == zero:
             if chain.motion[arm, end] < wp.static(PRISMATIC):
                 others += 1
-                if wp.abs(wp.dot(chain.axis[arm, end], a)) > parallel:
+                if wp.abs(wp.dot(chain.axis[arm, end], a)) > off:
                     return q, 0
             end += 1
         for j in range(chain.dof):
