@@ -6,11 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pinocchio
 import pytest
+from scipy.spatial.transform import Rotation
 
 from armwright.exceptions import SettingsError
-from armwright.robot.mounting import Mounting, mounted, needs_turning
+from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.kinematics.contact.clearance import clearances
+from armwright.robot.mounting import Mounting, mounted, needs_turning, turned
 from armwright.robot.urdf_reader import read_urdf
-from tests.support.robots import robot
+from tests.support.robots import any_arm, robot
 from tests.support.urdf_peers import differences, random_states, seen_by_kernels, seen_by_pinocchio
 
 
@@ -28,6 +31,15 @@ def test_turned_arm_is_where_pinocchio_sees_it(name: str, yaw: float) -> None:
         theirs, tip=np.array([pose.act(tip) for tip in theirs.tip]), rotation=pose.rotation @ theirs.rotation
     )
     assert max(differences(ours, moved).values()) < 1e-7
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_turned_arm_keeps_its_clearances(seed: int) -> None:
+    arm, rng = any_arm(seed), np.random.default_rng(seed)
+    other = turned(arm, Rotation.random(random_state=seed).as_matrix())
+    q = rng.uniform(-0.3, 0.3, (1, 20, len(arm.joints)))
+    before, after = (clearances(stack_arms([one], "float64"), q)[0] for one in (arm, other))
+    assert after == pytest.approx(before, abs=1e-9)
 
 
 def test_only_arms_whose_first_joint_makes_no_full_turn_need_turning() -> None:

@@ -79,7 +79,8 @@ def _arm(tree: "_LinkTree", base: str, tip: str, moving: Sequence[UrdfJoint], no
         # A file states nothing of a tube, so all mass is what the link carries.
         shift = _vector(centre - positions[i + 1])
         links.append(replace(link, end_mass=mass, end_shift=shift, end_inertia=_tensor(inertia)))
-    if points := [name for name, link in tree.document.links.items() if link.mass and not link.inertia.any()]:
+    moved = [tree.document.links[name] for body in bodies[1:] for name in body]
+    if points := [link.name for link in moved if link.mass and not link.inertia.any()]:
         notes.append(f"links without inertia count as points: {', '.join(points)}")
     if not any(link.total_mass for link in links):
         notes.append("no link states a mass; torques are those of the payload alone")

@@ -18,13 +18,13 @@ from armwright.tasks.payload import POINT_LOAD, LoadShape
 
 MAX_JOINTS = 16
 MAX_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
-# Motions: 0 to 2 rotate about local x, y, z or the opposite, 3 about another axis; 4 to 7 translate along these; 8 is
-# fixed.
+# Motions: 0 to 2 rotate about local x, y, z or the opposite, 3 about an oblique axis; 4 to 7 translate along these; 8
+# is fixed.
 OBLIQUE, PRISMATIC, FIXED = 3, 4, 8
-MOTION_AXES = np.vstack([np.eye(4, 3), np.eye(4, 3), np.zeros((1, 3))])  # by motion; 0 if it does not say
+MOTION_AXES = np.vstack([np.eye(4, 3), np.eye(4, 3), np.zeros((1, 3))])  # of designs, by motion
 
 Precision = Literal["float32", "float64"]
-Motions = Literal["revolute", "any", "oblique"]  # of all joints of some arms: the first about x, y or z, or any too
+Motions = Literal["revolute", "any", "oblique"]  # of all joints of some arms: about x, y, z; others too; or oblique too
 TargetKind = Literal["position", "pose"]  # points alone, or some with an axis or orientation of the tool
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
