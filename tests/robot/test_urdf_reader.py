@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pinocchio
 import pytest
@@ -12,6 +13,7 @@ from armwright.kinematics.cycle.torque_terms import inertia_matrices
 from armwright.kinematics.ik.solve import solve
 from armwright.robot.arm import Arm
 from armwright.robot.link_geometry import inertia_tensor
+from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_reader import UrdfArm, read_urdf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.robot.urdf_xml import MAX_FILE
@@ -108,7 +110,7 @@ def test_commercial_robots_agree_with_pinocchio(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["panda", "xarm7", "so101"])
 def test_exports_of_existing_arms_agree_with_their_files(file: Path, name: str) -> None:
-    """An export is read back with the same axes, and moves as the file does."""
+    """A URDF is read back and an MJCF driven by MuJoCo as Pinocchio drives the file."""
     read = read_urdf(robot(name))
     file.write_text(to_urdf(read.arm), encoding="utf-8")
     again = read_urdf(file, tip="tip")
@@ -116,6 +118,12 @@ def test_exports_of_existing_arms_agree_with_their_files(file: Path, name: str) 
     assert_as_pinocchio(file, again, states)
     theirs = seen_by_pinocchio(robot(name), read, states)
     assert max(differences(seen_by_kernels(again.arm, states), theirs).values()) < 1e-8
+    model = mujoco.MjModel.from_xml_string(to_mjcf(read.arm))
+    data = mujoco.MjData(model)
+    for row, torque in zip(states.swapaxes(0, 1), theirs.torque, strict=True):
+        data.qpos[:], data.qvel[:], data.qacc[:] = row
+        mujoco.mj_inverse(model, data)
+        assert data.qfrc_inverse - data.qfrc_passive == pytest.approx(torque, abs=1e-6 * np.abs(torque).max())
 
 
 def test_inertia_is_that_of_the_file(file: Path) -> None:
