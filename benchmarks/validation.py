@@ -126,7 +126,7 @@ def print_payloads(arms: Mapping[str, tuple[Path, UrdfArm]]) -> None:
     for case in CASES:
         if case.arm in arms:
             arm = arms[case.arm][1].arm
-            mass = sum(link.mass for link in arm.links)
+            mass = sum(link.total_mass for link in arm.links)
             found = held_payloads(postures_over_reach(driven(arm, case.torques), (0.5, 1.0)))
             near, far = (f"{payload:.2f} kg" for payload in found.payloads)
             print(f"| {case.arm} | {case.motors} | {mass:.2f} kg | {found.reach:.3f} m | {near} | {far} |")
@@ -179,17 +179,16 @@ def print_servos(arm: Arm) -> None:
 def print_droop(read: UrdfArm) -> None:
     """Print where OpenArm's first joint stays without compensation of gravity, by its gains and by a user."""
     arms = stack_arms([read.arm], "float64")
-    signs = np.array(read.signs)
     print("\n| commanded | measured | computed | torque by gain and measured error | computed there |")
     print("|--:|--:|--:|--:|--:|")
     for commanded, measured in zip(COMMANDED, MEASURED, strict=True):
-        target, there = (signs * np.radians([angle, *[0.0] * 6]) for angle in (commanded, measured))
-        stays = read.values_in_urdf(equilibrium(arms, target))
+        target, there = (np.radians([angle, *[0.0] * 6]) for angle in (commanded, measured))
+        stays = equilibrium(arms, target)
         exerted, needed = GAINS[0] * np.radians(commanded - measured), abs(held(arms, there[None, None])[0, 0])
         print(
             f"| {commanded:g}° | {measured:g}° | {np.degrees(stays[0]):.1f}° | {exerted:.1f} N m | {needed:.1f} N m |"
         )
-    horizontal = signs * np.radians([90.0, *[0.0] * 6])
+    horizontal = np.radians([90.0, *[0.0] * 6])
     print(f"horizontal: {abs(held(arms, horizontal[None, None])[0, 0]):.1f} N m")
 
 
@@ -204,10 +203,10 @@ def equilibrium(arms: ArmArrays, target: Array) -> Array:
 
 def print_torques(name: str, path: Path, read: UrdfArm, postures: Mapping[str, Sequence[float]]) -> None:
     """Print the holding torques of postures, and how far they are off Pinocchio's."""
-    q = (np.radians(list(postures.values())) - read.zeros) * read.signs
+    q = np.radians(list(postures.values()))
     ours, theirs = held(stack_arms([read.arm], "float64"), q[None]), gravity(read, path, q)
     print(f"\n| {name} | holding torques [N m] | largest difference |\n|---|---|--:|")
-    for posture, mine, difference in zip(postures, ours * read.signs, np.abs(ours - theirs).max(axis=1), strict=True):
+    for posture, mine, difference in zip(postures, ours, np.abs(ours - theirs).max(axis=1), strict=True):
         print(f"| {posture} | {', '.join(f'{round(value, 2) + 0.0:.2f}' for value in mine)} | {difference:.0e} |")
 
 
@@ -219,17 +218,17 @@ def held(arms: ArmArrays, q: Array, payload: float = 0.0) -> Array:
 
 
 def gravity(read: UrdfArm, path: Path, q: Array) -> Array:
-    """Return the torques (T, D) by Pinocchio at the arm's own values q (T, D) [N m]."""
+    """Return the torques (T, D) by Pinocchio in postures q (T, D) [N m]."""
     model = pinocchio.buildModelFromUrdf(str(path))
     data = model.createData()
     joints = [model.joints[model.getJointId(name)] for name in read.joints]
     torques = []
-    for row in read.values_in_urdf(q):
+    for row in q:
         values = pinocchio.neutral(model)
         for joint, value in zip(joints, row, strict=True):
             values[joint.idx_q : joint.idx_q + joint.nq] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
         torques.append(pinocchio.computeGeneralizedGravity(model, data, values)[[joint.idx_v for joint in joints]])
-    return np.array(torques) * read.signs
+    return np.array(torques)
 
 
 if __name__ == "__main__":

@@ -318,6 +318,26 @@ def test_existing_arm_drives_a_cycle_of_stated_durations() -> None:
     assert compare_arms(fastest, [UR5], space=WITH_MOTORS, base=(-0.2, 0.0, 0.0)).arms[0].values == (None, None)
 
 
+def test_carousel_needs_the_torque_of_its_own_inertia(tmp_path: Path) -> None:
+    """A quarter turn of 0.2 kg m² in 1 s, of which the minimum jerk accelerates with 5.77 times the angle at most."""
+    inertial = '<mass value="5"/><inertia ixx="0.05" ixy="0" ixz="0" iyy="0.15" iyz="0" izz="0.2"/>'
+    limit = '<limit lower="-2" upper="2" effort="1" velocity="20"/>'
+    file = tmp_path / "carousel.urdf"
+    file.write_text(
+        f'<robot name="r"><link name="a"/><link name="b"><inertial>{inertial}</inertial></link><link name="c"/>'
+        f'<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>{limit}</joint>'
+        '<joint name="k" type="fixed"><parent link="b"/><child link="c"/><origin xyz="0.4 0 0"/></joint></robot>',
+        encoding="utf-8",
+    )
+    side, cycle = 0.4 * np.sqrt(0.5), {"time": 1.0, "steps": [{"to": 1}, {"to": 2}]}
+    task = Task(
+        name="turn", targets=((side, side, 0.0), (side, -side, 0.0)), cycle=cycle, objectives=["dynamic_torque"]
+    )  # type: ignore[arg-type]
+    (arm,) = compare_arms(task, [file], base=(0.0, 0.0, 0.0)).arms
+    assert arm.values[0] == pytest.approx(0.2 * 5.7735 * np.pi / 2, rel=2e-3)
+    assert any("an effort of its file" in one for one in arm.violated)
+
+
 def test_slides_of_existing_arms_use_the_travel_of_the_space(tmp_path: Path) -> None:
     """The force is unchanged; the torque follows from the travel of the space."""
     tiago = read_urdf(robot("tiago_no_hand"))

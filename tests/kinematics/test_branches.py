@@ -1,5 +1,7 @@
 """Branches of the inverse kinematics at the first poses of blocks, and the choice among them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -15,6 +17,8 @@ from armwright.kinematics.ik.ik import solve_postures
 from armwright.problem.problem import Problem
 from armwright.proof.front_gap import known_front
 from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.robot.mounting import turned
+from armwright.rotations import rotation_about
 from armwright.spaces.design_space import load_space
 from armwright.spaces.parameters import FloatParameter
 from armwright.tasks.catalogue import load_task
@@ -65,17 +69,23 @@ def test_branches_of_many_random_starts_are_found(name: str) -> None:
     assert hit >= 0.9 * branches
 
 
-def test_shoulder_and_elbow_of_an_upright_arm_give_four_branches() -> None:
-    """q₁ or q₁ + π, each with the elbow on either side; the wrist follows."""
+@pytest.mark.parametrize("yaw", [0.0, 0.7])
+@pytest.mark.parametrize("flipped", [(), (1,), (0, 2, 3)])
+def test_shoulder_and_elbow_of_an_upright_arm_give_four_branches(yaw: float, flipped: tuple[int, ...]) -> None:
+    """q₁ or q₁ + π, each with the elbow on either side; the wrist follows, also about opposite and oblique axes."""
     joints = (Joint("revolute", "z", -3.1, 3.1), *(Joint("revolute", "y", -3.1, 3.1),) * 3)
     links = tuple(uniform_link((0.0, 0.0, length), 0.2, 0.01) for length in (0.1, 0.3, 0.25, 0.1))
-    target = {"position": [0.3, 0.1, 0.1], "axis": [0.0, 0.0, -1.0]}
+    sign = [-1.0 if j in flipped else 1.0 for j in range(4)]
+    axes = [tuple(way * x for x in joint.direction) for joint, way in zip(joints, sign, strict=True)]
+    opposite = [replace(joint, axis=axis) for joint, axis in zip(joints, axes, strict=True)]  # type: ignore[arg-type]
+    turn = rotation_about(np.array([0.0, 0.0, 1.0]), yaw)
+    points = [{"position": (turn @ point).tolist(), "axis": [0, 0, -1]} for point in ([0.3, 0.1, 0.1], [0.1, 0.3, 0.1])]
     content = {"cycle": {"closed": False, "steps": [{"to": 1}, {"to": 2}]}}
-    task = Task.model_validate({"name": "one", "targets": [target, {**target, "position": [0.1, 0.3, 0.1]}], **content})
-    arms = stack_arms([Arm((0.0, 0.0, 0.0), joints, links)], "float64")
+    task = Task.model_validate({"name": "one", "targets": points, **content})
+    arms = stack_arms([turned(Arm((0.0, 0.0, 0.0), tuple(opposite), links), turn)], "float64")
     plan = task.plan(task.target_positions)
     q = entry_postures(arms, plan)[0, 0]
-    q = q[~np.isnan(q[:, 0])]
+    q = sign * q[~np.isnan(q[:, 0])]
     assert sorted(np.round(q[:, 0], 3)) == [-2.82, -2.82, 0.322, 0.322]
     assert sorted(np.sign(np.sin(q[:, 2]))) == [-1.0, -1.0, 1.0, 1.0]
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import SettingsError, TaskError
+from armwright.kinematics.arms.arm_arrays import FIXED
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.checks.finding import PROVEN, SUSPECTED
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
@@ -216,7 +217,7 @@ def test_designs_lie_within_the_intervals_of_their_size(keys: dict[str, Any]) ->
     measured = {
         "mass": arms.mass.sum(axis=1, dtype=np.float64) + arms.base_mass,
         "length": arms.length,
-        "joints": (arms.motion < 6).sum(axis=1),
+        "joints": (arms.motion < FIXED).sum(axis=1),
         **({} if arms.actuation is None else {"price": arms.actuation.price + arms.structure_price}),
     }
     known = intervals_by_modules(checked)

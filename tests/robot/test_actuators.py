@@ -166,6 +166,32 @@ def test_catalogue_completes_every_actuator_and_counts_assumed_values() -> None:
     assert stated in guide
 
 
+def test_two_actuators_at_one_joint_are_one_of_twice_the_torque() -> None:
+    """They share a shaft, so what adds up doubles, also at other voltages, and the body is twice as long."""
+    content = {"name": "s", "link_section": {"material": "aluminium", "tubes": [[0.03, 0.002]]}}
+    space = DesignSpace.model_validate({**content, "actuators": ["XM430-W350", {"2x": "XM430-W350"}]})
+    again = DesignSpace.model_validate_json(space.model_dump_json())
+    assert [record.name for record in again.actuators] == ["XM430-W350", "2x-XM430-W350"]
+    assert again.actuators[1].assumed == tuple(n for n in space.actuators[0].assumed if not n.startswith("voltage"))
+    for supply in (11.1, 12.0, 14.8):
+        one, two = (record.at_supply(supply).actuator() for record in again.actuators)
+        for name in (
+            "mass",
+            "peak_torque",
+            "continuous_torque",
+            "rotor_inertia",
+            "price",
+            "current",
+            "joint_stiffness",
+        ):
+            assert getattr(two, name) == pytest.approx(2.0 * getattr(one, name)), name
+        assert (two.speed, two.corner_speed, two.backlash) == (one.speed, one.corner_speed, one.backlash)
+        assert one.shape is not None
+        assert two.shape == replace(one.shape, length=2.0 * one.shape.length)
+    with pytest.raises(ValueError, match='unknown actuator "XM43"'):
+        DesignSpace.model_validate({**content, "actuators": [{"2x": "XM43"}]})
+
+
 def test_defaults_are_ratios_of_the_reference_torque() -> None:
     record = ActuatorRecord(name="x", mass=0.1, stall_torque=4.0, speed=5.0, voltage=12.0, backlash=0.01)
     completed = record.completed()

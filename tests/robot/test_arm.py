@@ -20,6 +20,7 @@ LINK = uniform_link((0.0, 0.3, 0.4), 0.2, 0.015)
         ("revolute", "y", -math.inf, 1.0, r"finite: \[-inf, 1.0\] rad"),
         ("continuous", "y", -1.0, 1.0, '"continuous" is not one of revolute, prismatic, fixed'),
         ("revolute", "w", -1.0, 1.0, '"w" is not one of x, y, z'),
+        ("revolute", (0.0, 0.6, 0.6), -1.0, 1.0, "nor a vector of length 1"),
     ],
 )
 def test_invalid_joints_are_refused(kind: str, axis: str, lower: float, upper: float, words: str) -> None:

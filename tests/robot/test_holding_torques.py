@@ -9,7 +9,7 @@ import pinocchio
 import pytest
 
 from armwright.robot.urdf_reader import read_urdf
-from tests.robot.test_urdf_reader import seen_by_kernels
+from tests.support.urdf_peers import seen_by_kernels
 
 PAYLOAD = 2.0  # [kg]
 UR_POSTURES = {  # [°]
@@ -53,8 +53,8 @@ def test_ur5e_is_held_as_its_published_table_says(tmp_path: Path, payload: float
     angles = np.radians(list(UR_POSTURES.values()))
     theirs = gravity(model_of(UR5E, payload), angles, range(6))
     assert np.abs(theirs).max() > 50.0
-    _, ours = seen_by_kernels(read.arm, read.values_in_arm(angles), payload)
-    assert np.allclose(ours * read.signs, theirs, atol=1e-9)
+    ours = seen_by_kernels(read.arm, np.stack([angles, 0.0 * angles, 0.0 * angles]), payload).gravity
+    assert np.allclose(ours, theirs, atol=1e-9)
 
 
 def gravity(model: pinocchio.Model, values: np.ndarray, places: Sequence[int]) -> np.ndarray:

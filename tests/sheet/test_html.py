@@ -22,7 +22,7 @@ def small_sheet() -> DataSheet:
     joints = tuple(Joint("revolute", axis, -2.0, 2.0) for axis in ("z", "y", "y"))
     links = tuple(uniform_link((0.0, 0.0, length), 0.2, 0.01) for length in (0.1, 0.3, 0.2))
     arm = Arm((0.0, 0.0, 0.1), joints, links)
-    return urdf_sheet(UrdfArm("small", arm, "base", "tip", ("a", "b", "c"), (1.0,) * 3, (0.0,) * 3))
+    return urdf_sheet(UrdfArm("small", arm, "base", "tip", ("a", "b", "c")))
 
 
 def large_sheet() -> DataSheet:

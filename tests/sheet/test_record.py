@@ -180,7 +180,7 @@ def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
     places = [model.joints[model.getJointId(joint.name)].idx_q for joint in sheet.joints]
     assert [joint.lower for joint in sheet.joints] == pytest.approx(model.lowerPositionLimit[places], abs=1e-12)
     assert [joint.upper for joint in sheet.joints] == pytest.approx(model.upperPositionLimit[places], abs=1e-12)
-    q = there.values_in_urdf(problem.physics(stack_arms([there.arm])).q[0])
+    q = problem.physics(stack_arms([there.arm])).q[0].astype(np.float64)
     assert [joint.used for joint in sheet.joints] == [
         pytest.approx(ends) for ends in zip(q.min(axis=0), q.max(axis=0), strict=True)
     ]

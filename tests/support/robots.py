@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.rotations import rotation_about
+from armwright.rotations import rotation_about, rotation_from_rpy
 from tests.support.arms import _general_joint, _general_link, _vector
 
 
@@ -69,8 +69,10 @@ def with_frames_anyhow(arm: Arm, seed: int, off: float = 0.0) -> str:
     for link in robot.iter("link"):
         com = link.find("inertial/origin")
         if com is not None:
-            place = np.array([float(value) for value in com.get("xyz").split()])  # type: ignore[union-attr]
-            com.set("xyz", _words(turns[link.get("name")].T @ place))  # type: ignore[index]
+            place, angles = (np.array([float(value) for value in com.get(key).split()]) for key in ("xyz", "rpy"))  # type: ignore[union-attr]
+            turn = turns[link.get("name")].T  # type: ignore[index]
+            com.set("xyz", _words(turn @ place))
+            com.set("rpy", _words(Rotation.from_matrix(turn @ rotation_from_rpy(*angles)).as_euler("xyz")))
     return ElementTree.tostring(robot, encoding="unicode")
 
 

@@ -79,8 +79,8 @@ def placed(problem: Problem, described: UrdfArm, seed: int, mounting: Mounting |
 def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
     """Return where the base link stands best: by missed targets, then violation, then torque.
 
-    Its position lies within the ranges of the design space. It is turned only if the first joint makes no full turn,
-    and if that pays. Constraints on unknown quantities do not count.
+    Its position lies within the ranges of the design space. It is turned if that pays, unless a vertical first joint
+    makes full turns. Constraints on unknown quantities do not count.
     """
     by_name = {parameter.name: parameter for parameter in problem.space.parameters}
     parameters = [cast("FloatParameter", by_name[f"origin_{axis}"]) for axis in "xyz"]

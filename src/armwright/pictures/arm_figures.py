@@ -126,7 +126,7 @@ def _draw_panel(
         for axis, body in motor_solids(arm, q):
             draw_solid(axes, body, extent, JOINT[axis])
         for joint, place in zip(arm.joints, places[:-1], strict=True):
-            axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
+            axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.nearest_axis], alpha=alpha)
         goal = task.target_positions[target]
         axes.plot(*goal[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
         _draw_orientation(axes, goal, task.target_arrays, target, ARROW * arm.reach)

@@ -223,7 +223,7 @@ def _add_motor(body: Element, name: str, segment: Segment, arm: Arm) -> None:
     radius = segment.link.radius if before is None else before.radius
     shape = {"type": "sphere", "pos": numbers(segment.position), "size": number(radius)}
     bits = TOUCHES_ALL if counts else TOUCHES_NOTHING
-    SubElement(body, "geom", {"name": name, **shape, "material": f"joint_{segment.joint.axis}", **bits})
+    SubElement(body, "geom", {"name": name, **shape, "material": f"joint_{segment.joint.nearest_axis}", **bits})
 
 
 def _add_payload(body: Element, arm: Arm, scene: Scene) -> None:

@@ -30,7 +30,6 @@ ALIKE = 0.3  # difference in log length over which a result speaks for other siz
 DOUBT = 0.3  # weight of the uncorrected forecast, relative to that of one result of the same size
 MOST = 1.0  # largest correction of the torque's logarithm
 LEAST = 1e-6
-AXES = np.vstack([np.eye(3), np.zeros((4, 3))])  # by motion; zero for joints that do not turn
 
 
 @dataclass(frozen=True)
@@ -81,8 +80,8 @@ def _stretched(problem: Problem, designs: Sequence[Design]) -> tuple[Array, Arra
     places = np.concatenate([arms.base[:, None], ends], axis=1).astype(np.float64)  # (N, D + 1, 3) joints and tip
     up = places[:, -1] - places[:, 0]
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), SMALL)
-    axes = AXES[arms.motion]  # (N, D, 3)
     turns = arms.motion < PRISMATIC
+    axes = np.where(turns[..., None], arms.axis.astype(np.float64), 0.0)  # (N, D, 3)
     bends = turns & (np.abs(np.einsum("njk,nk->nj", axes, up)) < 0.5)
     first = np.where(bends.any(axis=1), bends.argmax(axis=1), arms.dof)  # (N,) the pivot's joint
     pivot = places[rows, first]

@@ -6,11 +6,12 @@ and get the default of the actuator's kind.
 
 import csv
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import resources
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
@@ -31,6 +32,12 @@ Edge = Literal["width", "height", "depth"]
 
 VOLTAGE_DRIVEN: tuple[ActuatorKind, ...] = ("servo", "coreless servo")  # without a limit of the current
 DIMENSIONS: tuple[Edge, ...] = get_args(Edge)
+SEVERAL = re.compile("([2-4])x")  # key of a space file for several actuators at one joint
+ADDED = (  # values of several actuators at one joint that add up
+    "mass", "bracket_mass", "stall_torque", "rated_torque", "peak_torque", "rotor_inertia", "coulomb_friction",
+    "viscous_friction", "joint_stiffness", "position_gain", "damping_gain", "current", "tilting_limit", "axial_limit",
+    "radial_limit", "price",
+)  # fmt: skip
 
 
 class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -154,6 +161,20 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         if record.corner_speed is None or record.speed is None:
             return record
         return record.model_copy(update={"corner_speed": min(record.corner_speed, record.speed)})
+
+    def several(self, count: int) -> "ActuatorRecord":
+        """Return as one the completed actuators that turn a joint together, side by side along its shaft."""
+        record = self.scaled(ADDED, count)
+        values: dict[str, Any] = {
+            "name": f"{count}x-{self.name}",
+            "at_voltages": tuple((volts, count * torque, speed) for volts, torque, speed in self.at_voltages),
+            "estimates": tuple(name for name in self.assumed if value_of(record, name) is not None),
+        }
+        if self.width is not None and self.height is not None and self.depth is not None:
+            shape, edge = default_shape(self.kind, self.width, self.height, self.depth)
+            edge = self.shaft_edge or edge
+            values |= {"shape": self.shape or shape, "shaft_edge": edge, edge: count * getattr(self, edge)}
+        return record.model_copy(update=values)
 
     def at_supply(self, volts: float) -> "ActuatorRecord":
         """Return the completed record at a supply [V], which is then the only one that it takes.
@@ -301,7 +322,11 @@ def named_actuator(name: str) -> ActuatorRecord:
 
 
 def resolve_actuator(entry: Any) -> Any:
-    """Return the record of a named actuator; anything else unchanged, for pydantic to validate."""
+    """Return the record of a named actuator, or of `{2x: NAME}`; anything else unchanged, for pydantic to validate."""
+    if isinstance(cast("object", entry), dict) and len(entry) == 1:
+        ((key, each),) = entry.items()
+        if several := SEVERAL.fullmatch(str(key)):
+            return ActuatorRecord.model_validate(resolve_actuator(each)).several(int(several[1]))
     if not isinstance(entry, str):
         return entry
     try:

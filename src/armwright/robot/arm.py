@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 from armwright.exceptions import ArmError
-from armwright.robot.axes import AXES, Axis, Vector
+from armwright.robot.axes import AXES, Axis, Vector, unit_vector
 from armwright.robot.motor_body import ActuatorShape, MotorBody
 from armwright.robot.tubes import section_square
 from armwright.text import listed
@@ -61,7 +61,7 @@ class Joint:
     """A joint about (revolute) or along (prismatic) a local axis."""
 
     kind: JointKind  # type; a fixed joint has no limits and does not move
-    axis: Axis  # local axis
+    axis: Axis | Vector  # local axis by its name, or a unit vector along it
     lower: float = 0.0  # lower limit [rad] or [m]
     upper: float = 0.0  # upper limit [rad] or [m]
     actuator: Actuator | None = None  # actuator; None if not chosen
@@ -71,8 +71,8 @@ class Joint:
     def __post_init__(self) -> None:
         if self.kind not in get_args(JointKind):
             raise ArmError(f'joint kind "{self.kind}" is not one of {", ".join(get_args(JointKind))}')
-        if self.axis not in AXES:
-            raise ArmError(f'joint axis "{self.axis}" is not one of {", ".join(AXES)}')
+        if self.axis not in AXES and not abs(math.hypot(*unit_vector(self.axis)) - 1.0) < UNIT:
+            raise ArmError(f'joint axis "{self.axis}" is not one of {", ".join(AXES)}, nor a vector of length 1')
         if self.kind == "fixed" and self.body is not None:
             raise ArmError("a fixed joint has no actuator, so no body of one")
         if self.body is not None and self.body.axis != self.axis:
@@ -86,6 +86,17 @@ class Joint:
             raise ArmError(
                 f"travel = {self.travel} m/rad: expected a value above 0 for a prismatic joint, 1 for any other"
             )
+
+    @property
+    def direction(self) -> Vector:
+        """The unit vector along its axis."""
+        return unit_vector(self.axis)
+
+    @property
+    def nearest_axis(self) -> Axis:
+        """The coordinate axis nearest to its axis, by which it is coloured."""
+        sizes = [abs(value) for value in self.direction]
+        return AXES[sizes.index(max(sizes))]
 
     @property
     def effort(self) -> float | None:

@@ -14,7 +14,6 @@ from armwright.robot.link_inertia import point_inertia, tube_inertia
 from armwright.robot.motor_body import MotorBody
 from armwright.rotations import rpy_from_rotation
 
-AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 COLOURS = {
     "link": "0.75 0.75 0.78 1",
     "joint_x": "0.84 0.37 0.00 1",

@@ -5,7 +5,6 @@ from xml.etree.ElementTree import Element, SubElement
 
 from armwright.robot.arm import GRAVITY, Arm, Column, Joint, Link
 from armwright.robot.link_geometry import (
-    AXIS_VECTORS,
     COLOURS,
     MIN_INERTIA,
     Segment,
@@ -89,7 +88,7 @@ def add_scene(root: Element, arm: Arm) -> Element:
 def joint_attributes(name: str, joint: Joint) -> dict[str, str]:
     """Return name, type, axis and limits of a joint that moves."""
     limits = f"{number(joint.lower)} {number(joint.upper)}"
-    return {"name": name, "type": TYPES[joint.kind], "axis": AXIS_VECTORS[joint.axis], "range": limits}
+    return {"name": name, "type": TYPES[joint.kind], "axis": numbers(joint.direction), "range": limits}
 
 
 def _add_link(body: Element, joint: Joint, link: Link) -> None:
@@ -98,7 +97,7 @@ def _add_link(body: Element, joint: Joint, link: Link) -> None:
         cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}
         euler = numbers(rpy_along(link.offset))
         SubElement(body, "geom", {**cylinder, "pos": numbers(midpoint(link)), "euler": euler, "material": "link"})
-    marker = {"type": "sphere", "size": number(marker_radius(link)), "material": f"joint_{joint.axis}"}
+    marker = {"type": "sphere", "size": number(marker_radius(link)), "material": f"joint_{joint.nearest_axis}"}
     SubElement(body, "geom", marker)
 
 
@@ -122,7 +121,7 @@ def add_motor(
     x, y, z = body.size
     size = (x / 2, y / 2, z / 2) if body.shape == "box" else (body.radius, body.length / 2)
     solid = {"type": body.shape, "size": numbers(size), "pos": numbers(body.centre), "euler": numbers(body_rpy(body))}
-    SubElement(element, "geom", {**solid, "material": f"joint_{segment.joint.axis}", **(attributes or {})})
+    SubElement(element, "geom", {**solid, "material": f"joint_{segment.joint.nearest_axis}", **(attributes or {})})
 
 
 def add_column(base: Element, column: Column, attributes: Mapping[str, str] | None = None) -> None:

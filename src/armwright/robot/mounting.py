@@ -1,18 +1,18 @@
-"""Where an existing arm stands: its base link moved, and turned about the vertical.
-
-Frames of an `Arm` are parallel to the world frame with all joints at 0, so the base cannot be turned by itself. If the
-first joint is vertical, a turn of the base is a shift of that joint's limits. Of a joint that makes more than a full
-turn, what is then beyond ±2π is not used.
-"""
+"""Where an existing arm stands: its base link moved, and turned about the vertical."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+
+from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.robot.arm import Arm, Vector
-from armwright.robot.urdf_reader import MAX_ANGLE, UrdfArm
+from armwright.robot.arm import Arm, Link, Tensor
+from armwright.robot.axes import Vector, axis_along
+from armwright.robot.urdf_reader import UrdfArm
+from armwright.rotations import rotation_about
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,42 +38,43 @@ class Mounting:
         return f"base at ({point}) m{turned}"
 
 
-def can_turn(arm: Arm) -> bool:
-    """Return True if the first joint is vertical and revolute, so that the base can be turned."""
-    first = arm.joints[0]
-    return first.kind == "revolute" and first.axis == "z"
-
-
 def needs_turning(arm: Arm) -> bool:
-    """Return True if a turn of the base changes what the arm reaches: its first joint makes no full turn."""
-    return can_turn(arm) and arm.joints[0].upper - arm.joints[0].lower < math.tau
+    """Return True if a turn of the base changes what the arm reaches: its first joint makes no full vertical turn."""
+    first = arm.joints[0]
+    return first.kind != "revolute" or abs(first.direction[2]) < 1.0 or first.upper - first.lower < math.tau
 
 
 def mounted(described: UrdfArm, mounting: Mounting) -> UrdfArm:
-    """Return an arm whose base link was at the origin with the base link elsewhere.
+    """Return an arm whose base link was at the origin with the base link elsewhere."""
+    arm = (
+        turned(described.arm, rotation_about(np.array([0.0, 0.0, 1.0]), mounting.yaw))
+        if mounting.yaw
+        else described.arm
+    )
+    x, y, z = (at + shift for at, shift in zip(arm.base, mounting.position, strict=True))
+    return replace(described, arm=replace(arm, base=(x, y, z)))
 
-    Raises:
-        SettingsError: If a yaw is given and the first joint is not vertical.
-    """
-    arm, yaw = described.arm, mounting.yaw
-    x, y, z = arm.base
-    if yaw != 0.0:
-        if not can_turn(arm):
-            raise SettingsError(
-                f"base turned by {math.degrees(yaw):g}°: expected an arm whose first joint turns about the vertical, "
-                f'which "{described.joints[0]}" of {described.name} does not; leave the turn out'
-            )
-        first = arm.joints[0]
-        middle = (first.lower + first.upper) / 2.0
-        shift = math.remainder(middle + yaw, math.tau) - middle  # the joint's range stays around 0
-        lower, upper = max(first.lower + shift, -MAX_ANGLE), min(first.upper + shift, MAX_ANGLE)
-        arm = replace(arm, joints=(replace(first, lower=lower, upper=upper), *arm.joints[1:]))
-        zero = described.zeros[0] - described.signs[0] * shift
-        notes = described.notes
-        if upper - lower < first.upper - first.lower:
-            notes = (*notes, f"not the whole range of {described.joints[0]} is used, because the base is turned")
-        described = replace(described, zeros=(zero, *described.zeros[1:]), notes=notes)
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        x, y = cos * x - sin * y, sin * x + cos * y
-    across, along, up = mounting.position
-    return replace(described, arm=replace(arm, base=(x + across, y + along, z + up)))
+
+def turned(arm: Arm, rotation: Array) -> Arm:
+    """Return an arm turned about the origin with its base, its joint values unchanged; rotation: (3, 3)."""
+
+    def vector(v: Vector) -> Vector:
+        x, y, z = (rotation @ v).tolist()
+        return x, y, z
+
+    def tensor(rows: Tensor) -> Tensor:
+        x, y, z = map(tuple, (rotation @ rows @ rotation.T).tolist())
+        return x, y, z
+
+    def link(each: Link) -> Link:
+        turns = {name: vector(getattr(each, name)) for name in ("offset", "com", "end_shift")}
+        return replace(each, **turns, end_inertia=tensor(each.end_inertia))
+
+    tool = {name: vector(getattr(arm.tool, name)) for name in ("tip", "axis", "side", "com")}
+    return replace(
+        arm,
+        base=vector(arm.base),
+        joints=tuple(replace(joint, axis=axis_along(vector(joint.direction))) for joint in arm.joints),
+        links=tuple(map(link, arm.links)),
+        tool=replace(arm.tool, **tool, inertia=tensor(arm.tool.inertia)),
+    )

@@ -1,29 +1,30 @@
 """An existing arm from its URDF: the serial chain from its base to its tip as an `Arm`.
 
-Links that are fixed to a link of the chain add to its mass, and so do fingers, which stay at 0. An `Arm` needs frames
-that are parallel to the world frame with all joints at 0, and axes along x, y or z. If the zero posture of the file is
-not such a posture, another one is found: a joint at a right angle to the one before it can be aligned with an axis of
-the world by rotating that one.
+Links that are fixed to a link of the chain add to its mass, and so do fingers, which stay at 0. Local frames of an
+`Arm` are parallel to the world frame with all joints at 0, so axes, links and tensors are those of the file in this
+posture.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
-from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Vector
+from armwright.robot.arm import Actuator, Arm, Joint, Link, MountedTool, Tensor
 from armwright.robot.arm_tip import find_tip
+from armwright.robot.axes import Axis, Vector, axis_along
+from armwright.robot.link_inertia import point_inertia
 from armwright.robot.plausibility import implausible
-from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document
-from armwright.rotations import rotation_about
+from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, UrdfLink, read_document
 from armwright.text import listed
 
-SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
+CUT_OFF = 4e-3  # [rad]; an angle of three digits as near to a right angle, such as 3.14, may stand for it
 MAX_ANGLE = 2 * math.pi  # [rad]
+NOWHERE = (0.0, 0.0, 0.0)
 RADIUS = 0.04  # [m], for drawings, if the file has no cylinder
 
 
@@ -36,17 +37,7 @@ class UrdfArm:
     base_link: str  # the link whose origin is the world's
     tip: str  # the link whose origin is the tip
     joints: tuple[str, ...]  # names of the moving joints, from base to tip
-    signs: tuple[float, ...]  # value q of a joint of the arm is signs * q + zeros in the URDF
-    zeros: tuple[float, ...]  # value of each joint in the URDF at 0 of the arm [rad] or [m]
     notes: tuple[str, ...] = ()  # the tip, its joints and what is left out; choices, changes and missing data
-
-    def values_in_urdf(self, q: Sequence[float] | Array) -> Array:
-        """Return the values (..., J) of the URDF's joints for those of the arm (..., J) [rad] or [m]."""
-        return np.asarray(q) * self.signs + self.zeros
-
-    def values_in_arm(self, q: Sequence[float] | Array) -> Array:
-        """Return the values (..., J) of the arm's joints for those of the URDF (..., J) [rad] or [m]."""
-        return (np.asarray(q) - self.zeros) * self.signs
 
 
 def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = None) -> UrdfArm:
@@ -70,41 +61,30 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
         raise ArmError(f'{path}: between the links "{base}" and "{last}" no joint moves')
     for joint in moving:
         _check_joint(joint, str(path))
-    zeros = _zeros(tree, base, moving, str(path))
-    return _arm(tree, base, last, moving, zeros, _chain_notes(tree, base, tip, last, moving))
+    return _arm(tree, base, last, moving, _chain_notes(tree, base, tip, last, chain))
 
 
-def _arm(
-    tree: "_LinkTree", base: str, tip: str, moving: Sequence[UrdfJoint], zeros: Mapping[str, float], notes: list[str]
-) -> UrdfArm:
-    poses = tree.poses(base, zeros)
+def _arm(tree: "_LinkTree", base: str, tip: str, moving: Sequence[UrdfJoint], notes: list[str]) -> UrdfArm:
+    poses = tree.poses(base)
     bodies = tree.bodies(base, [joint.child for joint in moving])  # names of links, per body
     positions = [poses[joint.child].position for joint in moving] + [poses[tip].position]
     moved = {joint.child for joint in tree.document.joints if joint.kind != "fixed"}
     any_mass = any(tree.document.links[name].mass for body in bodies[1:] for name in body)
     joints: list[Joint] = []
     links: list[Link] = []
-    signs: list[float] = []
-    snapped = 0.0
     for i, joint in enumerate(moving):
-        axis, sign, deviation = _nearest_axis(poses[joint.child].rotation @ joint.axis)
-        signs.append(sign)
-        snapped = max(snapped, deviation)
-        joints.append(_as_joint(joint, axis, sign, zeros[joint.name], notes))
+        joints.append(_as_joint(joint, axis_along(_vector(poses[joint.child].rotation @ joint.axis)), notes))
         body = [tree.document.links[name] for name in bodies[i + 1]]
-        mass = sum(link.mass for link in body)
-        moments = sum(
-            (link.mass * (poses[link.name] @ Pose(np.eye(3), link.com)).position for link in body), np.zeros(3)
-        )
-        com = moments / mass - positions[i] if mass > 0.0 else np.zeros(3)
+        mass, centre, inertia = _merged(body, poses)
         radius = max((link.radius for link in body if link.radius is not None), default=RADIUS)
         unknown = tuple(link.name for link in body if link.name in moved and not (link.has_mass and any_mass))
-        links.append(Link(_vector(positions[i + 1] - positions[i]), mass, _vector(com), radius, without_mass=unknown))
-    if snapped > 1e-9:
-        notes.append(f"axes are taken to lie along x, y or z; they are off by up to {snapped:.1g} rad")
-    shifted = [f"{name} by {value:.4g} rad" for name, value in zeros.items() if value]
-    if shifted:
-        notes.append(f"zero is moved, so that all axes lie along x, y or z: {', '.join(shifted)}")
+        link = Link(_vector(positions[i + 1] - positions[i]), 0.0, NOWHERE, radius, without_mass=unknown)
+        # A file states nothing of a tube, so all mass is what the link carries.
+        shift = _vector(centre - positions[i + 1])
+        links.append(replace(link, end_mass=mass, end_shift=shift, end_inertia=_tensor(inertia)))
+    beyond = [tree.document.links[name] for body in bodies[1:] for name in body]
+    if points := [link.name for link in beyond if link.mass and not link.inertia.any()]:
+        notes.append(f"links without inertia count as points: {', '.join(points)}")
     if any(joint.actuator is None for joint in joints):
         notes.append("not every joint states an effort, so how much of it is used is not known")
     rotation = poses[tip].rotation
@@ -119,8 +99,18 @@ def _arm(
         notes.append(f"{arm.no_mass}, so masses, torques and payloads are not known")
     notes += implausible(arm, [[tree.document.links[name] for name in body] for body in bodies[1:]])
     names = tuple(joint.name for joint in moving)
-    values = tuple(zeros[name] for name in names)
-    return UrdfArm(tree.document.name, arm, base, tip, names, tuple(signs), values, tuple(notes))
+    return UrdfArm(tree.document.name, arm, base, tip, names, tuple(notes))
+
+
+def _merged(links: Sequence[UrdfLink], poses: Mapping[str, Pose]) -> tuple[float, Array, Array]:
+    """Return mass [kg], centre [m] and inertia about it [kg m²] of links that are one rigid body, in the base frame."""
+    masses = np.array([link.mass for link in links])
+    centres = np.array([(poses[link.name] @ Pose(np.eye(3), link.com)).position for link in links])
+    mass = float(masses.sum())
+    centre = masses @ centres / (mass or 1.0)
+    rotations = np.array([poses[link.name].rotation for link in links])
+    tensors = rotations @ [link.inertia for link in links] @ rotations.swapaxes(1, 2)
+    return mass, centre, (tensors + point_inertia(masses, centres - centre)).sum(axis=0)
 
 
 def _check_joint(joint: UrdfJoint, where: str) -> None:
@@ -137,78 +127,53 @@ def _check_joint(joint: UrdfJoint, where: str) -> None:
         raise ArmError(f"{of}: expected limits lower < upper, got {joint.lower or 0.0:g} and {joint.upper or 0.0:g}")
 
 
-def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, moving: Sequence[UrdfJoint]) -> list[str]:
-    """Return the notes on the choice of a chain and how it is mounted."""
-    others = [joint.name for joint in tree.below(base) if joint.kind != "fixed" and joint not in moving]
+def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, chain: Sequence[UrdfJoint]) -> list[str]:
+    """Return the notes on the choice of a chain, how it is mounted, and its angles."""
+    moving = [joint.name for joint in chain if joint.kind != "fixed"]
+    others = [joint.name for joint in tree.below(base) if joint.kind != "fixed" and joint.name not in moving]
     left_out = f"; left out, at 0: {listed(others)}" if others else ""
     named = "" if tip is not None else " (--tip names another)"
-    joints = ", ".join(joint.name for joint in moving)
     down = ", ".join(f"{value:.4g}" for value in (-tree.orientation(base)[2]).round(6) + 0.0)
-    return [
-        f'the tip is the link "{last}"{named}; joints from "{base}": {joints}{left_out}',
+    notes = [
+        f'the tip is the link "{last}"{named}; joints from "{base}": {", ".join(moving)}{left_out}',
         f'the axes of the world are those of "{tree.root}"; gravity points along ({down}) in the frame of "{base}"',
     ]
+    short = [f"{angle:g} at {joint.name}" for joint in chain for angle in joint.rpy if _is_cut_off(angle)]
+    if short:
+        notes.append(f"right angles or π with too few digits are used as written: {', '.join(short)}")
+    return notes
 
 
-def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list[str]) -> Joint:
-    """Return the joint about the positive world axis, with limits relative to its zero."""
+def _is_cut_off(angle: float) -> bool:
+    """Return True for an angle of three digits that is nearly a multiple of π/2 other than 0 [rad]."""
+    off = abs(math.remainder(angle, math.pi / 2))
+    return 0.0 < off < CUT_OFF < abs(angle) - off and round(angle, 3) == angle
+
+
+def _as_joint(joint: UrdfJoint, axis: Axis | Vector, notes: list[str]) -> Joint:
+    """Return the joint about an axis; the part of its range beyond ±2π is left out."""
     actuator = None
     if joint.effort:
         actuator = Actuator(joint.name, 0.0, peak_torque=abs(joint.effort), speed=joint.speed or None)
     if joint.kind == "continuous":
-        return Joint("revolute", AXES[axis], -MAX_ANGLE, MAX_ANGLE, actuator)
-    lower, upper = (joint.lower or 0.0) - zero, (joint.upper or 0.0) - zero
-    if sign < 0.0:
-        lower, upper = -upper, -lower
+        return Joint("revolute", axis, -MAX_ANGLE, MAX_ANGLE, actuator)
+    lower, upper = joint.lower or 0.0, joint.upper or 0.0
     if joint.kind == "prismatic":
-        return Joint("prismatic", AXES[axis], lower, upper, actuator)
+        return Joint("prismatic", axis, lower, upper, actuator)
     if max(-lower, upper) > MAX_ANGLE:
         if max(-lower, upper) > MAX_ANGLE + 1e-2:
             notes.append(f"{joint.name} rotates from {lower:.4g} to {upper:.4g} rad; ±2π of it is used")
         lower, upper = max(lower, -MAX_ANGLE), min(upper, MAX_ANGLE)
-    return Joint("revolute", AXES[axis], lower, upper, actuator)
-
-
-def _zeros(tree: "_LinkTree", base: str, moving: Sequence[UrdfJoint], where: str) -> dict[str, float]:
-    """Return a posture [rad] with all joint axes along axes of the world, 0 for as many joints as possible."""
-    zeros = {joint.name: 0.0 for joint in moving}
-
-    def axes() -> dict[str, Array]:
-        poses = tree.poses(base, zeros)
-        return {joint.name: poses[joint.child].rotation @ joint.axis for joint in moving}
-
-    before: UrdfJoint | None = None  # the last joint that is not prismatic
-    for joint in moving:
-        axis = axes()[joint.name]
-        if _nearest_axis(axis)[2] > SNAP and before is not None:
-            index, sign, _ = _nearest_axis(axes()[before.name])
-            about = sign * np.eye(3)[index]
-            if abs(float(axis @ about)) < SNAP:
-                one = np.roll(np.abs(about), 1)
-                angle = math.atan2(float(axis @ np.cross(about, one)), float(axis @ one))
-                zeros[before.name] += round(angle / (math.pi / 2)) * (math.pi / 2) - angle
-        if joint.kind != "prismatic":
-            before = joint
-    for name, axis in axes().items():
-        if _nearest_axis(axis)[2] > SNAP:
-            vector = ", ".join(f"{value:.3f}" for value in axis)
-            raise ArmError(
-                f'{where}: joint "{name}" has the axis ({vector}) with all joints at 0, along none of x, y and z '
-                "and not at a right angle to the joint before; such an arm cannot be computed yet"
-            )
-    return zeros
-
-
-def _nearest_axis(direction: Array) -> tuple[int, float, float]:
-    """Return the index of the world axis nearest to a unit vector (3,), the sign, and the angle between them [rad]."""
-    axis = int(np.abs(direction).argmax())
-    sign = math.copysign(1.0, direction[axis])
-    across = float(np.linalg.norm(np.delete(direction, axis)))
-    return axis, sign, math.atan2(across, abs(float(direction[axis])))
+    return Joint("revolute", axis, lower, upper, actuator)
 
 
 def _vector(values: Array) -> Vector:
     x, y, z = values.tolist()
+    return x, y, z
+
+
+def _tensor(rows: Array) -> Tensor:
+    x, y, z = map(_vector, rows)
     return x, y, z
 
 
@@ -267,15 +232,11 @@ class _LinkTree:
             rotation = rotation @ joint.origin.rotation
         return rotation
 
-    def poses(self, base: str, values: Mapping[str, float]) -> dict[str, Pose]:
-        """Return the pose of every link beyond the base, whose origin is that of the world.
-
-        values: joint angles by name [rad], by default 0.
-        """
+    def poses(self, base: str) -> dict[str, Pose]:
+        """Return the pose of every link beyond the base, whose origin is that of the world, with all joints at 0."""
         poses = {base: Pose(self.orientation(base), np.zeros(3))}
         for joint in self.below(base):
-            motion = Pose(rotation_about(joint.axis, values.get(joint.name, 0.0)), np.zeros(3))
-            poses[joint.child] = poses[joint.parent] @ joint.origin @ motion
+            poses[joint.child] = poses[joint.parent] @ joint.origin
         return poses
 
     def bodies(self, base: str, moved: Sequence[str]) -> list[list[str]]:

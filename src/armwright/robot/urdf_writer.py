@@ -4,7 +4,6 @@ from xml.etree.ElementTree import Element, SubElement
 
 from armwright.robot.arm import Arm, Joint, Vector
 from armwright.robot.link_geometry import (
-    AXIS_VECTORS,
     COLOURS,
     MUJOCO_COMPILER,
     TENSOR_INDICES,
@@ -91,7 +90,7 @@ def _add_joint(
     SubElement(element, "child", link=child)
     _add_origin(element, xyz, rpy)
     if joint.kind != "fixed":
-        SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
+        SubElement(element, "axis", xyz=numbers(joint.direction))
         SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
 
 
@@ -118,7 +117,7 @@ def _add_link(robot: Element, segment: Segment) -> None:
     marker = SubElement(element, "visual")  # a coloured sphere that shows the joint and its axis
     _add_origin(marker, ORIGIN, ORIGIN)
     SubElement(SubElement(marker, "geometry"), "sphere", radius=number(marker_radius(link)))
-    SubElement(marker, "material", name=f"joint_{segment.joint.axis}")
+    SubElement(marker, "material", name=f"joint_{segment.joint.nearest_axis}")
 
 
 def _add_motor(robot: Element, segment: Segment, body: MotorBody) -> None:
@@ -126,7 +125,7 @@ def _add_motor(robot: Element, segment: Segment, body: MotorBody) -> None:
     dimensions = {"radius": number(body.radius), "length": number(body.length)}
     dimensions = {"size": numbers(body.size)} if body.shape == "box" else dimensions
     element = _add_massless(robot, segment.motor_name)
-    _add_solid(element, f"joint_{segment.joint.axis}", body.centre, body_rpy(body), body.shape, dimensions)
+    _add_solid(element, f"joint_{segment.joint.nearest_axis}", body.centre, body_rpy(body), body.shape, dimensions)
     _add_joint(robot, f"{segment.motor_name}_joint", segment.parent, segment.motor_name, segment.position)
 
 

@@ -57,6 +57,7 @@ class UrdfJoint:
     parent: str  # name of the link before it
     child: str
     origin: Pose  # of the child in the parent at a joint value of 0
+    rpy: tuple[float, ...]  # the angles of its rotation as written [rad]
     axis: Array  # (3,) unit vector in the child frame
     lower: float | None  # limit [rad] or [m]
     upper: float | None
@@ -181,6 +182,7 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
         parent,
         child,
         _pose(element.find("origin"), of),
+        tuple(_angles(element.find("origin"), of)),
         direction / (length if length > 0.0 else 1.0),
         *values,
         mimics=None if mimic is None else mimic.get("joint", ""),
@@ -202,8 +204,12 @@ def _pose(element: ElementTree.Element | None, of: str) -> Pose:
     if element is None:
         return Pose(np.eye(3), np.zeros(3))
     position = np.array(_numbers(element, "xyz", 3, of)) if element.get("xyz") is not None else np.zeros(3)
-    angles = _numbers(element, "rpy", 3, of) if element.get("rpy") is not None else [0.0, 0.0, 0.0]
-    return Pose(rotation_from_rpy(*angles), position)
+    return Pose(rotation_from_rpy(*_angles(element, of)), position)
+
+
+def _angles(element: ElementTree.Element | None, of: str) -> list[float]:
+    """Return roll, pitch and yaw of an <origin> [rad]; 0 if they are missing."""
+    return [0.0, 0.0, 0.0] if element is None or element.get("rpy") is None else _numbers(element, "rpy", 3, of)
 
 
 def _numbers(element: ElementTree.Element | None, key: str, n: int, of: str) -> list[float]:

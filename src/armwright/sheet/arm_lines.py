@@ -1,15 +1,13 @@
 """What any sheet states of its arm, whatever it is for: links, drawing, payload and errors over the reach."""
 
-from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.forward import link_lines
 from armwright.kinematics.reach.reach_outline import reach_outline
 from armwright.problem.over_reach import reach_lines
 from armwright.robot.arm import Arm, Vector
+from armwright.robot.link_geometry import home_position
 from armwright.sheet.record import Drawing, LinkLine
 
 SIDE, TOP = (0, 2), (0, 1)  # axes of the views
@@ -21,15 +19,12 @@ ASSUMED = {  # of the values of any sheet
 }
 
 
-def arm_lines(arm: Arm, payload: float, targets: Array, zeros: Sequence[float] | None = None) -> dict[str, Any]:
-    """Return these parts of a data sheet, by field; the payload [kg] moves with the tip.
-
-    Targets (T, 3) [m] may be none. `zeros` are the values of the joints that count as 0; 0 by default.
-    """
+def arm_lines(arm: Arm, payload: float, targets: Array) -> dict[str, Any]:
+    """Return these parts of a data sheet, by field; the payload [kg] moves with the tip, targets (T, 3) [m]."""
     return {
         "links": tuple(_link_line(arm, n) for n in range(1, len(arm.links) + 1)),
         "over_reach": reach_lines(arm, payload),
-        "drawing": _drawing(arm, targets, [0.0] * len(arm.joints) if zeros is None else zeros),
+        "drawing": _drawing(arm, targets),
     }
 
 
@@ -41,12 +36,12 @@ def _link_line(arm: Arm, number: int) -> LinkLine:
     return LinkLine(number, link.length, diameter, None if diameter is None else link.wall, mass)
 
 
-def _drawing(arm: Arm, targets: Array, zeros: Sequence[float]) -> Drawing:
-    q = [min(max(zero, joint.lower), joint.upper) for joint, zero in zip(arm.joints, zeros, strict=True)]
+def _drawing(arm: Arm, targets: Array) -> Drawing:
+    q = [home_position(joint) for joint in arm.joints]
     numbers = [*range(1, len(arm.links) + 1), 0]
     return Drawing(
         base=arm.base,
-        is_at_zero=np.allclose(q, zeros),
+        is_at_zero=not any(q),
         links=tuple(
             (n, _vector(start), _vector(end)) for n, (start, end) in zip(numbers, link_lines(arm, q), strict=True)
         ),

@@ -11,6 +11,7 @@ from armwright.kinematics.cycle.cycle_loads import CycleLoads, holding_torques
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.robot.arm import Arm
+from armwright.robot.axes import axis_name
 from armwright.robot.motor_body import MotorBody
 from armwright.sheet.record import JointLine
 
@@ -32,7 +33,7 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
             number=j + 1,
             name=names[k] if names else f"joint_{j + 1}",
             kind=joint.kind,
-            axis=joint.axis,
+            axis=axis_name(joint.axis),
             actuator="" if joint.actuator is None else joint.actuator.name,
             lower=joint.lower,
             upper=joint.upper,

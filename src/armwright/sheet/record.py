@@ -32,7 +32,7 @@ class JointLine:
     number: int  # its number, from 1; fixed joints count
     name: str  # its name in the URDF
     kind: str  # its type
-    axis: str  # its axis, with all joints at 0: x, y or z
+    axis: str  # its axis, with all joints at 0: x, y, z, the same with a minus, or a unit vector
     actuator: str  # the name of its actuator; empty if not stated
     lower: float  # the lower limit
     upper: float  # the upper limit

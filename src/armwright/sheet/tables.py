@@ -171,7 +171,7 @@ def _joint_row(sheet: DataSheet, joint: JointLine) -> tuple[str, ...]:
     def share(value: float | None) -> str:
         return "–" if value is None else f"{value:.0%}"
 
-    axis = f"slide ({joint.axis})" if joint.kind == "prismatic" else AXIS_NAMES[joint.axis]
+    axis = f"slide ({joint.axis})" if joint.kind == "prismatic" else AXIS_NAMES.get(joint.axis, f"about {joint.axis}")
     return (
         str(joint.number),
         axis if joint.name == f"joint_{joint.number}" else f"{joint.name}, {axis}",

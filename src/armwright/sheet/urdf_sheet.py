@@ -16,7 +16,7 @@ from armwright.robot.mounting import Mounting
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.sheet.arm_lines import ASSUMED, arm_lines
 from armwright.sheet.joint_lines import joint_lines
-from armwright.sheet.record import DataSheet, JointLine, MassLine
+from armwright.sheet.record import DataSheet, MassLine
 
 SAFETY_FACTOR = 1.5  # of torques, as that of designs by default
 NO_TASK = "an arm without a task"
@@ -49,7 +49,9 @@ def urdf_sheet(described: UrdfArm, job: Job | None = None, price: float | None =
     else:
         existing = ExistingArm(job.problem, job.problem.physics(stack_arms([arm])), price)
         payload, targets = float(job.problem.task.payloads.max()), existing.evaluation.targets
-    lines = arm_lines(arm, payload, targets, described.values_in_arm(np.zeros(len(arm.joints))).tolist())
+    lines = arm_lines(arm, payload, targets)
+    masses = [None if link.without_mass else link.total_mass for link in arm.links]
+    lines["links"] = tuple(replace(line, mass=masses[line.number - 1]) for line in lines["links"])
     assumptions = _assumptions(described, arm.safety_factor, job)
     if existing is not None and existing.undecided:
         assumptions["constraints"] = f"unknown whether it meets {', '.join(existing.undecided)}"
@@ -60,7 +62,7 @@ def urdf_sheet(described: UrdfArm, job: Job | None = None, price: float | None =
         design=None,
         joint_letters="",
         facts={**_facts(arm, existing, price), **reach_facts(arm, lines["over_reach"][-1])},
-        joints=_joints(described, existing),
+        joints=joint_lines(arm, None if existing is None else existing.evaluation, described.joints),
         masses=_masses(arm),
         assumptions=assumptions,
         not_modelled="",
@@ -81,33 +83,12 @@ def _on_task(existing: ExistingArm) -> dict[str, Any]:
     }
 
 
-def _joints(described: UrdfArm, existing: ExistingArm | None) -> tuple[JointLine, ...]:
-    """Return the lines of the joints, with values as the URDF counts them."""
-    evaluation = None if existing is None else existing.evaluation
-    lines = joint_lines(described.arm, evaluation, described.joints)
-    return tuple(map(_in_urdf, lines, described.signs, described.zeros))
-
-
-def _in_urdf(line: JointLine, sign: float, zero: float) -> JointLine:
-    """Return the line of a joint whose value q is sign * q + zero in the URDF."""
-
-    def span(low: float, high: float) -> tuple[float, float]:
-        first, last = sign * low + zero, sign * high + zero
-        return min(first, last), max(first, last)
-
-    lower, upper = span(line.lower, line.upper)
-    if line.used is None or line.unused is None:
-        return replace(line, lower=lower, upper=upper)
-    below, above = line.unused if sign > 0.0 else line.unused[::-1]
-    return replace(line, lower=lower, upper=upper, used=span(*line.used), unused=(below, above))
-
-
 def _masses(arm: Arm) -> tuple[MassLine, ...]:
     """Return the parts of the mass; none if it is not known."""
     if arm.no_mass:
         return ()
     lines = [MassLine("base", arm.base_mass)]
-    lines += [MassLine(f"link {n}", link.mass) for n, link in enumerate(arm.links, start=1)]
+    lines += [MassLine(f"link {n}", link.total_mass) for n, link in enumerate(arm.links, start=1)]
     lines.append(MassLine("tool", arm.tool.mass))
     return tuple(line for line in lines if line.mass > 0.0)
 

@@ -17,6 +17,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints
 from armwright.kinematics.arms.arm_arrays import (
     FIXED,
+    MOTION_AXES,
     PRISMATIC,
     ArmArrays,
     Precision,
@@ -184,6 +185,7 @@ class _Parts:
             precision,
             base=columns.matrix[:, :3],
             motion=np.ascontiguousarray(flat["motion"], dtype=np.int32),
+            axis=MOTION_AXES[flat["motion"]],
             lower=flat["lower"],
             upper=flat["upper"],
             offset=flat["body_offset"].copy(),

@@ -18,15 +18,18 @@ from armwright.tasks.payload import POINT_LOAD, LoadShape
 
 MAX_JOINTS = 16
 MAX_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
-PRISMATIC, FIXED = 3, 6  # motions: 0 to 2 rotate about local x, y, z; 3 to 5 translate along them; 6 is fixed
+# Motions: 0 to 2 rotate about local x, y, z or the opposite, 3 about an oblique axis; 4 to 7 translate along these; 8
+# is fixed.
+OBLIQUE, PRISMATIC, FIXED = 3, 4, 8
+MOTION_AXES = np.vstack([np.eye(4, 3), np.eye(4, 3), np.zeros((1, 3))])  # of designs, by motion
 
 Precision = Literal["float32", "float64"]
-Motions = Literal["revolute", "any"]  # of all joints of some arms
+Motions = Literal["revolute", "any", "oblique"]  # of all joints of some arms: about x, y, z; others too; or oblique too
 TargetKind = Literal["position", "pose"]  # points alone, or some with an axis or orientation of the tool
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
 
-FLOATS = ("base", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_side", "payload_center")
+FLOATS = ("base", "axis", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_side", "payload_center")
 ARRAYS = ("motion", *FLOATS)  # fields of `ArmArrays` that the kernels of inverse kinematics read
 
 
@@ -38,7 +41,8 @@ class ArmArrays(PerArm):
     """
 
     base: Floats  # (N, 3) [m]
-    motion: Ints  # (N, D) 0 to 2: rotates about local x, y, z; 3 to 5: translates along them; 6: fixed
+    motion: Ints  # (N, D) as above
+    axis: Floats  # (N, D, 3) unit vectors of axes in the local frames; 0 for fixed joints
     lower: Floats  # (N, D) [rad] or [m]; ±1 for fixed joints, so that nothing divides by 0
     upper: Floats  # (N, D) [rad] or [m]
     offset: Floats  # (N, D, 3) from a joint to the next, or to the tip of the tool [m]
@@ -86,12 +90,19 @@ class ArmArrays(PerArm):
     @property
     def motions(self) -> Motions:
         """The kernel variant that all arms need."""
+        if np.any(self.motion % PRISMATIC == OBLIQUE):
+            return "oblique"
         return "revolute" if np.all(self.motion < PRISMATIC) else "any"
 
     @property
     def prismatic(self) -> NDArray[np.bool_]:
         """(N, D) True for joints that translate."""
         return (self.motion >= PRISMATIC) & (self.motion < FIXED)
+
+    @property
+    def opposed(self) -> NDArray[np.bool_]:
+        """(N, D) True for joints that rotate about the opposite of x, y or z."""
+        return (self.motion < OBLIQUE) & np.any(self.axis < 0.0, axis=-1)
 
     @property
     def ranges_include_zero(self) -> bool:
@@ -146,11 +157,12 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
     lower *= -1.0
     mass, radius = np.zeros((2, n, dof))
     stiffness = np.full((2, n, dof), np.inf)  # bending and torsional
-    offset, com = np.zeros((2, n, dof, 3))
+    offset, com, axis = np.zeros((3, n, dof, 3))
     bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,), (3, 3))))
     for i, arm in enumerate(arms):
         own = slice(len(arm.joints))
         motion[i, own] = [_motion(joint) for joint in arm.joints]
+        axis[i, own] = [joint.direction for joint in arm.joints]
         lower[i, own] = [-1.0 if joint.kind == "fixed" else joint.lower for joint in arm.joints]
         upper[i, own] = [1.0 if joint.kind == "fixed" else joint.upper for joint in arm.joints]
         travel[i, own] = [joint.travel for joint in arm.joints]
@@ -166,6 +178,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         precision,
         base=np.array([arm.base for arm in arms]),
         motion=motion,
+        axis=np.where(motion[..., None] == FIXED, 0.0, axis),
         lower=lower,
         upper=upper,
         offset=offset,
@@ -193,8 +206,8 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
 
 
 def exact_arms(
-    precision: Precision, *, tool: Tools, n_joints: Ints, lower: Array, upper: Array, offset: Array, com: Array,
-    mass: Array, base: Array, radius: Array, **others: Any,
+    precision: Precision, *, tool: Tools, n_joints: Ints, axis: Array, lower: Array, upper: Array, offset: Array,
+    com: Array, mass: Array, base: Array, radius: Array, **others: Any,
 ) -> ArmArrays:  # fmt: skip
     """Return arms in a precision, from exact values of their fields.
 
@@ -204,7 +217,7 @@ def exact_arms(
     if tool.mass.any():
         mass[last], com[last] = joined(mass[last], com[last], tool.mass, offset[last] + tool.com)
     offset[last] += tool.tip
-    floats = {"base": base, "offset": offset, "com": com, "mass": mass, "radius": radius}
+    floats = {"base": base, "axis": axis, "offset": offset, "com": com, "mass": mass, "radius": radius}
     floats |= {"tool_axis": tool.axis, "tool_side": tool.side}
     return ArmArrays(
         **{name: np.ascontiguousarray(values, dtype=precision) for name, values in floats.items()},
@@ -272,4 +285,5 @@ def _stiffness(link: Link) -> tuple[float, float]:
 def _motion(joint: Joint) -> int:
     if joint.kind == "fixed":
         return FIXED
-    return AXES.index(joint.axis) + (PRISMATIC if joint.kind == "prismatic" else 0)
+    axis = AXES.index(joint.nearest_axis) if sum(map(bool, joint.direction)) == 1 else OBLIQUE
+    return axis + (PRISMATIC if joint.kind == "prismatic" else 0)

@@ -32,7 +32,7 @@ def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
     """Return the joint frames of N arms in postures; q: (N, K, D) joint angles [rad] or displacements [m]."""
     n, k, dof = q.shape
     revolute, prismatic = arms.motion < PRISMATIC, arms.prismatic  # (N, D)
-    local = np.where((revolute | prismatic)[..., None], np.eye(3)[arms.motion % PRISMATIC], 0.0)  # (N, D, 3)
+    local = arms.axis.astype(np.float64)  # (N, D, 3)
     rotated = rotation_about(local[:, None], np.where(revolute[:, None], q, 0.0))
     displacement = np.where(prismatic[:, None], q, 0.0)[..., None]
     rotation, position, axis = np.empty((n, k, dof, 3, 3)), np.empty((n, k, dof, 3)), np.empty((n, k, dof, 3))
@@ -89,7 +89,7 @@ def motor_solids(arm: Arm, q: Sequence[float] | Array) -> list[tuple[Axis, Solid
             _, axis, half, centre = body_values(joint.body)
             x, y, z = (start + rotation @ np.array(centre)).tolist()
             columns = rotation[:, [(axis + 1) % 3, (axis + 2) % 3, axis]]
-            found.append((joint.axis, Solid(joint.body.shape, (x, y, z), columns, half)))
+            found.append((joint.body.axis, Solid(joint.body.shape, (x, y, z), columns, half)))
     return found
 
 

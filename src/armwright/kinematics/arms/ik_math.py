@@ -1,7 +1,7 @@
 """Warp functions that all kernels of inverse kinematics share.
 
 The joints of an arm are the same in all lanes, so they may branch, in functions that return at once. Prismatic joints
-cost an eighth of the time, so arms of revolute joints alone have a variant.
+cost an eighth of the time, so arms of revolute joints alone have a variant, and those with other axes than x, y and z.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from armwright.kinematics.arms.arm_arrays import FIXED, PRISMATIC, Motions, Precision
+from armwright.kinematics.arms.arm_arrays import FIXED, OBLIQUE, PRISMATIC, Motions, Precision
 from armwright.kinematics.arms.lane_math import lane_math
 
 # At -O2, Warp's default, LLVM leaves more of the lanes scalar: 43,000 designs/s on a core rather than 58,000.
@@ -29,7 +29,7 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
     real, Vector3, Lane, Vector = base.real, base.Vector3, base.Lane, base.Vector
     at_least, sine_cosine, scaled = base.at_least, base.sine_cosine, base.scaled
     dot, cross, in_frame = base.dot, base.cross, base.in_frame
-    any_motion = motions == "any"
+    any_motion, oblique = motions != "revolute", motions == "oblique"
 
     zero, one, two = real(0.0), real(1.0), real(2.0)
     angle_margin = real(math.radians(1.0))  # from the limits, keeps the limit gradient finite
@@ -41,6 +41,7 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
         dof: int
         base: wp.array(dtype=Vector3)  # (N,)
         motion: wp.array2d(dtype=int)  # (N, D)
+        axis: wp.array2d(dtype=Vector3)  # (N, D)
         lower: wp.array2d(dtype=real)  # (N, D)
         upper: wp.array2d(dtype=real)  # (N, D)
         offset: wp.array2d(dtype=Vector3)  # (N, D)
@@ -51,15 +52,18 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
         payload_center: wp.array(dtype=Vector3)  # (N,)
 
     @wp.func
-    def rotate(motion: int, x: Vector, y: Vector, z: Vector, s: Lane, c: Lane):
-        """Return the frame's axes after a joint; last, the axis of that joint, which is arbitrary if it is fixed."""
-        if wp.static(any_motion):
-            if motion == PRISMATIC:
-                return x, y, z, x
-            if motion == PRISMATIC + 1:
-                return x, y, z, y
-            if motion > PRISMATIC + 1:
-                return x, y, z, z
+    def rotate(motion: int, axis: Vector3, x: Vector, y: Vector, z: Vector, s: Lane, c: Lane):
+        """Return the frame's axes after a joint and, last, the axis of that joint, as `frame_math` does."""
+        if wp.static(any_motion):  # noqa: SIM102 (Warp leaves out what is static alone)
+            if motion >= PRISMATIC:
+                return x, y, z, in_frame(axis, x, y, z)
+        if wp.static(oblique):  # noqa: SIM102
+            if motion == OBLIQUE:
+                a = in_frame(axis, x, y, z)
+                along = scaled(Lane(one) - c, a)
+                turned_x = scaled(c, x) + scaled(s, axis[2] * y - axis[1] * z) + axis[0] * along
+                turned_y = scaled(c, y) + scaled(s, axis[0] * z - axis[2] * x) + axis[1] * along
+                return turned_x, turned_y, cross(turned_x, turned_y), a
         if motion == 0:
             return x, scaled(c, y) + scaled(s, z), scaled(c, z) - scaled(s, y), x
         if motion == 1:
@@ -69,7 +73,7 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
     @wp.func
     def translate(motion: int, place: Vector, displacement: Lane, axis: Vector):
         """Return the place of a joint: a prismatic joint is displaced along its axis."""
-        if wp.static(any_motion):  # noqa: SIM102 (Warp leaves out what is static alone)
+        if wp.static(any_motion):  # noqa: SIM102
             if motion >= PRISMATIC and motion < FIXED:
                 return place + scaled(displacement, axis)
         return place
@@ -111,13 +115,13 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
         )
 
     @wp.func
-    def advance(motion: int, offset: Vector3, q: Lane, p: Vector, x: Vector, y: Vector, z: Vector):
+    def advance(motion: int, local: Vector3, offset: Vector3, q: Lane, p: Vector, x: Vector, y: Vector, z: Vector):
         """Return the axis of a joint at a value [rad] or [m], its place, that of the next joint, and the frame between.
 
-        p: where the joint is at 0.  x, y, z: the frame before it.
+        local: axis of the joint in the frame before it.  p: where it is at 0.  x, y, z: the frame before it.
         """
         s, c = sine_cosine(q)
-        x, y, z, axis = rotate(motion, x, y, z, s, c)
+        x, y, z, axis = rotate(motion, local, x, y, z, s, c)
         place = translate(motion, p, q, axis)
         return axis, place, place + in_frame(offset, x, y, z), x, y, z
 

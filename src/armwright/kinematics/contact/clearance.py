@@ -67,7 +67,7 @@ def _distances(
     own, free = (links.array(np.full(dim, most), links.kernels.real) for _ in range(2))
     offset = arms.offset.copy()
     offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
-    values = {name: getattr(arms, name) for name in ("base", "motion", "radius")} | {"offset": offset, "q": q}
+    values = {name: getattr(arms, name) for name in ("base", "motion", "axis", "radius")} | {"offset": offset, "q": q}
     values |= {name: links.empty(q.shape, links.kernels.Vector3) for name in ("starts", "ends")}
     posed = links.struct("Posed", values)
     links.launch("link_axes", dim, posed)

@@ -37,7 +37,9 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
         p = arms.base[arm]
         for j in range(arms.motion.shape[1]):
-            place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z)
+            _axis, place, p, x, y, z = advance(
+                arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z
+            )
             arms.starts[arm, target, j] = place
             arms.ends[arm, target, j] = p
 

@@ -51,7 +51,9 @@ def motor_kernels(precision: Precision) -> SimpleNamespace:
                     motors.into[arm, target, j] = wp.matrix_from_rows(z, x, y)
                 else:
                     motors.into[arm, target, j] = wp.matrix_from_rows(x, y, z)
-            _place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z)
+            _axis, _place, p, x, y, z = advance(
+                arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z
+            )
         t = tip[arm]
         p += t[0] * x + t[1] * y + t[2] * z
         into = tip_into[arm] * wp.matrix_from_rows(x, y, z)

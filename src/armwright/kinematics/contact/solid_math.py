@@ -33,6 +33,7 @@ def solid_math(precision: Precision) -> SimpleNamespace:
 
         base: wp.array(dtype=Vector3)  # (N,) [m]
         motion: wp.array2d(dtype=int)  # (N, D)
+        axis: wp.array2d(dtype=Vector3)  # (N, D) of the joints
         offset: wp.array2d(dtype=Vector3)  # (N, D) [m]
         q: wp.array3d(dtype=real)  # (N, T, D) [rad] or [m]
         radius: wp.array2d(dtype=real)  # (N, D) [m], 0 for links to ignore

@@ -116,8 +116,8 @@ def cycle_bearing_loads(
     largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
     for group, own in zip(paths.groups, terms, strict=True):
         moments = _at(group.counts, paths.instants.times(_density(group)))
-        joints, found = (group.arms.motion, bearing_offsets(group.arms)), np.empty_like(largest[group.index])
-        given = (*moments, durations[group.index], *joints, own.wrenches)
+        arms, found = group.arms, np.empty_like(largest[group.index])
+        given = (*moments, durations[group.index], arms.motion, arms.axis, bearing_offsets(arms), own.wrenches)
         loaded.launch("bearing_loads", found.shape[:2], *given, outputs=[found])
         largest[group.index] = found
     return largest

@@ -25,8 +25,7 @@ from armwright.robot.arm import GRAVITY
 def dynamics_kernels() -> SimpleNamespace:
     """Return the kernel."""
     base = frame_math("float64")
-    real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
-    advance, axis_of = base.advance, base.axis_of
+    real, Vector3, Matrix3, advance = base.real, base.Vector3, base.Matrix3, base.advance
     Vectors = wp.types.matrix(shape=(MAX_JOINTS, 3), dtype=real)
     Wrench = wp.types.vector(length=6, dtype=real)
     zero, one, two = real(0.0), real(1.0), real(2.0)
@@ -38,6 +37,7 @@ def dynamics_kernels() -> SimpleNamespace:
         dof: int
         base: wp.array(dtype=Vector3)  # (N,)
         motion: wp.array2d(dtype=int)  # (N, D)
+        axis: wp.array2d(dtype=Vector3)  # (N, D)
         offset: wp.array2d(dtype=Vector3)  # (N, D)
         mass: wp.array2d(dtype=real)  # (N, D)
         com: wp.array2d(dtype=Vector3)  # (N, D)
@@ -81,9 +81,9 @@ def dynamics_kernels() -> SimpleNamespace:
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
         p = bodies.base[arm]
         for j in range(bodies.dof):
-            motion = bodies.motion[arm, j]
-            a = axis_of(motion, x, y, z)
-            here, p, x, y, z = advance(motion, bodies.offset[arm, j], q[arm, sample, j], p, x, y, z)
+            a, here, p, x, y, z = advance(
+                bodies.motion[arm, j], bodies.axis[arm, j], bodies.offset[arm, j], q[arm, sample, j], p, x, y, z
+            )
             place[j] = here
             axis[j] = a
             along_x[j] = x
@@ -158,7 +158,8 @@ def dynamics_kernels() -> SimpleNamespace:
     def bearing_loads(
         before: wp.array2d(dtype=int), share: wp.array2d(dtype=real), rate: wp.array(dtype=real),
         change: wp.array(dtype=real), durations: wp.array2d(dtype=real), motion: wp.array2d(dtype=int),
-        offset: wp.array2d(dtype=real), wrenches: wp.array4d(dtype=Wrench), largest: wp.array4d(dtype=real),
+        axis: wp.array2d(dtype=Vector3), offset: wp.array2d(dtype=real), wrenches: wp.array4d(dtype=Wrench),
+        largest: wp.array4d(dtype=real),
     ):  # fmt: skip
         """Find the largest loads across the axes of joints that turn, as of `bearings.py`.
 
@@ -170,8 +171,7 @@ def dynamics_kernels() -> SimpleNamespace:
         for j in range(motion.shape[1]):
             tilting, axial, radial = real(0.0), real(0.0), real(0.0)
             if motion[arm, j] < wp.static(PRISMATIC):
-                a = Vector3()
-                a[motion[arm, j]] = one
+                a = axis[arm, j]
                 for f in range(rate.shape[0]):
                     sample, after = before[path, f], share[path, f]
                     s, ss = rate[f] / durations[arm, path], change[f] / (durations[arm, path] * durations[arm, path])

@@ -155,7 +155,7 @@ def _branches(
     found, nearness = np.full((n, b, count, dof), np.nan), np.full(cost.shape, np.inf)
 
     def find(chunk: slice) -> None:
-        values = {name: getattr(arms[chunk], name) for name in ("dof", "motion", "offset", "lower", "upper")}
+        values = {name: getattr(arms[chunk], name) for name in ("dof", "motion", "axis", "offset", "lower", "upper")}
         chain, outputs = loaded.struct("Chain", values), [nearness[chunk], found[chunk]]
         loaded.launch(
             "find_branches", outputs[1].shape[:2], chain, q[chunk], cost[chunk], known, distinct, outputs=outputs

@@ -70,7 +70,10 @@ def tool_errors(arms: ArmArrays, poses: Poses, q: Array, device: Device = "cpu")
 
 def _path(arms: ArmArrays, samples: LineSamples, loaded: Loaded) -> Any:
     """Return arms and samples as the kernels take them."""
-    poses, names = samples.poses, ("dof", "base", "motion", "lower", "upper", "offset", "tool_axis", "tool_side")
+    poses, names = (
+        samples.poses,
+        ("dof", "base", "motion", "axis", "lower", "upper", "offset", "tool_axis", "tool_side"),
+    )
     values = {name: getattr(arms, name) for name in names}
     values |= {"first": samples.first, "n_angular": poses.n_angular, "position": poses.position}
     return loaded.struct("Path", values | {axis: poses.rotation[:, :, i] for i, axis in enumerate("xyz")})

@@ -34,8 +34,7 @@ HOPELESS, HOPELESS_ANGLE = 0.02, 0.2  # [m], [rad] off at the first sample: the 
 def path_kernels() -> SimpleNamespace:
     """Return the kernels."""
     base, steps = frame_math("float64"), path_math()
-    real, Vector3 = base.real, base.Vector3
-    advance, axis_of = base.advance, base.axis_of
+    real, Vector3, advance = base.real, base.Vector3, base.advance
     Path, Row, Square = steps.Path, steps.Row, steps.Square
     tool_error, solve_damped = steps.tool_error, steps.solve_damped
     Columns = wp.types.matrix(shape=(MAX_JOINTS, 6), dtype=real)
@@ -83,8 +82,7 @@ def path_kernels() -> SimpleNamespace:
                 p = path.base[arm]
                 for j in range(path.dof):
                     motion = path.motion[arm, j]
-                    axis = axis_of(motion, x, y, z)
-                    place, p, x, y, z = advance(motion, path.offset[arm, j], q[j], p, x, y, z)
+                    axis, place, p, x, y, z = advance(motion, path.axis[arm, j], path.offset[arm, j], q[j], p, x, y, z)
                     for i in range(3):
                         columns[j, i] = place[i]  # for now
                         columns[j, i + 3] = axis[i]
@@ -151,7 +149,9 @@ def path_kernels() -> SimpleNamespace:
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
         p = path.base[arm]
         for j in range(path.dof):
-            _place, p, x, y, z = advance(path.motion[arm, j], path.offset[arm, j], q[arm, sample, j], p, x, y, z)
+            _axis, _place, p, x, y, z = advance(
+                path.motion[arm, j], path.axis[arm, j], path.offset[arm, j], q[arm, sample, j], p, x, y, z
+            )
         e, _turn, angle, _x, _y, _z = tool_error(path, arm, sample, p, x, y, z)
         errors[arm, sample, 0] = wp.length(e)
         errors[arm, sample, 1] = angle

@@ -16,7 +16,7 @@ DAMPING = 1e-6  # of the mean square singular value of J
 def path_math() -> SimpleNamespace:
     """Return the functions, and the arms and samples that they take."""
     base = frame_math("float64")
-    real, Vector3 = base.real, base.Vector3
+    real, Vector3, in_frame = base.real, base.Vector3, base.in_frame
     Row = wp.types.vector(length=6, dtype=real)
     Square = wp.types.matrix(shape=(6, 6), dtype=real)
     zero, one, half = real(0.0), real(1.0), real(0.5)
@@ -29,6 +29,7 @@ def path_math() -> SimpleNamespace:
         dof: int
         base: wp.array(dtype=Vector3)  # (N,)
         motion: wp.array2d(dtype=int)  # (N, D)
+        axis: wp.array2d(dtype=Vector3)  # (N, D)
         lower: wp.array2d(dtype=real)  # (N, D)
         upper: wp.array2d(dtype=real)  # (N, D)
         offset: wp.array2d(dtype=Vector3)  # (N, D)
@@ -40,11 +41,6 @@ def path_math() -> SimpleNamespace:
         x: wp.array(dtype=Vector3)  # (S,) of the tool
         y: wp.array(dtype=Vector3)  # (S,)
         z: wp.array(dtype=Vector3)  # (S,)
-
-    @wp.func
-    def in_frame(v: Vector3, x: Vector3, y: Vector3, z: Vector3):
-        """Return the world components of a vector that is fixed in a frame."""
-        return v[0] * x + v[1] * y + v[2] * z
 
     @wp.func
     def rotation_error(kind: int, s: Vector3, t: Vector3, a: Vector3, x: Vector3, y: Vector3, z: Vector3):

@@ -82,7 +82,7 @@ def _terms(
 
     def solve(chunk: slice) -> None:
         part = arms[chunk]
-        values: dict[str, Any] = {name: getattr(part, name) for name in ("dof", "base", "motion", "offset")}
+        values: dict[str, Any] = {name: getattr(part, name) for name in ("dof", "base", "motion", "axis", "offset")}
         values |= vars(part.rigid_bodies) | {"payload_mass": loaded.warp.float64(payload)}
         values |= {"payload_com": part.payload_center, "payload_inertia": payload * part.payload_gyration}
         bodies, states, outputs = loaded.struct("Bodies", values), (q, q_s, q_ss), (terms[chunk], full[chunk])

@@ -109,6 +109,13 @@ def _solve_all(
     arms: ArmArrays, columns: Array, updates: int, initial_q: ArrayLike | None, kind: TargetKind, device: Device
 ) -> Postures:
     """Solve all arms at the targets (T, C), in chunks."""
+    if (opposed := arms.opposed).any():  # the kernels rotate about x, y and z, by the opposite angle
+        sign = np.where(opposed, -1.0, 1.0).astype(arms.precision)[:, None]
+        lower, upper = np.where(opposed, -arms.upper, arms.lower), np.where(opposed, -arms.lower, arms.upper)
+        mirrored = replace(arms, axis=np.where(opposed[..., None], -arms.axis, arms.axis), lower=lower, upper=upper)
+        start = None if initial_q is None else sign * np.asarray(initial_q)
+        found = _solve_all(mirrored, columns, updates, start, kind, device)
+        return replace(found, q=sign * found.q, torque=sign * found.torque)
     n, t, dof = len(arms), len(columns), arms.dof
     initial = None
     if initial_q is not None:

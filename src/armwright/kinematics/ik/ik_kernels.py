@@ -106,7 +106,9 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
         for _ in range(updates):
             p, x, y, z = at_base(arms.base[arm])
             for j in range(arms.dof):
-                axis, place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], q[j], p, x, y, z)
+                axis, place, p, x, y, z = advance(
+                    arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], q[j], p, x, y, z
+                )
                 for i in range(3):
                     linear[3 * j + i] = axis[i]
                     angular[3 * j + i] = place[i]

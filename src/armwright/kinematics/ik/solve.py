@@ -48,7 +48,7 @@ def solve(
 ) -> Solutions:
     """Solve the inverse kinematics of every arm at every pose, within the joint limits.
 
-    The first start is the straight arm; an arm read from a URDF starts at its `UrdfArm.zeros`. Poses that are not
+    The first start is the straight arm; a joint that cannot be at 0 starts at the nearest limit. Poses that are not
     reached are solved again from further starts, the same in every call. Equal arms and poses give equal bits,
     independent of the other arms and poses of the call. A pose that is not reached is a result, never an error.
 
@@ -88,12 +88,7 @@ def solve(
     arrays = stack_arms([arm.arm if isinstance(arm, UrdfArm) else arm for arm in given])
     poses = _stack(positions, axes, orientations, tolerance, angle_tolerance)
     postures = _best_postures(arrays, poses, restarts)
-    q = postures.q.astype(np.float64)
-    for values, arm in zip(q, given, strict=True):
-        if isinstance(arm, UrdfArm):
-            own = slice(len(arm.joints))
-            values[:, own] = arm.values_in_urdf(values[:, own])
-    return Solutions(q, *_errors(postures, poses))
+    return Solutions(postures.q.astype(np.float64), *_errors(postures, poses))
 
 
 def check_tolerances(tolerance: float, angle_tolerance: float) -> None:

@@ -36,7 +36,9 @@ def static_torque_kernel(precision: Precision, lanes: int, motions: Motions, kin
         """Return distance² + (angle error in metres)² at angles q (N, G, D), and the angle error [rad]."""
         p, x, y, z = at_base(arms.base[arm])
         for j in range(arms.dof):
-            _axis, _place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], q[arm, group, j], p, x, y, z)
+            _axis, _place, p, x, y, z = advance(
+                arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], q[arm, group, j], p, x, y, z
+            )
         error = vector_of(targets, group, 0) - p
         square = dot(error, error)
         if wp.static(pose):
@@ -82,7 +84,9 @@ def static_torque_kernel(precision: Precision, lanes: int, motions: Motions, kin
         for j in range(arms.dof):
             q = select(is_kept, q_kept[arm, group, j], q_last[arm, group, j])
             q_kept[arm, group, j] = q
-            axis, place, p, x, y, z = advance(arms.motion[arm, j], arms.offset[arm, j], q, p, x, y, z)
+            axis, place, p, x, y, z = advance(
+                arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], q, p, x, y, z
+            )
             axes[j] = axis
             places[j] = place
             com = arms.com[arm, j]

@@ -178,14 +178,13 @@ def reach_map(
     search = PoseSearch(arrays, samples, points, directions, tolerance, angle_tolerance)
     bare = search.find()
     usable = bare if conditions is None else search.find_usable(bare, conditions)
-    coverage = _coverage(bare, arm, spacing**3)
-    others = coverage if usable is bare else _coverage(usable, arm, spacing**3)
+    coverage = _coverage(bare, spacing**3)
+    others = coverage if usable is bare else _coverage(usable, spacing**3)
     return ReachMap(points, shape, spacing, directions, coverage, others)
 
 
-def _coverage(found: FoundPoses, arm: Arm | UrdfArm, cell: float) -> PoseCoverage:
-    q = arm.values_in_urdf(found.q) if isinstance(arm, UrdfArm) else found.q
-    return PoseCoverage(found.reached, found.covered, np.where(found.reached[..., None], q, np.nan), cell)
+def _coverage(found: FoundPoses, cell: float) -> PoseCoverage:
+    return PoseCoverage(found.reached, found.covered, np.where(found.reached[..., None], found.q, np.nan), cell)
 
 
 def _directions(axis: ArrayLike, half_angle: float, n: int) -> Array:

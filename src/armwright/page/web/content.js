@@ -99,8 +99,8 @@ export class Content {
       const part = this._part(name, i);
       arm[name] = part.subarray(0, (n * part.length) / room);
     }
-    arm.kind = Array.from(arm.motion, (motion) => Math.floor(motion / 3));
-    arm.axis = Array.from(arm.motion, (motion) => motion % 3);
+    arm.kind = Array.from(arm.motion, (motion) => Math.floor(motion / 4));
+    arm.axis = Array.from(arm.motion, (motion) => motion % 4);
     return arm;
   }
 
