@@ -61,7 +61,7 @@ def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
         **_space_values(problem.space),
         **_task_values(problem),
         "constraints": problem.constraints,
-        "tolerance": problem.tolerance,
+        "problem": problem,
         "n_feasible": int(history.feasible.sum()),
         "reference_point": history.reference_point,
         "n_finished": len(history),
@@ -118,10 +118,8 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "tool": _describe_tool(task.tool),
         "payload": _describe_payload(task),
         "point_load": task.load_shape == POINT_LOAD,
-        "obstacles": [obstacle.describe() for obstacle in task.obstacles],
         "collisions": problem.uses("clearance"),
         "oriented": task.target_arrays.oriented,
-        "restarts": task.restarts,
         "cycle": task.cycle_description,
         "cycle_times": task.cycle.describe_times() if task.cycle and problem.uses("durations") else "",
         "workspace": [r.describe() for r in task.workspace] if problem.uses("workspace", "directions") else [],
@@ -129,7 +127,6 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "n_targets": len(task.target_positions),
         "updates": UPDATES,
         "objectives": [_task_specific(objective, task) for objective in problem.objectives],
-        "cases": task.cases_description,
     }
 
 
