@@ -7,13 +7,21 @@ which belongs to one port, and sends it as a header. A cookie would reach the se
 
 import secrets
 import time
-from collections.abc import Collection
-from typing import Any
+from collections.abc import Awaitable, Callable, Collection
+from typing import Any, TypeVar
 
+from pydantic import BaseModel, ValidationError
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
 
+from armwright.exceptions import ArmwrightError, UsageError
+
+Body = TypeVar("Body", bound=BaseModel)
+
+MAX_BODY = 1024 * 1024  # [bytes] of a POST: two texts of the editor, their quotes escaped
 KEY_HEADER = "x-armwright-key"
 HEADERS = {
     "Cache-Control": "no-store",
@@ -66,18 +74,30 @@ class Guard:
         return PlainTextResponse("the key is missing or wrong; use the address that the server printed", 403)
 
 
-async def read_request(request: Request, limit: int) -> bytes | Response:
-    """Return the body of a POST of the page itself, of at most `limit` bytes, or the refusal of any other."""
+def post_route(path: str, schema: type[Body], handle: Callable[[Body], Awaitable[Response]]) -> Route:
+    """Return the route of a POST of the page itself; `handle` answers bodies of this schema, all others are refused."""
+
+    async def answer(request: Request) -> Response:
+        try:
+            return await handle(schema.model_validate_json(await _body(request)))
+        except ValidationError:
+            raise HTTPException(422, "the request is not one of the page") from None
+        except ClientDisconnect:
+            return Response(status_code=400)  # nobody receives it
+        except ArmwrightError as fault:
+            raise HTTPException(400 if isinstance(fault, UsageError) else 500, str(fault)) from None
+
+    return Route(path, answer, methods=["POST"])
+
+
+async def _body(request: Request) -> bytes:
     if request.headers.get("origin", "") != f"{request.url.scheme}://{request.headers.get('host', '')}":
-        return PlainTextResponse("only the page itself may send this", status_code=403)
+        raise HTTPException(403, "only the page itself may send this")
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        return PlainTextResponse("expected application/json", status_code=415)
+        raise HTTPException(415, "expected application/json")
     body = b""
-    try:
-        async for part in request.stream():
-            body += part
-            if len(body) > limit:
-                return PlainTextResponse("request too long", status_code=413)
-    except ClientDisconnect:
-        return Response(status_code=400)  # nobody receives it
+    async for part in request.stream():
+        body += part
+        if len(body) > MAX_BODY:
+            raise HTTPException(413, "request too long")
     return body
