@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import armwright as aw
-from armwright.page.request_guard import MAX_BODY
+from armwright.editor.app import MAX_BODY
 from tests.support.editor import ServedEditor, served_editor
 
 POSTS = ("/assess", "/points", "/save", "/design", "/stop")

@@ -21,7 +21,6 @@ from importlib import resources
 from typing import Any
 
 from pydantic import BaseModel, Field
-from pydantic_core import to_json
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
@@ -35,11 +34,12 @@ from armwright.editor.yaml_edits import Edit, edit_text
 from armwright.exceptions import TaskError, UsageError
 from armwright.page.assembly import SHARED, PageSource, assemble
 from armwright.page.live_app import LivePage, show_shell
-from armwright.page.request_guard import post_route
+from armwright.page.request_guard import post_route, to_response
 from armwright.tasks.points_file import parse_points
 from armwright.tasks.task import Task
 from armwright.yaml_documents import parse_document
 
+MAX_BODY = 4 * MAX_BYTES  # [bytes]; two texts, their quotes escaped
 MAX_EDITS = 10_000
 MIN_SECONDS, MAX_SECONDS = 5.0, 24 * 3600.0
 SHELLS = ("/", "/run/")
@@ -102,10 +102,10 @@ class Editor:
             Route("/", self.page),
             Route("/opened", self.opened),
             Route("/job", self.job),
-            post_route("/assess", AssessBody, self.assess),
-            post_route("/points", PointsBody, self.points),
-            post_route("/save", TextsBody, self.save),
-            post_route("/design", DesignBody, self.design),
+            post_route("/assess", AssessBody, self.assess, MAX_BODY),
+            post_route("/points", PointsBody, self.points, MAX_BODY),
+            post_route("/save", TextsBody, self.save, MAX_BODY),
+            post_route("/design", DesignBody, self.design, MAX_BODY),
             post_route("/stop", StopBody, self.stop),
             Route("/run/", show_shell),
             Mount("/run", app=self.run),
@@ -124,41 +124,17 @@ class Editor:
         files = self._files
         names = {"task": files.task.name, "space": files.space.name}
         state = {"exist": files.exist, "notes": files.notes, "choices": choices()}
-        return _json({"files": names, **dict(files.texts()), **state})
+        return to_response({"files": names, **dict(files.texts()), **state})
 
     async def job(self, request: Request) -> Response:
-        return _json(None if self._job is None else self._job.status())
+        return to_response(None if self._job is None else self._job.status())
 
     async def run(self, scope: Any, receive: Any, send: Any) -> None:
         """Answer the requests of the live page."""
         app = self._live or PlainTextResponse("no search has been started", 404)
         await app(scope, receive, send)
 
-    async def assess(self, body: AssessBody) -> Response:
-        return _json(await asyncio.to_thread(self._assess, body))
-
-    async def points(self, body: PointsBody) -> Response:
-        return _json(await asyncio.to_thread(parse_points, body.text, body.unit, "pasted text"))
-
-    async def save(self, body: TextsBody) -> Response:
-        await asyncio.to_thread(self._files.save, body, body.overwrite)
-        return Response(status_code=204)
-
-    async def design(self, body: DesignBody) -> Response:
-        if self._job is not None and self._job.is_running:
-            raise UsageError("a search is running; stop it first")
-        name = parse_document(body.task, Task, TaskError, self._files.task).name
-        await asyncio.to_thread(self._files.save, body, body.overwrite)
-        self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
-        self._live = Router(LivePage(self._job.folder).routes())
-        return _json(self._job.status())
-
-    async def stop(self, body: StopBody) -> Response:
-        if self._job is not None:
-            self._job.stop()
-        return Response(status_code=204)
-
-    def _assess(self, body: AssessBody) -> dict[str, Any]:
+    def assess(self, body: AssessBody) -> dict[str, Any]:
         files = self._files
         texts = Texts(
             task=edit_text(body.task, body.task_edits, str(files.task)),
@@ -166,7 +142,21 @@ class Editor:
         )
         return {"texts": texts, **assess(texts, files)}
 
+    def points(self, body: PointsBody) -> Any:
+        return parse_points(body.text, body.unit, "pasted text")
 
-def _json(content: Any) -> Response:
-    """Return JSON; numbers that it lacks become null, and dates text."""
-    return Response(to_json(content, inf_nan_mode="null", fallback=str), media_type="application/json")
+    def save(self, body: TextsBody) -> None:
+        self._files.save(body, body.overwrite)
+
+    def design(self, body: DesignBody) -> dict[str, Any]:
+        if self._job is not None and self._job.is_running:
+            raise UsageError("a search is running; stop it first")
+        name = parse_document(body.task, Task, TaskError, self._files.task).name
+        self._files.save(body, body.overwrite)
+        self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
+        self._live = Router(LivePage(self._job.folder).routes())
+        return self._job.status()
+
+    def stop(self, body: StopBody) -> None:
+        if self._job is not None:
+            self._job.stop()

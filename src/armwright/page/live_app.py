@@ -80,11 +80,10 @@ class LivePage:
     async def status(self, request: Request) -> Response:
         return JSONResponse(await asyncio.to_thread(self._run.status))
 
-    async def control(self, body: ControlRequest) -> Response:
+    def control(self, body: ControlRequest) -> None:
         if not self._folder.is_dir():
             raise RunFolderError("the run folder is gone")
-        await asyncio.to_thread(stop_study, self._folder)
-        return Response(status_code=204)
+        stop_study(self._folder)
 
 
 def _natural(request: Request, name: str) -> int | None:

@@ -5,12 +5,14 @@ address that the terminal shows, which browsers do not send. The page (page/key.
 which belongs to one port, and sends it as a header. A cookie would reach the servers of other users on other ports.
 """
 
+import asyncio
 import secrets
 import time
-from collections.abc import Awaitable, Callable, Collection
+from collections.abc import Callable, Collection
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import to_json
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
@@ -21,7 +23,7 @@ from armwright.exceptions import ArmwrightError, UsageError
 
 Body = TypeVar("Body", bound=BaseModel)
 
-MAX_BODY = 1024 * 1024  # [bytes] of a POST: two texts of the editor, their quotes escaped
+MAX_BODY = 64 * 1024  # [bytes] of a POST
 KEY_HEADER = "x-armwright-key"
 HEADERS = {
     "Cache-Control": "no-store",
@@ -74,23 +76,33 @@ class Guard:
         return PlainTextResponse("the key is missing or wrong; use the address that the server printed", 403)
 
 
-def post_route(path: str, schema: type[Body], handle: Callable[[Body], Awaitable[Response]]) -> Route:
-    """Return the route of a POST of the page itself; `handle` answers bodies of this schema, all others are refused."""
+def post_route(path: str, schema: type[Body], handle: Callable[[Body], Any], limit: int = MAX_BODY) -> Route:
+    """Return the route of a POST of the page itself with a body of this schema; all others are refused.
+
+    `handle` runs in a thread and returns the content of the response, None for none.
+    """
 
     async def answer(request: Request) -> Response:
         try:
-            return await handle(schema.model_validate_json(await _body(request)))
+            body = schema.model_validate_json(await _body(request, limit))
+            content = await asyncio.to_thread(handle, body)
         except ValidationError:
             raise HTTPException(422, "the request is not one of the page") from None
         except ClientDisconnect:
             return Response(status_code=400)  # nobody receives it
         except ArmwrightError as fault:
             raise HTTPException(400 if isinstance(fault, UsageError) else 500, str(fault)) from None
+        return Response(status_code=204) if content is None else to_response(content)
 
     return Route(path, answer, methods=["POST"])
 
 
-async def _body(request: Request) -> bytes:
+def to_response(content: Any) -> Response:
+    """Return content as JSON; numbers that it lacks become null, and dates text."""
+    return Response(to_json(content, inf_nan_mode="null", fallback=str), media_type="application/json")
+
+
+async def _body(request: Request, limit: int) -> bytes:
     if request.headers.get("origin", "") != f"{request.url.scheme}://{request.headers.get('host', '')}":
         raise HTTPException(403, "only the page itself may send this")
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
@@ -98,6 +110,6 @@ async def _body(request: Request) -> bytes:
     body = b""
     async for part in request.stream():
         body += part
-        if len(body) > MAX_BODY:
+        if len(body) > limit:
             raise HTTPException(413, "request too long")
     return body
