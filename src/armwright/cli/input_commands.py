@@ -8,7 +8,7 @@ from pathlib import Path
 
 from armwright.cli.options import load_problem
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import check_formats, open_console, print_json, print_records, print_text
+from armwright.cli.streams import open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -97,7 +97,7 @@ def tasks(names: list[str] | None = None, *, json_: bool = False, csv_: bool = F
     from armwright.proof.front_gap import best_known_hypervolume
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
-    console = open_console(check_formats(json_, csv_))
+    console = open_console(json_ or csv_)
     listed = [load_task(name) for name in names] if names else list(builtin_tasks().values())
     content = [task_record(task) for task in listed] if json_ else ()
     if print_records(json_, csv_, content, task_rows(listed)):
@@ -117,7 +117,7 @@ def actuators(names: list[str] | None = None, *, json_: bool = False, csv_: bool
     from armwright.cli.show_inputs import actuator_rows, show_actuator, show_actuators
     from armwright.robot.actuators import catalogue, named_actuator
 
-    console = open_console(check_formats(json_, csv_))
+    console = open_console(json_ or csv_)
     records = [named_actuator(name) for name in names] if names else list(catalogue().values())
     content = [record.completed().model_dump(exclude_none=True) | {"assumed": record.assumed} for record in records]
     if print_records(json_, csv_, content, actuator_rows(records)):

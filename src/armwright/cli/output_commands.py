@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.streams import activity, check_formats, open_console, print_csv, print_json, print_text
+from armwright.cli.streams import activity, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -34,7 +34,6 @@ def pick(
     from armwright.problem.conditions import read_condition
     from armwright.proof.selection import pick_from, survival_of
 
-    check_formats(json_, csv_)
     if n < 1:
         raise SettingsError(f"-n {n}: expected a whole number from 1")
     conditions = [read_condition(text) for text in where or ()]

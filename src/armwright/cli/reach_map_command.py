@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING
 
 from armwright.cli.arm_options import parse_numbers
 from armwright.cli.streams import open_console, print_json
-from armwright.cli.tables import number, print_table, text
+from armwright.cli.tables import Column, print_table
 from armwright.exceptions import SettingsError
 from armwright.text import percent, rounded
 
 if TYPE_CHECKING:
     from armwright.pictures.mapped_arm import MappedArm
-
-GRID, CONDITIONS = "Grid and directions", "Conditions"
 
 
 def reach_map(
@@ -122,8 +120,9 @@ def reach_map(
         return
     console.print(f"{len(found.points):,} points {rounded(found.spacing)} m apart, {len(found.directions)} directions")
     columns = (
-        text("postures", "postures", least=24), number("reached [m³]", "volume"),
-        number("in all directions [m³]", "dexterous_volume"), number("poses", "poses", lambda share: percent(share, 1)),
+        Column("postures", "postures", least=24), Column("reached [m³]", "volume", rounded),
+        Column("in all directions [m³]", "dexterous_volume", rounded),
+        Column("poses", "poses", lambda share: percent(share, 1)),
     )  # fmt: skip
     print_table(console, columns, volumes, "--json prints all")
     for written in files:

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from armwright.cli.show_results import format_value, links_of
 from armwright.cli.streams import format_point, print_command, print_named
-from armwright.cli.tables import Column, number, print_table
+from armwright.cli.tables import Column, print_table
 from armwright.problem.arm_quantities import TORQUE_SCALE, torque
 from armwright.problem.assumptions import assumed_values, count_assumed
 from armwright.problem.facts import describe_supply
@@ -69,13 +69,13 @@ def show_picked_table(
 
     def quantity(name: str, write: Callable[[float], str]) -> Column:
         head = f"{name.replace('_', ' ')}{units[name]}" if name in units else name
-        return Column(head, lambda member: write(quantities[member.number][name]), is_number=True)
+        return Column(head, lambda member: quantities[member.number][name], write)
 
     motors = Column("motors", lambda member: ", ".join(member.design.motors), rank=5, least=12)
     columns = (
-        number("#", "number", str), Column("source", lambda member: source_label(member.source), rank=3),
+        Column("#", "number", str), Column("source", lambda member: source_label(member.source), rank=3),
         *(quantity(name, format_value) for name in minimised), *(quantity(name, "{:.4g}".format) for name in further),
-        Column("types", lambda member: member.design.joints, rank=1), Column("links [m]", links_of, rank=4),
+        Column("types", "design.joints", rank=1), Column("links [m]", links_of, rank=4),
         *([motors] if any(member.design.motors for member in picked) else []),
     )  # fmt: skip
     _show_count(console, history, picked)

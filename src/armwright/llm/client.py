@@ -131,22 +131,15 @@ class ModelClient(LlmBackend):
         most_requests: int | None = None,
         earlier: Sequence[Turn] | None = None,
     ) -> Reply:
-        """Return the answer to a prompt; refusals of its output format are sent back to the model."""
-        if output is not None:
-            return self._ask_for(question, output, most_requests, earlier)
-        reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, earlier)
-        if not reply.answer.strip():
-            raise CallError("answer", f"{self.model} gave an empty answer", reply)
-        return reply
+        """Return the answer to a prompt; refusals of its output format are sent back to the model.
 
-    def _ask_for(
-        self,
-        question: Question,
-        output: OutputFormat,
-        most_requests: int | None,
-        earlier: Sequence[Turn] | None = None,
-    ) -> Reply:
-        """Ask in the first output mode that the server accepts and respects, which is used from then on."""
+        The first output mode that the server accepts and respects is used from then on.
+        """
+        if output is None:
+            reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, earlier)
+            if not reply.answer.strip():
+                raise CallError("answer", f"{self.model} gave an empty answer", reply)
+            return reply
         spent, modes = Reply(), self._modes
         for mode in modes:
             left = None if most_requests is None else most_requests - spent.requests
@@ -205,10 +198,8 @@ class ModelClient(LlmBackend):
                 raise _FormError(fault.kind, str(fault), fault.reply) from fault
             if fault.kind != "limit" or not refusals:
                 raise
-            message = (
-                f"{self.model}: max_calls leaves no request after an invalid answer ({redacted_line(refusals[-1])})"
-            )
-            raise CallError(fault.kind, message, fault.reply) from fault
+            reason = f"max_calls leaves no request after an invalid answer ({redacted_line(refusals[-1])})"
+            raise CallError(fault.kind, f"{self.model}: {reason}", fault.reply) from fault
         return replace(reply, answer=accepted[-1])
 
     def cancel(self) -> None:

@@ -33,6 +33,7 @@ from armwright.llm.configuration import ConfiguredModel, configuration_path, con
 from armwright.llm.draft_prompt import draft_prompt, draft_schema
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import estimated_tokens
+from armwright.llm.servers import describe_server
 from armwright.llm.session import LlmSession
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
@@ -121,8 +122,8 @@ class Drafter(LlmSession):
         given, configured = _input_tokens(description), self.configured
         cost = describe_cost(configured.options, 1, given, ANSWER_TOKENS)
         return (
-            f"asking {self._by()}{configured.place}, named by {configured.named_by}: about {given:,} tokens in, "
-            f"{ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
+            f"asking {self._by()}{describe_server(configured.options)}, named by {configured.named_by}: "
+            f"about {given:,} tokens in, {ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
         )
 
     def _calls(self) -> Sequence[Call]:

@@ -1,6 +1,5 @@
 """The values of a prompt template: the problem as text, and what is shown of past designs."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -166,15 +165,9 @@ def _describe_payload(task: Task) -> str:
         return f"At every target the tip carries a rigid payload: {task.payload.describe()}."
     if np.ptp(payloads) == 0.0:
         return f"At every target the tip carries a payload of {payloads[0]:g} kg, a point mass."
-    listed, omission = _sample([f"{payload:g}" for payload in payloads])
-    each = "some of" if omission else "each"
+    listed = ", ".join(f"{payloads[i]:g}" for i in spread(len(payloads), MAX_TARGETS))
+    each = "some of" if len(payloads) > MAX_TARGETS else "each"
     return f"At the targets the tip carries payloads, point masses of [kg], for {each} TARGET in this order: {listed}."
-
-
-def _sample(items: Sequence[str]) -> tuple[str, str]:
-    """Join at most MAX_TARGETS of the items; the second text says if some are omitted."""
-    shown = spread(len(items), MAX_TARGETS)
-    return ", ".join(items[i] for i in shown), "" if len(shown) == len(items) else f" (some of {len(items)})"
 
 
 def shown_values(history: History, feedback: Feedback, most: Limits) -> dict[str, Any]:

@@ -20,8 +20,9 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 
 from armwright.exceptions import ArmwrightError, RunFolderError
+from armwright.page.assembly import assemble
 from armwright.page.live_run import LiveRun
-from armwright.page.page import live_shell
+from armwright.page.page import PAGE
 from armwright.page.request_guard import post_route
 from armwright.runs.control import stop_study
 
@@ -39,7 +40,7 @@ def live_app(folder: Path) -> Starlette:
 
 async def show_shell(request: Request) -> Response:
     """Answer with the live page, without data."""
-    return HTMLResponse(live_shell())
+    return HTMLResponse(assemble(PAGE, "armwright, live", connects=True, values={"data": ""}))
 
 
 class LivePage:
@@ -68,7 +69,8 @@ class LivePage:
         return Response(data, media_type="application/octet-stream")
 
     async def file(self, request: Request) -> Response:
-        number, kind = _natural(request, "design"), request.query_params.get("format", "")
+        given, kind = request.query_params.get("design", ""), request.query_params.get("format", "")
+        number = int(given) if given.isascii() and given.isdigit() and len(given) < 10 else None
         try:
             text = None if number is None else await asyncio.to_thread(self._run.file, number, kind)
         except ArmwrightError as fault:  # the arm of a data sheet that cannot be made
@@ -84,9 +86,3 @@ class LivePage:
         if not self._folder.is_dir():
             raise RunFolderError("the run folder is gone")
         stop_study(self._folder)
-
-
-def _natural(request: Request, name: str) -> int | None:
-    """Return a whole number from the query; None if it is missing or invalid."""
-    text = request.query_params.get(name, "")
-    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else None

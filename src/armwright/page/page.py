@@ -28,8 +28,3 @@ def write_report(folder: str | Path) -> Path:
     with naming_write_errors(path, "; the trials are safe"):
         replace_file(path, page.encode())
     return path
-
-
-def live_shell() -> str:
-    """Return the HTML of the live page, which fetches its data."""
-    return assemble(PAGE, "armwright, live", connects=True, values={"data": ""})

@@ -11,7 +11,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from armwright.pictures.style import RC
-from armwright.sheet import tables as tables
+from armwright.sheet import tables
 from armwright.sheet.drawings import draw_side, draw_top
 from armwright.sheet.record import DataSheet
 from armwright.sheet.tables import Table
@@ -43,7 +43,8 @@ DRAWN = 160.0  # lines of 1 pt that the drawings take
 
 def to_html(sheet: DataSheet) -> str:
     """Return the data sheet as HTML, which prints on two pages of A4; the same sheet gives the same text."""
-    title = html.escape(f"Data sheet: {tables.title_of(sheet)}")
+    design = "" if sheet.design is None else f", design {sheet.design} ({sheet.joint_letters})"
+    title = html.escape(f"Data sheet: {sheet.name}{design}")
     verdict = tables.verdict_of(sheet)
     left, right = (tables.key_figures, tables.reach_table), (tables.link_table, tables.mass_table)
     columns = [[make(sheet) for make in makers] for makers in (left, right)]
@@ -54,8 +55,10 @@ def to_html(sheet: DataSheet) -> str:
         _beside(_picture(sheet, draw_side, "side view"), _picture(sheet, draw_top, "top view")),
     ]
     joints, parts = tables.joint_table(sheet), tables.parts_table(sheet)
-    assumed = tuple(f"{about}: {text}." for about, text in sheet.assumptions.items())
-    bodies, sources = tables.body_lines(sheet), tables.source_lines(sheet)
+    assumed = [f"{about}: {text}." for about, text in sheet.assumptions.items()]
+    bodies = [f"actuator at joint {joint.number}: {joint.body}" for joint in sheet.joints if joint.body]
+    read = ((part.part, "; ".join(filter(None, (part.source, part.price_source)))) for part in sheet.parts)
+    sources = [f"{name}: {source}" for name, source in read if source]
     second = [
         *(_table(joints), _list(bodies), _table(parts), _list(sources)),
         *("<h2>What the values assume</h2>", _list(assumed)),
@@ -110,12 +113,9 @@ def _table(table: Table) -> str:
 
 
 def _row(table: Table, cells: tuple[str, ...], tag: str) -> str:
-    shown: list[str] = []
-    for column, cell in enumerate(cells):
-        aligned = ' class="left"' if column in table.left else ""
-        shown.append(f"<{tag}{aligned}>{html.escape(cell)}</{tag}>")
-    return f"<tr>{''.join(shown)}</tr>"
+    starts = [f'<{tag} class="left">' if column in table.left else f"<{tag}>" for column in range(len(cells))]
+    return f"<tr>{''.join(f'{start}{html.escape(c)}</{tag}>' for start, c in zip(starts, cells, strict=True))}</tr>"
 
 
-def _list(lines: tuple[str, ...]) -> str:
+def _list(lines: Sequence[str]) -> str:
     return f"<ul>{''.join(f'<li>{html.escape(line)}</li>' for line in lines)}</ul>" if lines else ""
