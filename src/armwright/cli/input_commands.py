@@ -93,13 +93,15 @@ def tasks(names: list[str] | None = None, *, json_: bool = False, csv_: bool = F
     Parameters:
         names: Describe these tasks (built-in, random-N, files).
     """
-    from armwright.cli.show_inputs import show_task, show_tasks, task_record, task_rows
+    from armwright.cli.show_inputs import show_task, show_tasks, task_rows
     from armwright.proof.front_gap import best_known_hypervolume
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
     console = open_console(json_ or csv_)
     listed = [load_task(name) for name in names] if names else list(builtin_tasks().values())
-    content = [task_record(task) for task in listed] if json_ else ()
+    content = [
+        task.model_dump(mode="json") | {"best_known_hypervolume": best_known_hypervolume(task)} for task in listed
+    ]
     if print_records(json_, csv_, content, task_rows(listed)):
         return
     if not names:

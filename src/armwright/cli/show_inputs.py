@@ -31,11 +31,6 @@ MAX_ROWS = 40  # of a table of targets
 FOUR = partial(rounded, digits=4)
 
 
-def task_record(task: DesignTask) -> dict[str, Any]:
-    """Return a task for JSON, with the best known hypervolume."""
-    return task.model_dump(mode="json") | {"best_known_hypervolume": best_known_hypervolume(task)}
-
-
 def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
     """Yield tasks as rows of tables."""
     for task in tasks:

@@ -176,14 +176,19 @@ def frame(axes: Any, extent: Extent) -> None:
 
 def _extent(problem: Problem, drawn: Sequence[tuple[Arm, DesignRecord]]) -> Extent:
     """Return the cube that contains all targets, columns, postures and motions."""
-    task, plan = problem.task, problem.scenes[0].plan
-    places = [task.target_positions, *([] if plan is None else [plan.poses.position])]
-    places += [corner for region in task.workspace for corner in region.corners]
+    places = places_of(problem)
     for arm, record in drawn:
         places += [joint_positions(arm, target.q) for target in record.targets] + _tip_paths(arm, record)
         if arm.column is not None:
             places.append(np.array(arm.base) - (0.0, 0.0, arm.column.length))
-    return extent_of(places, task.obstacles)
+    return extent_of(places, problem.task.obstacles)
+
+
+def places_of(problem: Problem) -> list[Any]:
+    """Return the points of a task that are drawn: targets, poses of the cycle, and corners of the workspace."""
+    task, plan = problem.task, problem.scenes[0].plan
+    corners = [corner for region in task.workspace for corner in region.corners]
+    return [task.target_positions, *([] if plan is None else [plan.poses.position]), *corners]
 
 
 def _legend(problem: Problem, records: Sequence[DesignRecord]) -> list[Line2D | Patch]:

@@ -1,6 +1,6 @@
 """Figures without a display, written as PNG and PDF; a folder of figures is replaced in one step."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -118,11 +118,12 @@ def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:
     return [place / name for name in names]
 
 
-def save_figure(figure: Figure, file: Path) -> None:
-    """Write a figure, in the format of the file's ending."""
+def save_figure(draw: Callable[[], Figure], file: Path) -> None:
+    """Write what `draw` draws, in the format of the file's ending."""
     content = BytesIO()
-    figure.savefig(content, format=file.suffix.removeprefix("."))
-    replace_file(file, content.getvalue())
+    with matplotlib.rc_context(RC), naming_write_errors(file):
+        draw().savefig(content, format=file.suffix.removeprefix("."))
+        replace_file(file, content.getvalue())
 
 
 def _save(figure: Figure, png: Path) -> str:

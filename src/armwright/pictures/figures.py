@@ -126,10 +126,12 @@ def draw_search(history: History, search: Mapping[str, Any]) -> Figure:
 
 def _label_hypervolume(axes: Any, history: History, x_label: str) -> None:
     """Label axes of a hypervolume, with a line at the best known one of the task, if one is known."""
-    found = front_gap(history.problem, history.masked_objectives, _reference(history))
+    reference = _reference(history)
+    found = front_gap(history.problem, history.masked_objectives, reference)
     if found is not None:
         axes.axhline(found.hypervolume, **BEST_KNOWN, label=f"best known ({found.hypervolume:.2f})")
-    axes.set(xlabel=x_label, ylabel="Hypervolume", title=_title(history))
+    title = f"{history.problem.task.name}, reference point ({', '.join(f'{value:.4g}' for value in reference)})"
+    axes.set(xlabel=x_label, ylabel="Hypervolume", title=title)
     axes.set_ylim(bottom=0)
     axes.legend(loc="lower right")
 
@@ -235,11 +237,6 @@ def _legend(history: History) -> list[Line2D]:
 
 def _mark(style: Look) -> Line2D:
     return legend_mark(style.label, style.marker, style.colour, markersize=5)
-
-
-def _title(history: History) -> str:
-    values = ", ".join(f"{value:.4g}" for value in _reference(history))
-    return f"{history.problem.task.name}, reference point ({values})"
 
 
 def _reference(history: History) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ import { ball, empty, floorParts, rod, segments } from "./shapes.js";
 import { solidParts } from "./solids.js";
 import { openStage } from "./stage.js";
 import { listen, set, state } from "./state.js";
-import { $, colour, element, number, onTheme, shown } from "./format.js";
+import { $, colour, dot, element, number, onTheme, shown } from "./format.js";
 
 const REST = 1200; // [ms] at a target while playing
 const VIEW = [0.55, -1, 0.42]; // initial direction of the camera
@@ -119,11 +119,7 @@ function legend() {
   if (content.head.bodies.length) parts.push([content.head.colours.target, "tool, payload at targets"]);
   if (content.head.lines.length) parts.push([content.head.colours.target, "line of the cycle"]);
   if (content.head.workspace.length) parts.push([colour("soft"), "workspace (edges)"]);
-  $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
-    const dot = element("span", { class: "dot" });
-    dot.style.background = paint_;
-    return element("span", { class: "key" }, dot, text);
-  }));
+  $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => element("span", { class: "key" }, dot(paint_), text)));
 }
 
 // Returns the points of the selected design that must be visible: targets, and the arm in all postures.

@@ -8,7 +8,7 @@ const OF_ARM = ["base", "up", "tip", "tool_axis", "tool_side", "column_half"];
 const OF_JOINTS = ["motion", "lower", "upper", "offset", "radius", "body_shape", "body_half", "body_centre"];
 
 // A JSON head, and arrays that are views of the bytes (see page/content.py, pack).
-export function unpack(buffer) {
+function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const arrays = {};

@@ -2,7 +2,7 @@
 
 import { FIXED, angleOff, chain, distance, length, linkLength } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
-import { $, element, metres, millimetres, number, quantity, save } from "./format.js";
+import { $, element, markRows, metres, millimetres, number, quantity, save } from "./format.js";
 
 const AT_LIMIT = 1e-3; // rad or m
 const ONLY_FRONT = "Torques are stated of the designs of the front";
@@ -180,16 +180,12 @@ function describeIdle(i, posed) {
 }
 
 function mark() {
-  for (const row of $("postures").querySelectorAll("tbody tr")) {
-    const isChosen = Number(row.dataset.target) === state.target;
-    row.classList.toggle("chosen", isChosen);
-    row.setAttribute("aria-current", isChosen);
-    if (isChosen) showRow(row);
-  }
+  showRow(markRows($("postures").querySelectorAll("tbody tr"), "target", state.target));
 }
 
-// Scrolls a table's own box, never the page.
+// Scrolls a table's own box to a row, if there is one, never the page.
 export function showRow(row) {
+  if (row === null) return;
   const box = row.closest(".scroll"), head = box.querySelector("thead").offsetHeight;
   const foot = box.querySelector("tfoot")?.offsetHeight ?? 0, end = row.offsetTop + row.offsetHeight + foot;
   if (row.offsetTop - head < box.scrollTop) box.scrollTop = row.offsetTop - head;
