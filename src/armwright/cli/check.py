@@ -73,8 +73,7 @@ def record_check(problem: Problem, findings: Sequence[Finding], n_samples: int) 
 
 def show_check(console: Console, problem: Problem) -> None:
     """Print what a task and a space mean."""
-    has_bodies = problem.space.has_bodies
-    show_task(console, problem.task, has_drives=problem.has_drives, has_bodies=has_bodies, is_brief=True)
+    show_task(console, problem.task, problem=problem)
     show_target_table(console, problem)
     minimised = ", ".join(f"{objective.name}{objective.unit_in_brackets}" for objective in problem.objectives)
     console.print(f"  minimised: {minimised}")

@@ -151,19 +151,18 @@ def draft(
         force: Replace files of the same name.
         print_prompt: Print the prompt and the schema that would be sent, and exit.
     """
-    from armwright.cli.show_inputs import show_draft
-
-    if not print_prompt:
-        import_module("armwright.llm.client")  # names the extra `llm`, which brings all that follows
-    from armwright.llm.configuration import load_model_options
-    from armwright.llm.draft import Drafter, drafting_model
-    from armwright.llm.draft_prompt import draft_prompt, draft_schema
-
     request = " ".join(description)
     if print_prompt:
+        from armwright.llm.draft_prompt import draft_prompt, draft_schema
+
         print_text(draft_prompt(request))
         print_json(draft_schema())
         return
+    import_module("armwright.llm.client")  # names the extra `llm`, which brings all that follows
+    from armwright.cli.show_inputs import show_draft
+    from armwright.llm.configuration import load_model_options
+    from armwright.llm.draft import Drafter, drafting_model
+
     console = open_console(json_)
     options = load_model_options(model_options, model=model, max_cost=max_cost)
     drafter = Drafter(drafting_model(options), out, force)

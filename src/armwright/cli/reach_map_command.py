@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armwright.cli.arm_options import parse_numbers
+from armwright.cli.arm_options import parse_numbers, refuse
 from armwright.cli.streams import open_console, print_json
 from armwright.cli.tables import Column, print_table
 from armwright.exceptions import SettingsError
@@ -142,14 +142,11 @@ def _subject(
 
     run = Path(source)
     if not run.is_dir():
-        if design is not None:
-            raise SettingsError(f"--design {design} is for a run; {source} is an arm")
+        refuse(f" is for a run; {source} is an arm", design=design)
         arm = read_urdf(find_urdf(source), tip)
         around = None if task is None else load_task(task)
         return MappedArm(run.stem, arm, around, conditions), Path(f"{run.stem}-reach.npz")
-    for name, value in (("--tip", tip), ("--task", task)):
-        if value is not None:
-            raise SettingsError(f"{name} {value} is for a URDF; the run {source} has its own")
+    refuse(f" is for a URDF; the run {source} has its own", tip=tip, task=task)
     _, history = read_run(run)
     member = pick(history)[0] if design is None else history.member(design)
     title = f"design {member.number} of {source}"

@@ -103,26 +103,13 @@ def _describe_body(record: ActuatorRecord, body: ActuatorShape) -> str:
 
 
 def show_task(
-    console: Console,
-    task: DesignTask,
-    best_known: float | None = None,
-    has_drives: bool = False,
-    has_bodies: bool = False,
-    is_brief: bool = False,
+    console: Console, task: DesignTask, best_known: float | None = None, problem: Problem | None = None
 ) -> None:
-    """Print a task.
-
-    Args:
-        console: The console.
-        task: The task.
-        best_known: Its best known hypervolume, if any.
-        has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
-        has_bodies: Whether motors or a column are solid bodies, which may not collide.
-        is_brief: Leave out the targets.
-    """
+    """Print a task, with its best known hypervolume; of a problem, the implied constraints and not the targets."""
+    has_drives, has_bodies = (problem.has_drives, problem.space.has_bodies) if problem else (False, False)
     reference = task.reference_point
     print_named(console, task.name, f": {task.description}" if task.description else "")
-    if not is_brief:
+    if problem is None:
         points = " ".join(format_point(point) for point in task.target_positions.tolist())
         console.print(f"  {len(task.targets)} targets [m]: {points}")
         for line in describe_targets(task.targets):

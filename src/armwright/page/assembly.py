@@ -39,7 +39,8 @@ def assemble(source: PageSource, title: str, connects: bool, values: Mapping[str
 
     `connects` lets it ask its own server; otherwise the policy forbids all connections.
     """
-    scripts = [*(_library(source, name) for name in source.libraries), program(source)]
+    libraries = (source.read(f"vendor/{name}").replace("</script", "<\\/script") for name in source.libraries)
+    scripts = [*libraries, program(source)]
     sums = " ".join(f"'sha256-{_sum(script)}'" for script in scripts)
     reach = "'self'" if connects else "'none'"
     policy = (
@@ -83,10 +84,6 @@ def _as_function(name: str, text: str) -> str:
 
 def _variable(name: str) -> str:
     return f"{name.removesuffix('.js').replace('-', '_')}_module"
-
-
-def _library(source: PageSource, name: str) -> str:
-    return source.read(f"vendor/{name}").replace("</script", "<\\/script")
 
 
 @cache

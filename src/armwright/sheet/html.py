@@ -5,6 +5,7 @@ import html
 import io
 import math
 from collections.abc import Callable, Sequence
+from importlib import resources
 from typing import Any
 
 import matplotlib
@@ -17,24 +18,6 @@ from armwright.sheet.record import DataSheet
 from armwright.sheet.tables import Table
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
-STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #111; background: #fff; margin: 2rem auto; max-width: 60rem;
-       padding: 0 1rem; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.1em; margin: 1.6em 0 0.4em; }
-.wide { overflow-x: auto; } .pair { display: flex; flex-wrap: wrap; gap: 0 2em; }
-.pair > * { flex: 1 1 20rem; max-width: 100%; min-width: 0; }
-img { max-width: 100%; }
-table { border-collapse: collapse; font-size: 0.85em; }
-th, td { padding: 0.15em 0.6em 0.15em 0; border-bottom: 1px solid #ddd; text-align: right; vertical-align: top; }
-th { border-bottom-color: #111; } .left { text-align: left; } p, li { font-size: 0.85em; overflow-wrap: anywhere; }
-@page { size: A4; margin: 12mm; }
-@media print {
-  body { margin: 0; max-width: none; padding: 0; line-height: 1.25; } section { font-size: var(--size); }
-  section + section { break-before: page; } h1 { margin: 0; } h2 { margin: 0.8em 0 0.2em; break-after: avoid; }
-  tr, img { break-inside: avoid; } .wide { overflow-x: visible; } .pair > * { flex-basis: 40%; }
-  img { width: 100%; max-height: 80mm; } ul { margin: 0.2em 0; padding-left: 1.2em; } p { margin: 0.3em 0; }
-}
-"""
 SIZES = (9.5, 9.0, 8.5, 8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0, 4.5, 4.0)  # of printed text [pt]; the largest that fits
 PAGE = 500.0  # lines of 1 pt on a page of A4
 WIDTH = 1150.0  # letters of 1 pt in a line
@@ -71,10 +54,11 @@ def to_html(sheet: DataSheet) -> str:
         f'<section style="--size: {size}pt">\n{chr(10).join(filter(None, texts))}\n</section>'
         for size, texts in zip(sizes, (first, second), strict=True)
     ]
+    style = (resources.files("armwright.sheet") / "datasheet.css").read_text(encoding="utf-8")
     head = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>{STYLE}</style></head>\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>\n{style}</style></head>\n'
     )
     return head + "<body>\n" + "\n".join(pages) + "\n</body></html>\n"
 
