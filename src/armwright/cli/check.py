@@ -145,6 +145,5 @@ def _describe_range(parameter: Parameter) -> str:
     step = f" in steps of {parameter.step:g}" if parameter.step else ""
     if parameter.integer and parameter.step == 1.0:
         step = ", whole numbers"
-    return f"{parameter.low:g} to {parameter.high:g}{unit}{step}" + (
-        ", on a logarithmic scale" if parameter.log else ""
-    )
+    scale = ", on a logarithmic scale" if parameter.log else ""
+    return f"{parameter.low:g} to {parameter.high:g}{unit}{step}{scale}"

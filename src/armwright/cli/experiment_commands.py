@@ -5,14 +5,7 @@ from pathlib import Path
 
 from armwright.cli.arm_options import parse_base, parse_prices
 from armwright.cli.options import select_workers
-from armwright.cli.streams import (
-    activity,
-    exit_interrupted,
-    open_console,
-    print_json,
-    print_records,
-    print_text,
-)
+from armwright.cli.streams import activity, exit_interrupted, open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 

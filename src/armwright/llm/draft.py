@@ -17,15 +17,7 @@ from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
-from armwright.exceptions import (
-    ArmwrightError,
-    FailureError,
-    ModelError,
-    ProposalError,
-    SettingsError,
-    SpaceError,
-    TaskError,
-)
+from armwright.exceptions import FailureError, ModelError, ProposalError, SettingsError, SpaceError, TaskError
 from armwright.files import naming_write_errors, replace_file
 from armwright.llm.backend import MAX_REQUESTS, CallError, OutputFormat, Question
 from armwright.llm.budget import CallBudget
@@ -250,7 +242,7 @@ def drafting_model(options: ModelOptions | str | None = None) -> ConfiguredModel
     return configured
 
 
-def _document(content: Any, schema: type[Model], error: type[ArmwrightError], where: str) -> tuple[Model, str]:
+def _document(content: Any, schema: type[Model], error: type[Exception], where: str) -> tuple[Model, str]:
     """Return the value of an answer's part, and the YAML that states it without the keys that have their default.
 
     The YAML is read back like a file: what is written is what was checked.

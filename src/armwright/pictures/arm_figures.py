@@ -12,15 +12,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from armwright.arrays import Array
+from armwright.kinematics.arms import forward
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.kinematics.arms.forward import (
-    column_solid,
-    forward_kinematics,
-    joint_positions,
-    link_lines,
-    motor_solids,
-    rails,
-)
 from armwright.pictures.drawing import legend_mark
 from armwright.pictures.solids import Extent, draw_edges, draw_obstacles, draw_solid, extent_of
 from armwright.pictures.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET
@@ -112,18 +105,18 @@ def _draw_panel(
             if motion.by == "line":
                 axes.plot(*plan.poses.position[[motion.start, motion.end]].T, **MOVE)
             axes.plot(*points.T, **TIP)
-    column = column_solid(arm)
+    column = forward.column_solid(arm)
     if column is not None:
         draw_solid(axes, column, extent, LINK)
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
         q = record.targets[target].q
-        places = joint_positions(arm, q)
-        for line in rails(arm, q):
+        places = forward.joint_positions(arm, q)
+        for line in forward.rails(arm, q):
             axes.plot(*line.T, color=FRONT, linewidth=1.0, alpha=alpha)
-        for line in link_lines(arm, q):
+        for line in forward.link_lines(arm, q):
             axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
-        for axis, body in motor_solids(arm, q):
+        for axis, body in forward.motor_solids(arm, q):
             draw_solid(axes, body, extent, JOINT[axis])
         for joint, place in zip(arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
@@ -144,7 +137,7 @@ def _tip_paths(arm: Arm, record: DesignRecord) -> list[Array]:
         columns: Array = np.array(points, dtype=np.float64).T
         values: list[Array] = [np.interp(at, shares, column) for column in columns]
         q: Array = np.stack(values, axis=-1)
-        found.append(forward_kinematics(stack_arms([arm], "float64"), q[None]).tip[0])
+        found.append(forward.forward_kinematics(stack_arms([arm], "float64"), q[None]).tip[0])
     return found
 
 
@@ -178,7 +171,7 @@ def _extent(problem: Problem, drawn: Sequence[tuple[Arm, DesignRecord]]) -> Exte
     """Return the cube that contains all targets, columns, postures and motions."""
     places = places_of(problem)
     for arm, record in drawn:
-        places += [joint_positions(arm, target.q) for target in record.targets] + _tip_paths(arm, record)
+        places += [forward.joint_positions(arm, target.q) for target in record.targets] + _tip_paths(arm, record)
         if arm.column is not None:
             places.append(np.array(arm.base) - (0.0, 0.0, arm.column.length))
     return extent_of(places, problem.task.obstacles)
