@@ -5,10 +5,10 @@ import logging
 import threading
 import time
 import warnings
-from collections.abc import Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from armwright.exceptions import SettingsError, UsageError
@@ -144,7 +144,8 @@ class ModelClient(LlmBackend):
         for mode in modes:
             left = None if most_requests is None else most_requests - spent.requests
             try:
-                reply = self._ask_in(mode, question, output, left, earlier)
+                run = partial(self._run, question=question, most_requests=left, earlier=earlier)
+                reply = self._ask_in(mode, output, 0 if question is CHECK else REASKS, run)
             except (CallError, Interrupted) as fault:
                 fault.reply = spent = spent.plus(fault.reply)
                 others = modes[modes.index(mode) + 1 :]
@@ -166,15 +167,8 @@ class ModelClient(LlmBackend):
                 return replace(spent.plus(reply), output_mode=mode)
         raise AssertionError("there is at least one mode")
 
-    def _ask_in(
-        self,
-        mode: str,
-        question: Question,
-        output: OutputFormat,
-        most_requests: int | None,
-        earlier: Sequence[Turn] | None,
-    ) -> Reply:
-        """Ask in one output mode; refusals go back to the model, except in a check."""
+    def _ask_in(self, mode: str, output: OutputFormat, retries: int, run: Callable[[Agent[None, Any]], Reply]) -> Reply:
+        """Ask in one output mode; refusals go back to the model, so many times."""
         accepted: list[str] = []
         refusals: list[str] = []
 
@@ -188,11 +182,10 @@ class ModelClient(LlmBackend):
             return answer
 
         schema = _OUTPUTS[mode](StructuredDict(dict(output.schema)))
-        retries = 0 if question is CHECK else REASKS
         agent: Agent[None, Any] = Agent(self._model, output_type=schema, retries=retries)
         agent.output_validator(accept)
         try:
-            reply = self._run(agent, question, most_requests, earlier)
+            reply = run(agent)
         except CallError as fault:
             if fault.kind in ("answer", "limit") and fault.reply.requests and not refusals:
                 raise _FormError(fault.kind, str(fault), fault.reply) from fault

@@ -78,14 +78,12 @@ export class Content {
   }
 
   // The joint types in order, such as "PYR".
-  joints(i) {
-    return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
-  }
+  joints(i) { return this.chosen(i, "joint").join(""); }
 
   // The value of a parameter; undefined if it is not active.
   param(i, name) { return this.params(i).find((p) => p.name === name)?.value; }
 
-  // The choices of KIND_1, KIND_2, … in order; KIND is "motor", "tube" or "direction".
+  // The choices of KIND_1, KIND_2, … in order; KIND is "joint", "motor", "tube" or "direction".
   chosen(i, kind) {
     return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
   }
