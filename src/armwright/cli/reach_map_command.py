@@ -77,8 +77,7 @@ def reach_map(
         clearance=clearance,
         obstacles=mapped.obstacles if obstacles else (),
     )
-    if out is not None:
-        file = out
+    file = out or file
     file.parent.mkdir(parents=True, exist_ok=True)
     around = "of the whole sphere" if cone >= 180.0 else f"within {cone:g}° of ({axis})"
     count = f"{len(found.directions)} directions" if len(found.directions) > 1 else "one direction"

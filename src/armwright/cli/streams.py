@@ -89,12 +89,12 @@ def print_csv(rows: Iterable[Mapping[str, Any]]) -> None:
     print_text(to_csv(rows), end="")
 
 
-def print_records(is_json: bool, is_csv: bool, content: Any, rows: Iterable[Mapping[str, Any]] | None = None) -> bool:
-    """Print content as JSON or rows, by default the content, as CSV; return whether either was asked for."""
+def print_records(is_json: bool, is_csv: bool, content: Any, rows: Iterable[Mapping[str, Any]]) -> bool:
+    """Print content as JSON or rows as CSV; return whether either was asked for."""
     if is_json:
         print_json(content)
     elif is_csv:
-        print_csv(content if rows is None else rows)
+        print_csv(rows)
     return is_json or is_csv
 
 

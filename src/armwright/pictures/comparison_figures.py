@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from armwright.experiments.compare_runs import Comparison
 from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.pictures.arm_figures import draw_arm, frame
-from armwright.pictures.drawing import draw_dominated, frame_plane, legend_below, one_panel, several_panels, write_drawn
+from armwright.pictures.drawing import draw_dominated, frame_plane, legend_below, one_panel, write_drawn
 from armwright.pictures.figures import draw_samples
 from armwright.pictures.reason_figures import draw_reasons
 from armwright.pictures.solids import extent_of
@@ -164,7 +164,8 @@ def _columns(tasks: Sequence[str]) -> int:
 def _panels(tasks: Sequence[str], height: float) -> tuple[Figure, Sequence[Any]]:
     columns = _columns(tasks)
     rows = math.ceil(len(tasks) / columns)
-    figure = several_panels(max(5.2, min(3.5, 11.0 / columns) * columns), height * rows + 0.7)
+    width = max(5.2, min(3.5, 11.0 / columns) * columns)
+    figure = Figure(figsize=(width, height * rows + 0.7), layout="constrained")
     panels: list[Any] = list(np.atleast_1d(figure.subplots(rows, columns)).flat)
     for axes in panels[len(tasks) :]:
         axes.set_visible(False)

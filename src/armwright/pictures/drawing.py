@@ -31,11 +31,6 @@ def one_panel(width: float, height: float, pad: float | None = None) -> tuple[Fi
     return figure, figure.subplots()
 
 
-def several_panels(width: float, height: float) -> Figure:
-    """Return a figure of this size [inch] without axes."""
-    return Figure(figsize=(width, height), layout="constrained")
-
-
 def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Array:
     """Return the limits (2, 2) of a plane of two objectives: low and high of each.
 
@@ -76,23 +71,15 @@ def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], limits:
 
 
 def draw_dominated(axes: Any, front: Array, reference: Sequence[float], **fill: Any) -> None:
-    """Draw a front (K, 2) within the reference box as a step line, and fill the area that it dominates."""
-    x, y = front_steps(front, reference)
-    axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=2)
-    axes.fill_between(x, y, reference[1], step="post", linewidth=0, **fill)
+    """Draw a front as a step line from the top to the right side of the reference box, and fill what it dominates.
 
-
-def front_steps(front: Array, reference: Sequence[float]) -> tuple[Array, Array]:
-    """Return the x and y of a front's step line from the top to the right side of the reference box.
-
-    The front (K, 2) holds points within the box, sorted by the first objective. Of the reference point, only the first
-    two objectives are used.
+    The front (K, 2) holds points within the box, at least one, sorted by the first objective. Of the reference point,
+    only the first two objectives are used.
     """
-    if not len(front):
-        return np.array([reference[0]]), np.array([reference[1]])
     x = np.concatenate([front[:1, 0], front[:, 0], [reference[0]]])
     y = np.concatenate([[reference[1]], front[:, 1], front[-1:, 1]])
-    return x, y
+    axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=2)
+    axes.fill_between(x, y, reference[1], step="post", linewidth=0, **fill)
 
 
 def legend_mark(label: str, marker: str, colour: str, **style: Any) -> Line2D:

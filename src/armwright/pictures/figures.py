@@ -129,7 +129,7 @@ def _label_hypervolume(axes: Any, history: History, x_label: str) -> None:
 
 def draw_samples(history: History) -> Figure:
     """Draw all trials after 5, 35, 65 and 100 % of the counted ones, coloured by source, with the front."""
-    figure = drawing.several_panels(10.4, 3.4)
+    figure = Figure(figsize=(10.4, 3.4), layout="constrained")
     panels: Sequence[Any] = figure.subplots(1, len(SAMPLE_SHARES), sharex=True, sharey=True)
     counted, limits = len(history) - history.n_init, _limits(history)
     shown = sorted({max(1, round(share * counted)) for share in SAMPLE_SHARES}) if counted > 0 else [0]

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from armwright.kinematics.reach.reach_map import PoseCoverage, ReachMap
-from armwright.pictures.drawing import legend_below, legend_mark, save_figure, several_panels
+from armwright.pictures.drawing import legend_below, legend_mark, save_figure
 from armwright.pictures.mapped_arm import MappedArm
 from armwright.pictures.style import FRONT, OBSTACLE, TARGET
 from armwright.robot.arm import Arm
@@ -55,7 +55,7 @@ def _draw(found: ReachMap, around: MappedArm) -> Figure:
     rows = [("within joint limits", found.bare)]
     if found.usable is not found.bare:
         rows.append((around.conditions, found.usable))
-    figure = several_panels(2 * PANEL + 0.8, PANEL * len(rows) + 0.9)
+    figure = Figure(figsize=(2 * PANEL + 0.8, PANEL * len(rows) + 0.9), layout="constrained")
     axes: Any = figure.subplots(len(rows), 2, squeeze=False)
     slices = (_vertical(found, around.body), _horizontal(found, around))
     image: Any = None
