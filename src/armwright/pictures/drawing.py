@@ -89,10 +89,9 @@ def legend_mark(label: str, marker: str, colour: str, **style: Any) -> Line2D:
 
 def legend_below(figure: Figure, handles: Sequence[Any]) -> None:
     """Add a legend below the panels, with as many columns as fit."""
-    if handles:
-        widest = LEGEND_MARK + LEGEND_LETTER * max(len(str(handle.get_label())) for handle in handles)
-        columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))
-        figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+    widest = LEGEND_MARK + LEGEND_LETTER * max(len(str(handle.get_label())) for handle in handles)
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
 
 
 def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:

@@ -17,7 +17,7 @@ export function openDesign(shownContent, fetched) {
   content = shownContent;
   fetchFile = fetched;
   for (const button of document.querySelectorAll(".download")) {
-    button.addEventListener("click", () => download(button.dataset.format));
+    button.addEventListener("click", () => downloadOf(state.design, button.dataset.format));
   }
   listen((changed) => {
     if (changed.has("design")) drawDesign();
@@ -194,8 +194,6 @@ export function showRow(row) {
 
 // Whether a server writes what this page does not hold.
 export const hasServer = () => fetchFile !== null;
-
-const download = (format) => downloadOf(state.design, format);
 
 // Saves a design as a file.
 export async function downloadOf(i, format) {
