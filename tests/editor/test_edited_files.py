@@ -76,6 +76,7 @@ def test_line_ends_and_the_mark_stay(written: list[str], end: str, has_mark: boo
         files = EditedFiles(file)
         texts = files.texts()
         assert texts.task == "\n".join(["# first", *written])
+        assert files.notes == Texts(task="", space="")
         files.save(texts)
         assert file.read_bytes() == before
         changed = data.draw(st.integers(0, len(written) - 1))
@@ -85,17 +86,23 @@ def test_line_ends_and_the_mark_stay(written: list[str], end: str, has_mark: boo
         assert EditedFiles(file).texts().task == "\n".join(["# first", *written])
 
 
-def test_a_change_keeps_neither_mixed_line_ends_nor_hard_links(tmp_path: Path) -> None:
+def test_what_saving_does_not_keep_is_announced(tmp_path: Path) -> None:
     file = tmp_path / "task.yaml"
     mixed = b"name: one\r\n# a\r# b\n"
     file.write_bytes(mixed)
     (tmp_path / "other.yaml").hardlink_to(file)
     files = EditedFiles(file)
+    assert files.notes.task == (
+        "Saving a change of task.yaml writes the line end CRLF in all lines. "
+        "The other names of task.yaml (hard links) keep the text from before a change."
+    )
+    assert files.notes.space == ""
     files.save(files.texts())
     assert file.read_bytes() == mixed
     files.save(Texts(task="name: two\n# a\n# b\n", space=files.texts().space))
     assert file.read_bytes() == b"name: two\r\n# a\r\n# b\r\n"
     assert (tmp_path / "other.yaml").read_bytes() == mixed
+    assert files.notes == Texts(task="", space="")
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe", b"#" * (MAX_BYTES + 1)])

@@ -82,6 +82,12 @@ class StopBody(BaseModel, frozen=True, extra="forbid"):
     """Nothing."""
 
 
+def editor_app(files: EditedFiles) -> Starlette:
+    """Return the editor's application, to be guarded."""
+    editor = Editor(files)
+    return Starlette(routes=editor.routes(), lifespan=editor.lifespan)
+
+
 class Editor:
     """The editor's requests."""
 
@@ -90,9 +96,9 @@ class Editor:
         self._job: DesignRun | None = None
         self._live: Router | None = None
 
-    def app(self) -> Starlette:
-        """Return the editor's application, to be guarded."""
-        routes = [
+    def routes(self) -> list[Route | Mount]:
+        """Return the routes of the application."""
+        return [
             Route("/", self.page),
             Route("/opened", self.opened),
             Route("/job", self.job),
@@ -104,7 +110,6 @@ class Editor:
             Route("/run/", show_shell),
             Mount("/run", app=self.run),
         ]
-        return Starlette(routes=routes, lifespan=self.lifespan)
 
     @asynccontextmanager
     async def lifespan(self, app: Starlette) -> AsyncGenerator[None]:
@@ -118,7 +123,8 @@ class Editor:
     async def opened(self, request: Request) -> Response:
         files = self._files
         names = {"task": files.task.name, "space": files.space.name}
-        return to_response({"files": names, **dict(files.texts()), "exist": files.exist, "choices": choices()})
+        state = {"exist": files.exist, "notes": files.notes, "choices": choices()}
+        return to_response({"files": names, **dict(files.texts()), **state})
 
     async def job(self, request: Request) -> Response:
         return to_response(None if self._job is None else self._job.status())

@@ -40,16 +40,23 @@ def assess(texts: Texts, files: EditedFiles) -> dict[str, Any]:
     findings: list[Finding] = []
     if problem is not None:
         findings = attempt(lambda: check_instantly(problem)) or []
-    bases = None if problem is None else [corner.tolist() for corner in base_box(problem.space)]  # allowed [m]
     return {
         "task": contents[0],  # as read, valid or not; None if it is not YAML
         "space": contents[1],  # likewise
-        # why no search can start
-        "errors": [*map(str, faults), *(str(finding) for finding in findings if finding.is_proven)],
+        "errors": [
+            *map(str, faults),
+            *(str(finding) for finding in findings if finding.is_proven),
+        ],  # no search can start
         "findings": [finding for finding in findings if not finding.is_proven],  # what is suspicious
-        "scene": None if task is None else drawn_task(task) | {"names": task.target_names, "bases": bases},
+        "scene": None if task is None else _scene(task, problem),
         "meaning": {} if problem is None else _meaning(problem),  # in words
     }
+
+
+def _scene(task: Task, problem: Problem | None) -> dict[str, Any]:
+    """Return what is drawn, positions in [m]; the bases are those that the space allows."""
+    bases = None if problem is None else [corner.tolist() for corner in base_box(problem.space)]
+    return drawn_task(task) | {"names": task.target_names, "bases": bases}
 
 
 def _meaning(problem: Problem) -> dict[str, str]:

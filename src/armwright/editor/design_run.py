@@ -4,7 +4,6 @@ import subprocess
 import threading
 import time
 from collections import deque
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -76,4 +75,7 @@ class DesignRun:
 
 def next_folder(name: str) -> Path:
     """Return the first folder runs/NAME-1, runs/NAME-2, ... that does not exist."""
-    return next(folder for n in count(1) if not (folder := Path("runs") / f"{name}-{n}").exists())
+    number = 1
+    while (folder := Path("runs") / f"{name}-{number}").exists():
+        number += 1
+    return folder

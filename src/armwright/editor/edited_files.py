@@ -1,11 +1,12 @@
 """The two files that the editor writes: a task and its design space.
 
 The page has their texts with LF line ends and no byte order mark, like any text field of a browser. `save` writes the
-line ends, the mark, the mode and the symbolic links that it found, but neither mixed line ends nor hard links.
+line ends, the mark, the mode and the symbolic links that it found; `notes` says before what it cannot keep.
 """
 
 import codecs
 import os
+import re
 import stat
 from importlib import resources
 from pathlib import Path
@@ -22,7 +23,7 @@ SUFFIXES = (".yaml", ".yml")
 
 
 class Texts(BaseModel, frozen=True):
-    """The text of a task file and of a space file."""
+    """The text of a task file and of a space file, or about them."""
 
     task: str = Field(max_length=MAX_BYTES)
     space: str = Field(max_length=MAX_BYTES)
@@ -59,6 +60,12 @@ class EditedFiles:
             task=task_template(self.task) if task is None else _decode(task, self.task),
             space=space_template(self.space) if space is None else _decode(space, self.space),
         )
+
+    @property
+    def notes(self) -> Texts:
+        """What saving a change of each file will change besides; empty for nothing."""
+        task, space = (_note(file, content) for file, content in self._seen.items())
+        return Texts(task=task, space=space)
 
     def save(self, texts: Texts, overwrite: bool = False) -> None:
         """Write both files; `overwrite` replaces even files that have changed since they were last read.
@@ -111,7 +118,24 @@ def _decode(content: bytes, file: Path) -> str:
 def _encode(text: str, former: bytes) -> bytes:
     """Return a text as bytes, with the byte order mark and the line ends of the former content."""
     mark = codecs.BOM_UTF8 if former.startswith(codecs.BOM_UTF8) else b""
-    return mark + text.encode().replace(b"\n", b"\r\n" if b"\r\n" in former else b"\n")
+    return mark + text.encode().replace(b"\n", _line_end(former))
+
+
+def _line_end(content: bytes) -> bytes:
+    return b"\r\n" if b"\r\n" in content else b"\n"
+
+
+def _note(file: Path, content: bytes | None) -> str:
+    """Return what saving a change of a file does not keep."""
+    if content is None:
+        return ""
+    notes: list[str] = []
+    if set(re.findall(rb"\r\n|\r|\n", content)) - {_line_end(content)}:
+        end = "CRLF" if b"\r\n" in content else "LF"
+        notes.append(f"Saving a change of {file.name} writes the line end {end} in all lines.")
+    if file.stat().st_nlink > 1:
+        notes.append(f"The other names of {file.name} (hard links) keep the text from before a change.")
+    return " ".join(notes)
 
 
 def _write(file: Path, content: bytes) -> None:

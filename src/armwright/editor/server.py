@@ -21,7 +21,7 @@ def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0,
         FailureError: The port cannot be used.
     """
     check_extra("live", "the editor")
-    from armwright.editor.app import SHELLS, Editor
+    from armwright.editor.app import SHELLS, editor_app
 
     with TemporaryDirectory(prefix="armwright-") as private:
 
@@ -33,4 +33,4 @@ def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0,
                 page.write_text(refresh, encoding="utf-8")
                 webbrowser.open(page.as_uri())
 
-        serve_app(Editor(files).app(), SHELLS, announce, port)
+        serve_app(editor_app(files), SHELLS, announce, port)

@@ -17,6 +17,7 @@ export const opened = {
   assessed: null, // what the server read in the texts
   shown: "task", // the file in the text field
   history: [],
+  notes: null, // { task, space }: what saving a change does not keep
 };
 
 export async function ask(path, content) {
@@ -47,9 +48,9 @@ export function complain(message) {
 export const isSaved = () => opened.texts.task === opened.saved?.task && opened.texts.space === opened.saved?.space;
 
 // Begins with the server's files; `draw` is called whenever something has changed.
-export function openDocument({ files, task, space, exist }, draw) {
+export function openDocument({ files, task, space, exist, notes }, draw) {
   const texts = { task, space };
-  Object.assign(opened, { files, texts, saved: exist ? texts : null });
+  Object.assign(opened, { files, texts, notes, saved: exist ? texts : null });
   listener = draw;
   $("text").addEventListener("input", () => {
     clearTimeout(typing);
@@ -114,6 +115,7 @@ function write(path, content = {}) {
       if (!confirm(`${fault.message}. Replace it by the text of this page?`)) throw fault;
       await ask(path, { ...texts, ...content, overwrite: true });
     }
+    for (const file of ["task", "space"]) if (texts[file] !== opened.saved?.[file]) opened.notes[file] = "";
     opened.saved = texts;
     listener();
   });

@@ -19,6 +19,7 @@ function draw() {
     field.scrollTop = top;
   }
   $("file-name").textContent = opened.files[shown];
+  $("file-note").textContent = `${opened.notes.task} ${opened.notes.space}`.trim();
   for (const button of $("files").children) button.setAttribute("aria-pressed", button.dataset.file === shown);
   $("saved").textContent = isSaved() ? "saved" : "not saved";
   $("save").disabled = isSaved();
