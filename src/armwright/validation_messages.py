@@ -134,11 +134,8 @@ def _one_expected(annotation: Any, unit: str) -> str:
         plain = many.get(members_of(entries[0])[0], "entries")
         if entries[-1] is not Ellipsis:
             return f"{_COUNTS.get(len(entries), len(entries))} {plain}{_in(unit)}"
-        return (
-            f"a list of {plain}{_in(unit)}"
-            if plain != "entries"
-            else f"a list, each entry {_expected(entries[0], unit)}"
-        )
+        is_plain = plain != "entries"
+        return f"a list of {plain}{_in(unit)}" if is_plain else f"a list, each entry {_expected(entries[0], unit)}"
     if keys := keys_of(annotation):
         return f"a record with the keys {', '.join(keys)}"
     return "keys and values" if get_origin(annotation) is not None else ""

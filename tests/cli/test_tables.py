@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from armwright.cli.tables import Column, number, print_table, shorten, text
+from armwright.cli.tables import Column, print_table, shorten
+from armwright.text import rounded
 
 LETTERS = st.text("abc é中", max_size=30).map(str.strip)
 NUMBERS = st.floats(-1e6, 1e6)
@@ -30,7 +31,7 @@ def printed(columns: list[Column], rows: list[dict[str, object]], width: int, ga
 def test_tables_fit_and_cut_no_number(shapes: list, data: st.DataObject, width: int, gap: int) -> None:
     """What does not fit is of rank 0; heads are shown or named, and the highest ranks are left out first."""
     columns = [
-        number(head, head, "{:.4g}".format, rank) if is_number else text(head, head, rank, least)
+        Column(head, head, "{:.4g}".format if is_number else None, rank, least)
         for head, is_number, rank, least in shapes
     ]
     row = {head: data.draw(NUMBERS if is_number else LETTERS) for head, is_number, _, _ in shapes}
@@ -42,13 +43,18 @@ def test_tables_fit_and_cut_no_number(shapes: list, data: st.DataObject, width: 
         assert {column.rank for column in kept} == {0} or len(kept) == 1
     for column in kept:
         assert column.head.split()[0] in " ".join(lines)
-        assert not column.is_number or f"{row[column.head]:.4g}" in lines[-1]
+        assert not column.write or f"{row[column.head]:.4g}" in lines[-1]
     gone = [column.rank for column in columns if column not in kept]
     assert min(gone, default=9) >= max((column.rank for column in kept if column.rank), default=0)
 
 
 def test_what_is_left_out_is_named() -> None:
-    columns = [number("#", "n"), text("source", "by", 1), number("cycle time", "t"), text("links [m]", "l", 2)]
+    columns = [
+        Column("#", "n", rounded),
+        Column("source", "by", rank=1),
+        Column("cycle time", "t", rounded),
+        Column("links [m]", "l", rank=2),
+    ]
     rows: list[dict[str, object]] = [{"n": 1, "by": "front search", "t": 3.125, "l": "0.10 0.20"}]
     whole = ["# source       cycle time links [m]", "1 front search       3.12 0.10 0.20"]
     assert printed(columns, rows, 80, gap=1) == whole

@@ -18,7 +18,12 @@ PAIRS = [
 
 
 def texts_of(task: str, space: str) -> Texts:
-    return Texts(*((EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8") for name in (task, space)))
+    return Texts(
+        **{
+            key: (EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
+            for key, name in (("task", task), ("space", space))
+        }
+    )
 
 
 @pytest.fixture
@@ -32,15 +37,15 @@ def test_findings_and_meaning_are_those_of_check(files: EditedFiles, task: str, 
     files.save(texts)
     found = assess(texts, files)
     checked = json.loads(armwright("check", files.task, "--space", files.space, "--no-picture", "--json").stdout)
-    assert not found.errors
-    assert found.findings == checked["findings"]
-    assert found.meaning["constraints, stated and implied"].split(", ") == checked["constraints"]
-    assert found.scene is not None
+    assert not found["errors"]
+    assert found["findings"] == checked["findings"]
+    assert found["meaning"]["constraints, stated and implied"].split(", ") == checked["constraints"]
+    assert found["scene"] is not None
     assert np.allclose(
-        found.scene["targets"],
+        found["scene"]["targets"],
         [np.array(t.get("position") if isinstance(t, dict) else t) for t in checked["task"]["targets"]],
     )
-    assert len(found.scene["obstacles"]) == len(checked["task"]["obstacles"])
+    assert len(found["scene"]["obstacles"]) == len(checked["task"]["obstacles"])
 
 
 @pytest.mark.parametrize(
@@ -54,16 +59,16 @@ def test_findings_and_meaning_are_those_of_check(files: EditedFiles, task: str, 
 def test_nonsense_is_an_error_with_its_place(files: EditedFiles, old: str, new: str, message: str) -> None:
     texts = texts_of(*PAIRS[0])
     assert old in texts.task
-    found = assess(Texts(texts.task.replace(old, new, 1), texts.space), files)
-    assert any(message in error for error in found.errors), found.errors
-    assert str(files.task) in found.errors[0] or "target" in found.errors[0]
+    found = assess(Texts(task=texts.task.replace(old, new, 1), space=texts.space), files)
+    assert any(message in error for error in found["errors"]), found["errors"]
+    assert str(files.task) in found["errors"][0] or "target" in found["errors"][0]
 
 
 def test_a_fault_of_the_space_leaves_the_scene(files: EditedFiles) -> None:
     texts = texts_of(*PAIRS[0])
-    found = assess(Texts(texts.task, "joints: many\n"), files)
-    assert len(found.errors) == 1
-    assert str(files.space) in found.errors[0]
-    assert found.scene is not None
-    assert found.scene["bases"] is None
-    assert found.meaning == {}
+    found = assess(Texts(task=texts.task, space="joints: many\n"), files)
+    assert len(found["errors"]) == 1
+    assert str(files.space) in found["errors"][0]
+    assert found["scene"] is not None
+    assert found["scene"]["bases"] is None
+    assert found["meaning"] == {}

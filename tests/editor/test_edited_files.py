@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import armwright as aw
-from armwright.editor.edited_files import MAX_BYTES, ChangedOnDiskError, EditedFiles, Texts, default_space_file
+from armwright.editor.edited_files import MAX_BYTES, EditedFiles, Texts, default_space_file
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -37,16 +37,16 @@ def test_a_file_that_changed_or_appeared_on_disk_is_kept(tmp_path: Path) -> None
     files = EditedFiles(tmp_path / "new.yaml")
     files.save(files.texts())
     (tmp_path / "new.yaml").write_text("name: theirs\n", encoding="utf-8")
-    mine = Texts("name: mine\n", files.texts().space)
-    with pytest.raises(ChangedOnDiskError, match=r"new\.yaml has changed"):
+    mine = Texts(task="name: mine\n", space=files.texts().space)
+    with pytest.raises(aw.UsageError, match=r"new\.yaml has changed"):
         files.save(mine)
     assert (tmp_path / "new.yaml").read_text(encoding="utf-8") == "name: theirs\n"
     files.save(mine, overwrite=True)
     assert (tmp_path / "new.yaml").read_text(encoding="utf-8") == "name: mine\n"
-    files.save(Texts("name: later\n", mine.space))
+    files.save(Texts(task="name: later\n", space=mine.space))
     later = EditedFiles(tmp_path / "later.yaml")
     (tmp_path / "later-space.yaml").write_text("name: theirs\n", encoding="utf-8")
-    with pytest.raises(ChangedOnDiskError, match=r"later-space\.yaml"):
+    with pytest.raises(aw.UsageError, match=r"later-space\.yaml"):
         later.save(later.texts())
     assert not (tmp_path / "later.yaml").exists()
 
@@ -56,7 +56,7 @@ def test_links_and_modes_stay(tmp_path: Path) -> None:
     (tmp_path / "real.yaml").chmod(0o600)
     (tmp_path / "link.yaml").symlink_to(tmp_path / "real.yaml")
     files = EditedFiles(tmp_path / "link.yaml")
-    files.save(Texts("name: two\n", files.texts().space))
+    files.save(Texts(task="name: two\n", space=files.texts().space))
     assert (tmp_path / "link.yaml").is_symlink()
     assert (tmp_path / "real.yaml").read_text(encoding="utf-8") == "name: two\n"
     assert stat.S_IMODE((tmp_path / "real.yaml").stat().st_mode) == 0o600
@@ -76,12 +76,12 @@ def test_line_ends_and_the_mark_stay(written: list[str], end: str, has_mark: boo
         files = EditedFiles(file)
         texts = files.texts()
         assert texts.task == "\n".join(["# first", *written])
-        assert files.notes == Texts("", "")
+        assert files.notes == Texts(task="", space="")
         files.save(texts)
         assert file.read_bytes() == before
         changed = data.draw(st.integers(0, len(written) - 1))
         written[changed] = data.draw(lines)
-        files.save(Texts("\n".join(["# first", *written]), texts.space))
+        files.save(Texts(task="\n".join(["# first", *written]), space=texts.space))
         assert file.read_bytes() == mark + f"# first{end}{end.join(written)}".encode()
         assert EditedFiles(file).texts().task == "\n".join(["# first", *written])
 
@@ -99,10 +99,10 @@ def test_what_saving_does_not_keep_is_announced(tmp_path: Path) -> None:
     assert files.notes.space == ""
     files.save(files.texts())
     assert file.read_bytes() == mixed
-    files.save(Texts("name: two\n# a\n# b\n", files.texts().space))
+    files.save(Texts(task="name: two\n# a\n# b\n", space=files.texts().space))
     assert file.read_bytes() == b"name: two\r\n# a\r\n# b\r\n"
     assert (tmp_path / "other.yaml").read_bytes() == mixed
-    assert files.notes == Texts("", "")
+    assert files.notes == Texts(task="", space="")
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe", b"#" * (MAX_BYTES + 1)])

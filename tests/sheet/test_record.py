@@ -100,7 +100,7 @@ def test_reach_is_that_of_the_drawing(sheet: DataSheet, history: History) -> Non
     """No posture of Pinocchio is outside of an outline: tests/kinematics/test_reach_outline.py."""
     arm = history.member(NUMBER).arm
     outline = np.array(sheet.drawing.top.points) - arm.base[:2]
-    assert np.linalg.norm(outline, axis=1).max() == pytest.approx(sheet.reach, rel=1e-3)
+    assert np.linalg.norm(outline, axis=1).max() == pytest.approx(sheet.over_reach[-1].distance, rel=1e-3)
 
 
 def test_utilisation_of_joints_is_that_of_the_quantities(sheet: DataSheet, history: History) -> None:
@@ -161,7 +161,7 @@ def test_sheet_of_a_urdf_is_that_of_the_design_that_it_was_written_from(
     file = tmp_path / "arm.urdf"
     file.write_text(to_urdf(arm), encoding="utf-8")
     existing = urdf_sheet(read_urdf(file, tip="tip"))
-    assert existing.reach == pytest.approx(sheet.reach, rel=1e-3)
+    assert existing.over_reach[-1].distance == pytest.approx(sheet.over_reach[-1].distance, rel=1e-3)
     assert existing.facts["payload_at_full_reach"].value == pytest.approx(
         sheet.facts["payload_at_full_reach"].value, rel=1e-2
     )

@@ -22,7 +22,7 @@ from armwright.cli.search_commands import design, optimize
 from armwright.cli.signals import INTERRUPTED, install_handlers
 from armwright.cli.simulate_command import simulate
 from armwright.cli.streams import abandon_streams, claim_streams, print_error
-from armwright.exceptions import ArmwrightError
+from armwright.exceptions import ArmwrightError, SettingsError
 from armwright.extras import naming_extras
 from armwright.user_code import open_closed_streams
 
@@ -34,6 +34,7 @@ app = typer.Typer(
     help="Which robot arm should I build for this task? Searches base position, joint types and link lengths "
     "for small position error and small joint torque, and returns the Pareto set with a URDF for each arm.",
 )
+CLOSED = "output pipe closed; rerun the same command to resume an unfinished run"
 COMMANDS = {
     "Before a run": (init, edit, check, tasks, actuators, draft),
     "Search": (design, optimize, experiment),
@@ -51,6 +52,8 @@ def _command(function: Callable[..., None]) -> Callable[..., None]:
     @wraps(function)
     def command(*arguments: object, **options: object) -> None:
         claim_streams()
+        if options.get("json_") and options.get("csv_"):
+            raise SettingsError("--json and --csv: expected one of them")
         with naming_extras(function.__name__.replace("_", "-")):
             function(*arguments, **options)
 
@@ -79,18 +82,13 @@ def main() -> NoReturn:
         sys.exit(error.exit_code)
     except OSError as error:
         with suppress(OSError):  # stderr may be gone as well
-            print_error(f"armwright: {_describe(error)}")
+            reason = f"{error.strerror or error}: {error.filename or 'the output'}"
+            print_error(f"armwright: {CLOSED if isinstance(error, BrokenPipeError) else reason}")
         abandon_streams()
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
     sys.exit(0)
-
-
-def _describe(error: OSError) -> str:
-    if isinstance(error, BrokenPipeError):
-        return "output pipe closed; rerun the same command to resume an unfinished run"
-    return f"{error.strerror or error}: {error.filename or 'the output'}"
 
 
 def _show_version(requested: bool) -> None:

@@ -21,6 +21,13 @@ def parse_numbers(option: str, text: str, expected: str, *counts: int) -> list[f
     return numbers
 
 
+def refuse(reason: str, **options: object) -> None:
+    """Raise SettingsError if one of these options is given, with the reason after its name and value."""
+    for name, value in options.items():
+        if value is not None:
+            raise SettingsError(f"--{name.replace('_', '-')} {value}{reason}")
+
+
 def parse_prices(texts: Sequence[str]) -> dict[str, float]:
     """Parse `ur5e=28000`, each of another arm, into prices by name [USD]."""
     prices: dict[str, float] = {}

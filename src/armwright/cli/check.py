@@ -73,8 +73,7 @@ def record_check(problem: Problem, findings: Sequence[Finding], n_samples: int) 
 
 def show_check(console: Console, problem: Problem) -> None:
     """Print what a task and a space mean."""
-    has_bodies = problem.space.has_bodies
-    show_task(console, problem.task, has_drives=problem.has_drives, has_bodies=has_bodies, is_brief=True)
+    show_task(console, problem.task, problem=problem)
     show_target_table(console, problem)
     minimised = ", ".join(f"{objective.name}{objective.unit_in_brackets}" for objective in problem.objectives)
     console.print(f"  minimised: {minimised}")
@@ -146,6 +145,5 @@ def _describe_range(parameter: Parameter) -> str:
     step = f" in steps of {parameter.step:g}" if parameter.step else ""
     if parameter.integer and parameter.step == 1.0:
         step = ", whole numbers"
-    return f"{parameter.low:g} to {parameter.high:g}{unit}{step}" + (
-        ", on a logarithmic scale" if parameter.log else ""
-    )
+    scale = ", on a logarithmic scale" if parameter.log else ""
+    return f"{parameter.low:g} to {parameter.high:g}{unit}{step}{scale}"

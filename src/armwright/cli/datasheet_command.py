@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from armwright.cli.arm_options import parse_base
+from armwright.cli.arm_options import parse_base, refuse
 from armwright.cli.options import load_problem
 from armwright.cli.streams import activity, print_json, print_text
-from armwright.exceptions import SettingsError
 
 
 def datasheet(
@@ -40,11 +39,8 @@ def datasheet(
 
     read = ""
     if Path(source).is_dir():
-        of_urdf = {"--task": task, "--space": space, "--base": base, "--price": price,
-                   "--tip": tip, "--base-link": base_link, "--seed": seed}  # fmt: skip
-        for name, value in of_urdf.items():
-            if value is not None:
-                raise SettingsError(f"{name} {value}: expected a URDF, got the run {source}, which has its own arms")
+        reason = f": expected a URDF, got the run {source}, which has its own arms"
+        refuse(reason, task=task, space=space, base=base, price=price, tip=tip, base_link=base_link, seed=seed)
         with activity("writing the data sheet"):
             sheet = design_sheet(Path(source), design)
         folder = Path(source) / DESIGNS / design_name(sheet.design or 0)
@@ -54,11 +50,9 @@ def datasheet(
         from armwright.robot.urdf_reader import read_urdf
         from armwright.sheet.urdf_sheet import Job, urdf_sheet
 
-        if design is not None:
-            raise SettingsError(f"--design {design}: expected a run folder, got {source}")
-        for name, value in (("--space", space), ("--base", base)):
-            if value is not None and task is None:
-                raise SettingsError(f"{name} {value}: expected a task, too; try --task TASK")
+        refuse(f": expected a run folder, got {source}", design=design)
+        if task is None:
+            refuse(": expected a task, too; try --task TASK", space=space, base=base)
         with activity("placing the arm" if task and base is None else "writing the data sheet"):
             described, job = read_urdf(find_urdf(source), tip, base_link), None
             if task is not None:

@@ -5,15 +5,7 @@ from pathlib import Path
 
 from armwright.cli.arm_options import parse_base, parse_prices
 from armwright.cli.options import select_workers
-from armwright.cli.streams import (
-    activity,
-    check_formats,
-    exit_interrupted,
-    open_console,
-    print_json,
-    print_records,
-    print_text,
-)
+from armwright.cli.streams import activity, exit_interrupted, open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -126,7 +118,7 @@ def compare(
     from armwright.experiments.run_list import read_finished_runs
     from armwright.experiments.tables import tables, write_tables
 
-    console = open_console(check_formats(json_, csv_))
+    console = open_console(json_ or csv_)
     places = folders or [Path("runs")]
     with activity("comparing the runs"):
         finished, unfinished = read_finished_runs(places)
@@ -176,7 +168,6 @@ def compare_arms(
     from armwright.existing.compare_arms import compare_arms, comparison_record
     from armwright.spaces.design_space import load_space
 
-    check_formats(json_, csv_)
     with activity(f"evaluating {', '.join(arms)}"):
         compared = compare_arms(
             task,

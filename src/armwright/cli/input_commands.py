@@ -8,7 +8,7 @@ from pathlib import Path
 
 from armwright.cli.options import load_problem
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import check_formats, open_console, print_json, print_records, print_text
+from armwright.cli.streams import open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -93,13 +93,15 @@ def tasks(names: list[str] | None = None, *, json_: bool = False, csv_: bool = F
     Parameters:
         names: Describe these tasks (built-in, random-N, files).
     """
-    from armwright.cli.show_inputs import show_task, show_tasks, task_record, task_rows
+    from armwright.cli.show_inputs import show_task, show_tasks, task_rows
     from armwright.proof.front_gap import best_known_hypervolume
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
-    console = open_console(check_formats(json_, csv_))
+    console = open_console(json_ or csv_)
     listed = [load_task(name) for name in names] if names else list(builtin_tasks().values())
-    content = [task_record(task) for task in listed] if json_ else ()
+    content = [
+        task.model_dump(mode="json") | {"best_known_hypervolume": best_known_hypervolume(task)} for task in listed
+    ]
     if print_records(json_, csv_, content, task_rows(listed)):
         return
     if not names:
@@ -117,7 +119,7 @@ def actuators(names: list[str] | None = None, *, json_: bool = False, csv_: bool
     from armwright.cli.show_inputs import actuator_rows, show_actuator, show_actuators
     from armwright.robot.actuators import catalogue, named_actuator
 
-    console = open_console(check_formats(json_, csv_))
+    console = open_console(json_ or csv_)
     records = [named_actuator(name) for name in names] if names else list(catalogue().values())
     content = [record.completed().model_dump(exclude_none=True) | {"assumed": record.assumed} for record in records]
     if print_records(json_, csv_, content, actuator_rows(records)):
@@ -149,19 +151,18 @@ def draft(
         force: Replace files of the same name.
         print_prompt: Print the prompt and the schema that would be sent, and exit.
     """
-    from armwright.cli.show_inputs import show_draft
-
-    if not print_prompt:
-        import_module("armwright.llm.client")  # names the extra `llm`, which brings all that follows
-    from armwright.llm.configuration import load_model_options
-    from armwright.llm.draft import Drafter, drafting_model
-    from armwright.llm.draft_prompt import draft_prompt, draft_schema
-
     request = " ".join(description)
     if print_prompt:
+        from armwright.llm.draft_prompt import draft_prompt, draft_schema
+
         print_text(draft_prompt(request))
         print_json(draft_schema())
         return
+    import_module("armwright.llm.client")  # names the extra `llm`, which brings all that follows
+    from armwright.cli.show_inputs import show_draft
+    from armwright.llm.configuration import load_model_options
+    from armwright.llm.draft import Drafter, drafting_model
+
     console = open_console(json_)
     options = load_model_options(model_options, model=model, max_cost=max_cost)
     drafter = Drafter(drafting_model(options), out, force)

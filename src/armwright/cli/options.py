@@ -136,6 +136,4 @@ def select_workers(n_workers: int | None, scheduler: str | None) -> "Workers | N
     """Return the workers of --workers and --scheduler; None to evaluate in this process."""
     from armwright.study.workers.cluster import Workers
 
-    if not n_workers and not scheduler:
-        return None
-    return Workers(n_workers or None, scheduler)
+    return Workers(n_workers or None, scheduler) if n_workers or scheduler else None

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.streams import activity, check_formats, open_console, print_csv, print_json, print_text
+from armwright.cli.streams import activity, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -30,11 +30,10 @@ def pick(
         n: Number of designs, the best first.
         all_: All designs that meet the conditions, in a table.
     """
-    from armwright.cli.show_picked import picked_rows, show_picked, show_picked_table, with_parts
+    from armwright.cli.show_picked import picked_rows, show_picked, show_picked_table
     from armwright.problem.conditions import read_condition
     from armwright.proof.selection import pick_from, survival_of
 
-    check_formats(json_, csv_)
     if n < 1:
         raise SettingsError(f"-n {n}: expected a whole number from 1")
     conditions = [read_condition(text) for text in where or ()]
@@ -42,9 +41,8 @@ def pick(
         history, picked, records = pick_from(run, conditions, by, holds)
     chosen = picked if all_ else picked[:n]
     names = [*(condition.name for condition in conditions), *([] if by is None else [by])]
-    rows = picked_rows(history, chosen, names, records)
     if csv_:
-        print_csv(rows)
+        print_csv(picked_rows(history, chosen, names, records))
         return
     if all_ and not json_:
         show_picked_table(open_console(), history, chosen, names, records)
@@ -52,7 +50,7 @@ def pick(
     with activity("perturbing the chosen designs"):
         survival = {} if all_ else survival_of(run, history, [member.number for member in chosen])
     if json_:
-        print_json(list(with_parts(history, rows, records, survival)))
+        print_json(list(picked_rows(history, chosen, names, records, survival)))
         return
     show_picked(open_console(), run, history, picked, records, survival, n)
 

@@ -30,7 +30,8 @@ def study_progress(console: Console) -> Generator[Callable[[StudyProgress], None
 
         def watch(progress: StudyProgress) -> None:
             if progress.note:
-                console.print(_note(progress))
+                note = f"no usable proposal ({progress.note}); a black-box trial took its place"
+                console.print(f"trial {progress.number}: {note}" if progress.fault else progress.note)
             source, done = source_label(progress.source), progress.iteration
             if progress.reason and progress.source != "rules":  # the rules are explained in the report
                 console.print(f"trial {progress.number}, {source}: {progress.reason}")
@@ -82,12 +83,6 @@ def announce_compilation(console: Console) -> None:
     compilation.announce = lambda: _print_at_once(
         console, "compiling kernels for this machine, once; this time does not count"
     )
-
-
-def _note(progress: StudyProgress) -> str:
-    if progress.fault:
-        return f"trial {progress.number}: no usable proposal ({progress.note}); a black-box trial took its place"
-    return progress.note
 
 
 def _print_at_once(console: Console, line: str) -> None:

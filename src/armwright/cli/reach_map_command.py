@@ -4,16 +4,14 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armwright.cli.arm_options import parse_numbers
+from armwright.cli.arm_options import parse_numbers, refuse
 from armwright.cli.streams import open_console, print_json
-from armwright.cli.tables import number, print_table, text
+from armwright.cli.tables import Column, print_table
 from armwright.exceptions import SettingsError
 from armwright.text import percent, rounded
 
 if TYPE_CHECKING:
     from armwright.pictures.mapped_arm import MappedArm
-
-GRID, CONDITIONS = "Grid and directions", "Conditions"
 
 
 def reach_map(
@@ -80,8 +78,7 @@ def reach_map(
         clearance=clearance,
         obstacles=mapped.obstacles if obstacles else (),
     )
-    if out is not None:
-        file = out
+    file = out or file
     file.parent.mkdir(parents=True, exist_ok=True)
     around = "of the whole sphere" if cone >= 180.0 else f"within {cone:g}° of ({axis})"
     count = f"{len(found.directions)} directions" if len(found.directions) > 1 else "one direction"
@@ -123,8 +120,9 @@ def reach_map(
         return
     console.print(f"{len(found.points):,} points {rounded(found.spacing)} m apart, {len(found.directions)} directions")
     columns = (
-        text("postures", "postures", least=24), number("reached [m³]", "volume"),
-        number("in all directions [m³]", "dexterous_volume"), number("poses", "poses", lambda share: percent(share, 1)),
+        Column("postures", "postures", least=24), Column("reached [m³]", "volume", rounded),
+        Column("in all directions [m³]", "dexterous_volume", rounded),
+        Column("poses", "poses", lambda share: percent(share, 1)),
     )  # fmt: skip
     print_table(console, columns, volumes, "--json prints all")
     for written in files:
@@ -144,14 +142,11 @@ def _subject(
 
     run = Path(source)
     if not run.is_dir():
-        if design is not None:
-            raise SettingsError(f"--design {design} is for a run; {source} is an arm")
+        refuse(f" is for a run; {source} is an arm", design=design)
         arm = read_urdf(find_urdf(source), tip)
         around = None if task is None else load_task(task)
         return MappedArm(run.stem, arm, around, conditions), Path(f"{run.stem}-reach.npz")
-    for name, value in (("--tip", tip), ("--task", task)):
-        if value is not None:
-            raise SettingsError(f"{name} {value} is for a URDF; the run {source} has its own")
+    refuse(f" is for a URDF; the run {source} has its own", tip=tip, task=task)
     _, history = read_run(run)
     member = pick(history)[0] if design is None else history.member(design)
     title = f"design {member.number} of {source}"

@@ -11,14 +11,7 @@ import typer
 
 from armwright.cli.options import load_problem, select_workers
 from armwright.cli.signals import interruptible
-from armwright.cli.streams import (
-    activity,
-    exit_interrupted,
-    open_console,
-    print_error,
-    print_json,
-    print_text,
-)  # fmt: skip
+from armwright.cli.streams import activity, exit_interrupted, open_console, print_error, print_json, print_text
 from armwright.exceptions import StoppedError
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from armwright.cli.notes import payload_note
 from armwright.cli.streams import list_files
-from armwright.cli.tables import Column, number, print_table, text
+from armwright.cli.tables import Column, print_table
 from armwright.existing.compare_arms import ArmComparison, ComparedArm
 from armwright.experiments.cells import Cell
 from armwright.experiments.compare_runs import Comparison
@@ -104,8 +104,8 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     console.print("; ".join(filter(None, (f"Arms on {task.name}", payload_note(task)))))
     known = [name for name in ASKED if name not in names and any(arm.value(name) is not None for arm in shown)]
     columns = [
-        text("arm", "name", least=12),
-        number("joints", "joints", str, rank=1),
+        Column("arm", "name", least=12),
+        Column("joints", "joints", str, rank=1),
         *(_objective_column(objective, i) for i, objective in enumerate(objectives)),
         *(_fact_column(shown[0].facts[name].label, name, rank) for rank, name in enumerate(known, start=2)),
     ]
@@ -153,13 +153,11 @@ def arm_rows(comparison: ArmComparison) -> Iterator[dict[str, Any]]:
 
 def _objective_column(objective: Objective, index: int) -> Column:
     head = f"{objective.label.lower()}{objective.unit_in_brackets}"
-    return Column(head, lambda arm: rounded(arm.values[index]), is_number=True)
+    return Column(head, lambda arm: arm.values[index], rounded)
 
 
 def _fact_column(label: str, name: str, rank: int) -> Column:
-    return Column(
-        label.lower(), lambda arm: "–" if arm.value(name) is None else arm.facts[name].text, is_number=True, rank=rank
-    )
+    return Column(label.lower(), lambda arm: "–" if arm.value(name) is None else arm.facts[name].text, str, rank)
 
 
 def _describe_dominance(arm: ComparedArm, front: int) -> str:

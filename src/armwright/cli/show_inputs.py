@@ -12,12 +12,12 @@ from rich.console import Console
 
 from armwright.arrays import Array
 from armwright.cli.streams import format_point, print_command, print_named
-from armwright.cli.tables import NO_BREAK, Column, number, print_table, text
+from armwright.cli.tables import NO_BREAK, Column, print_table
 from armwright.problem.checks.reach import distance_to_bases
 from armwright.problem.constraints import implied_constraints
 from armwright.problem.problem import Problem
 from armwright.proof.front_gap import best_known_hypervolume
-from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
+from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources
 from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, Target, TargetArrays, describe_targets
@@ -28,11 +28,7 @@ if TYPE_CHECKING:
     from armwright.llm.draft import Draft
 
 MAX_ROWS = 40  # of a table of targets
-
-
-def task_record(task: DesignTask) -> dict[str, Any]:
-    """Return a task for JSON, with the best known hypervolume."""
-    return task.model_dump(mode="json") | {"best_known_hypervolume": best_known_hypervolume(task)}
+FOUR = partial(rounded, digits=4)
 
 
 def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
@@ -45,8 +41,8 @@ def task_rows(tasks: Sequence[DesignTask]) -> Iterator[dict[str, Any]]:
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     """Print a table with a line per task."""
     columns = (
-        text("task", "name"), number("targets", "targets", str), number("best known", "best_known", decimals),
-        text("", "description", rank=1, least=24),
+        Column("task", "name"), Column("targets", "targets", str), Column("best known", "best_known", decimals),
+        Column("", "description", rank=1, least=24),
     )  # fmt: skip
     print_table(console, columns, task_rows(tasks))
     console.print("\nbest known: the hypervolume of the best known front. armwright tasks NAME describes one task;")
@@ -62,13 +58,13 @@ def actuator_rows(records: Sequence[ActuatorRecord]) -> Iterator[dict[str, Any]]
 
 def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
     """Print the catalogue."""
-    torque, four = f"N{NO_BREAK}m", partial(rounded, digits=4)
+    torque = f"N{NO_BREAK}m"
     columns = (
-        text("actuator", "name"), text("maker", "maker", rank=3, least=8), number("V", "voltage", four),
-        number("kg", "mass", four), number(f"stall {torque}", "stall_torque", four, rank=2),
-        number(f"rated {torque}", "rated_torque", four, rank=1), number(f"peak {torque}", "peak_torque", four),
-        number("rad/s", "speed", four), number("USD", "price", four),
-        text("source", "source", rank=4, least=24),
+        Column("actuator", "name"), Column("maker", "maker", rank=3, least=8), Column("V", "voltage", FOUR),
+        Column("kg", "mass", FOUR), Column(f"stall {torque}", "stall_torque", FOUR, rank=2),
+        Column(f"rated {torque}", "rated_torque", FOUR, rank=1), Column(f"peak {torque}", "peak_torque", FOUR),
+        Column("rad/s", "speed", FOUR), Column("USD", "price", FOUR),
+        Column("source", "source", rank=4, least=24),
     )  # fmt: skip
     print_table(console, columns, records)
     console.print("\narmwright actuators NAME lists the values of one with their sources.")
@@ -89,10 +85,10 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
     console.print(f"page: {record.source}", soft_wrap=True)  # an address stays whole
     console.print(f"note: {record.note}")
     columns = (
-        Column("", str), Column("value", lambda name: rounded(value_of(completed, name), 4), is_number=True),
+        Column("", str), Column("value", partial(getattr, completed), FOUR),
         Column("", lambda name: UNITS[name]), Column("source", source_of, rank=1, least=24),
     )  # fmt: skip
-    print_table(console, columns, [name for name in UNITS if value_of(completed, name) is not None])
+    print_table(console, columns, [name for name in UNITS if getattr(completed, name) is not None])
     for volts, torque, speed in record.at_voltages:
         console.print(f"at {volts:g} V: {torque:g} N m at rest, {speed:.4g} rad/s without load")
     if record.body_shape is not None:
@@ -107,26 +103,13 @@ def _describe_body(record: ActuatorRecord, body: ActuatorShape) -> str:
 
 
 def show_task(
-    console: Console,
-    task: DesignTask,
-    best_known: float | None = None,
-    has_drives: bool = False,
-    has_bodies: bool = False,
-    is_brief: bool = False,
+    console: Console, task: DesignTask, best_known: float | None = None, problem: Problem | None = None
 ) -> None:
-    """Print a task.
-
-    Args:
-        console: The console.
-        task: The task.
-        best_known: Its best known hypervolume, if any.
-        has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
-        has_bodies: Whether motors or a column are solid bodies, which may not collide.
-        is_brief: Leave out the targets.
-    """
+    """Print a task, with its best known hypervolume; of a problem, the implied constraints and not the targets."""
+    has_drives, has_bodies = (problem.has_drives, problem.space.has_bodies) if problem else (False, False)
     reference = task.reference_point
     print_named(console, task.name, f": {task.description}" if task.description else "")
-    if not is_brief:
+    if problem is None:
         points = " ".join(format_point(point) for point in task.target_positions.tolist())
         console.print(f"  {len(task.targets)} targets [m]: {points}")
         for line in describe_targets(task.targets):
@@ -161,7 +144,7 @@ def show_target_table(console: Console, problem: Problem) -> None:
     distances = distance_to_bases(problem.space, points)
 
     def column(head: str, values: Array, rank: int = 0) -> Column:
-        return Column(head, lambda i: rounded(float(values[i]), 4), is_number=True, rank=rank)
+        return Column(head, lambda i: float(values[i]), FOUR, rank)
 
     columns = (
         Column("target", task.target_names.__getitem__, least=12),

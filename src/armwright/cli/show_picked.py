@@ -1,7 +1,7 @@
 """Print designs that were picked: each with all that is known of it, or many in a table."""
 
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from rich.console import Console
 
 from armwright.cli.show_results import format_value, links_of
 from armwright.cli.streams import format_point, print_command, print_named
-from armwright.cli.tables import Column, number, print_table
+from armwright.cli.tables import Column, print_table
 from armwright.problem.arm_quantities import TORQUE_SCALE, torque
 from armwright.problem.assumptions import assumed_values, count_assumed
 from armwright.problem.facts import describe_supply
@@ -27,35 +27,26 @@ Records = Mapping[int, DesignRecord]
 
 
 def picked_rows(
-    history: History, picked: Sequence[FrontMember], names: Sequence[str], records: Records
+    history: History,
+    picked: Sequence[FrontMember],
+    names: Sequence[str],
+    records: Records,
+    survival: Mapping[int, Mapping[str, Any]] | None = None,
 ) -> Iterator[dict[str, Any]]:
-    """Yield the chosen designs as rows of CSV: parameters, quantities of the run, and those of these names."""
+    """Yield the chosen designs as rows of CSV: parameters, quantities of the run, and those of these names.
+
+    With the survival by number, for JSON, also the types of the joints, the worst along the cycle, and the survival.
+    """
     quantities = quantities_of_front(history, names, facts_by_number(records))
     categorical = [p.name for p in history.problem.space.parameters if isinstance(p, CategoricalParameter)]
     for member in picked:
-        yield {
-            "number": member.number,
-            "source": member.source,
-            **{name: member.design.params.get(name) for name in categorical},
-            **quantities[member.number],
-        }
-
-
-def with_parts(
-    history: History,
-    rows: Iterable[dict[str, Any]],
-    records: Records,
-    survival: Mapping[int, Mapping[str, Any]],
-) -> Iterator[dict[str, Any]]:
-    """Yield rows for JSON: with the types of the joints, the worst along the cycle, and what a design survives."""
-    for row in rows:
-        number = row["number"]
-        parts: dict[str, Any] = {
-            "joints": history.trials[number].design.joints,
-            "path": to_jsonable_python(records[number].path),
-            "survival": survival.get(number),
-        }
-        yield row | {name: part for name, part in parts.items() if part is not None}
+        number, choices = member.number, {name: member.design.params.get(name) for name in categorical}
+        row = {"number": number, "source": member.source, **choices, **quantities[number]}
+        if survival is not None:
+            path = to_jsonable_python(records[number].path)
+            parts = {"joints": member.design.joints, "path": path, "survival": survival.get(number)}
+            row |= {name: part for name, part in parts.items() if part is not None}
+        yield row
 
 
 def show_picked_table(
@@ -69,13 +60,13 @@ def show_picked_table(
 
     def quantity(name: str, write: Callable[[float], str]) -> Column:
         head = f"{name.replace('_', ' ')}{units[name]}" if name in units else name
-        return Column(head, lambda member: write(quantities[member.number][name]), is_number=True)
+        return Column(head, lambda member: quantities[member.number][name], write)
 
     motors = Column("motors", lambda member: ", ".join(member.design.motors), rank=5, least=12)
     columns = (
-        number("#", "number", str), Column("source", lambda member: source_label(member.source), rank=3),
+        Column("#", "number", str), Column("source", lambda member: source_label(member.source), rank=3),
         *(quantity(name, format_value) for name in minimised), *(quantity(name, "{:.4g}".format) for name in further),
-        Column("types", lambda member: member.design.joints, rank=1), Column("links [m]", links_of, rank=4),
+        Column("types", "design.joints", rank=1), Column("links [m]", links_of, rank=4),
         *([motors] if any(member.design.motors for member in picked) else []),
     )  # fmt: skip
     _show_count(console, history, picked)

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from armwright.cli.notes import payload_note, unused_parts
 from armwright.cli.streams import list_files
-from armwright.cli.tables import Column, number, print_table, text
+from armwright.cli.tables import Column, print_table
 from armwright.problem.arm_quantities import TORQUE_SCALE, position_error, torque
 from armwright.problem.assumptions import count_assumed
 from armwright.problem.ignored_errors import describe_ignored_errors
@@ -37,8 +37,8 @@ def show_result(console: Console, run: StudyResult | FrontRun, figures: Sequence
     if summary.get("proposer"):
         console.print("Attribution")
         columns = (
-            text("source", "source"), number("trials", "trials", str), number("on the front", "front", str),
-            number("hypervolume gained", "hypervolume_gained", lambda gained: decimals(gained, 3)),
+            Column("source", "source"), Column("trials", "trials", str), Column("on the front", "front", str),
+            Column("hypervolume gained", "hypervolume_gained", lambda gained: decimals(gained, 3)),
         )  # fmt: skip
         shares = ({"source": source_label(source), **share} for source, share in summary["attribution"].items())
         print_table(console, columns, shares, "--json prints all")
@@ -70,16 +70,16 @@ def show_front(console: Console, history: History, summary: Record) -> None:
     found: Record = {} if verified is None else verified["verdict"]
 
     def objective(name: str, index: int) -> Column:
-        return Column(name, lambda member: format_value(member.values[index]), is_number=True)
+        return Column(name, lambda member: member.values[index], format_value)
 
     names = [SHORT_NAMES.get(one, one.name.replace("_", " ")) for one in history.problem.objectives]
     word = {number: str(found["good"]) for number in found.get("numbers", ())}
     verdict = Column("verdict", lambda member: word.get(member.number, str(found["bad"])), rank=1)
     parameters = Column("parameters", lambda member: describe_custom(custom, member.design.params), rank=2)
     columns = (
-        number("#", "number", str), Column("source", lambda member: source_label(member.source), rank=5),
+        Column("#", "number", str), Column("source", lambda member: source_label(member.source), rank=5),
         *([verdict] if found else []), *(objective(name, i) for i, name in enumerate(names)),
-        Column("joints", lambda member: member.design.joints), *([parameters] if custom else []),
+        Column("joints", "design.joints"), *([parameters] if custom else []),
         Column("base [m]", lambda member: " ".join(f"{value:5.2f}" for value in member.design.origin), rank=4),
         Column("links [m]", links_of, rank=3),
     )  # fmt: skip

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armwright.cli.streams import activity, check_formats, open_console, print_records
-from armwright.cli.tables import number, print_table, text
+from armwright.cli.streams import activity, open_console, print_records
+from armwright.cli.tables import Column, print_table
 from armwright.exceptions import SettingsError
 
 if TYPE_CHECKING:
@@ -42,7 +42,6 @@ def simulate(
     from armwright.runs.folder import RunFolder as Folder
     from armwright.runs.folder import read_run
 
-    check_formats(json_, csv_)
     if design is not None and all_:
         raise SettingsError("--design and --all choose the designs; use one of them")
     with activity(f"reading {run}"):
@@ -91,10 +90,6 @@ def _row(one: "SimulatedDesign") -> dict[str, Any]:
     }
 
 
-def _in_millimetres(error: float) -> str:
-    return f"{1e3 * error:.2f}"
-
-
 def _show(
     console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: Sequence[dict[str, Any]]
 ) -> None:
@@ -105,11 +100,15 @@ def _show(
     if not results:
         console.print(f"nothing to simulate: {run} has no feasible design")
         return
+
+    def in_millimetres(error: float) -> str:
+        return f"{1e3 * error:.2f}"
+
     columns = (
-        number("#", "design", str), text("verdict", "verdict"), number("cycle [s]", "cycle_time", "{:.2f}".format),
-        number("energy [J]", "energy", "{:.1f}".format), number("tip error [mm]", "tip_error", _in_millimetres),
-        number("without feed-forward [mm]", "droop", _in_millimetres),
-        number("peak torque / claimed", "torque_over_claimed", "{:.3f}".format),
+        Column("#", "design", str), Column("verdict", "verdict"), Column("cycle [s]", "cycle_time", "{:.2f}".format),
+        Column("energy [J]", "energy", "{:.1f}".format), Column("tip error [mm]", "tip_error", in_millimetres),
+        Column("without feed-forward [mm]", "droop", in_millimetres),
+        Column("peak torque / claimed", "torque_over_claimed", "{:.3f}".format),
     )  # fmt: skip
     print_table(console, columns, map(_row, results))
     for one in results:

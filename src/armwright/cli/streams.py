@@ -13,7 +13,6 @@ from rich.console import Console
 from rich.text import Text
 
 from armwright.cli.signals import INTERRUPTED
-from armwright.exceptions import SettingsError
 from armwright.files import to_csv
 
 WIDE = 1000  # [characters]
@@ -90,19 +89,12 @@ def print_csv(rows: Iterable[Mapping[str, Any]]) -> None:
     print_text(to_csv(rows), end="")
 
 
-def print_records(is_json: bool, is_csv: bool, content: Any, rows: Iterable[Mapping[str, Any]] | None = None) -> bool:
-    """Print content as JSON or rows, by default the content, as CSV; return whether either was asked for."""
+def print_records(is_json: bool, is_csv: bool, content: Any, rows: Iterable[Mapping[str, Any]]) -> bool:
+    """Print content as JSON or rows as CSV; return whether either was asked for."""
     if is_json:
         print_json(content)
     elif is_csv:
-        print_csv(content if rows is None else rows)
-    return is_json or is_csv
-
-
-def check_formats(is_json: bool, is_csv: bool) -> bool:
-    """Return whether a program reads stdout; SettingsError if both formats are asked for."""
-    if is_json and is_csv:
-        raise SettingsError("--json and --csv: expected one of them")
+        print_csv(rows)
     return is_json or is_csv
 
 
@@ -119,7 +111,9 @@ def print_command(console: Console, command: str) -> None:
 def exit_interrupted(console: Console, kept: str) -> NoReturn:
     """Print what an interrupted command has kept and how to resume it, and exit."""
     console.print(f"\nstopped; {kept}. Resume with:")
-    print_command(console, repeat_command())
+    program, *arguments = sys.argv
+    called = ["python", "-m", "armwright"] if Path(program).name == "__main__.py" else [program]
+    print_command(console, shlex.join([*called, *arguments]))
     sys.exit(INTERRUPTED)
 
 
@@ -131,10 +125,3 @@ def list_files(name: str, files: Sequence[Path]) -> str:
 def format_point(point: Sequence[float]) -> str:
     """Return a point as (x, y, z)."""
     return "(" + ", ".join(f"{value:g}" for value in point) + ")"
-
-
-def repeat_command() -> str:
-    """Return the command that was given, quoted for a shell."""
-    program, *arguments = sys.argv
-    called = ["python", "-m", "armwright"] if Path(program).name == "__main__.py" else [program]
-    return shlex.join([*called, *arguments])

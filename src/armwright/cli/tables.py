@@ -9,8 +9,6 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
-from armwright.text import rounded
-
 ELLIPSIS = "…"
 NO_BREAK = "\N{NO-BREAK SPACE}"  # in heads, between words that stay on one line
 COMPLETE = "--json and --csv print all"
@@ -21,25 +19,17 @@ class Column:
     """A column of a table: its head, and the text of its cell for each record."""
 
     head: str
-    cell: Callable[[Any], str]
-    is_number: bool = False  # aligned to the right
+    value: str | Callable[[Any], Any]  # a key or an attribute of the records, or a function of them
+    write: Callable[[Any], str] | None = None  # of a number, which is aligned to the right; None for texts
     rank: int = 0  # of a table that is too wide, the highest rank is dropped first, rank 0 never
     least: int | None = None  # characters to which its texts may be shortened; None if they are shown whole
 
-
-def text(head: str, key: str, rank: int = 0, least: int | None = None) -> Column:
-    """Return a column of texts: a key or an attribute of the records."""
-    return Column(head, lambda record: str(_value(record, key)), rank=rank, least=least)
-
-
-def number(head: str, key: str, write: Callable[[Any], str] = rounded, rank: int = 0) -> Column:
-    """Return a column of numbers: a key or an attribute of the records."""
-    return Column(head, lambda record: write(_value(record, key)), is_number=True, rank=rank)
-
-
-def _value(record: Any, key: str) -> Any:
-    get: Any = itemgetter(key) if isinstance(record, Mapping) else attrgetter(key)
-    return get(record)
+    def cell(self, record: Any) -> str:
+        """Return the text of a record's cell."""
+        get: Any = self.value
+        if isinstance(get, str):
+            get = itemgetter(get) if isinstance(record, Mapping) else attrgetter(get)
+        return (self.write or str)(get(record))
 
 
 @dataclass(frozen=True)
@@ -61,7 +51,7 @@ class _Cells:
     def aligned(self, line: str) -> str:
         """Return a line of the column in its width."""
         space = " " * (self.width - cell_len(line))
-        return space + line if self.column.is_number else line + space
+        return space + line if self.column.write else line + space
 
 
 def print_table(

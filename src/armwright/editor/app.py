@@ -15,27 +15,26 @@ All but the two pages need the server's key (request_guard.py). What changes any
 """
 
 import asyncio
-from collections.abc import AsyncGenerator, Awaitable, Callable
+from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
-from dataclasses import asdict
-from typing import Annotated, Any, TypeVar
+from importlib import resources
+from typing import Any
 
-from pydantic import BaseModel, Field, ValidationError
-from pydantic_core import to_json
+from pydantic import BaseModel, Field
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, Router
 
 from armwright.editor.assessment import assess
 from armwright.editor.choices import choices
 from armwright.editor.design_run import DesignRun, next_folder
-from armwright.editor.edited_files import MAX_BYTES, ChangedOnDiskError, EditedFiles, Texts
-from armwright.editor.editor_page import editor_shell
+from armwright.editor.edited_files import MAX_BYTES, EditedFiles, Texts
 from armwright.editor.yaml_edits import Edit, edit_text
-from armwright.exceptions import ArmwrightError, SpaceError, TaskError
+from armwright.exceptions import TaskError, UsageError
+from armwright.page.assembly import SHARED, PageSource, assemble
 from armwright.page.live_app import LivePage, show_shell
-from armwright.page.request_guard import read_request
+from armwright.page.request_guard import post_route, to_response
 from armwright.tasks.points_file import parse_points
 from armwright.tasks.task import Task
 from armwright.yaml_documents import parse_document
@@ -44,22 +43,19 @@ MAX_BODY = 4 * MAX_BYTES  # [bytes]; two texts, their quotes escaped
 MAX_EDITS = 10_000
 MIN_SECONDS, MAX_SECONDS = 5.0, 24 * 3600.0
 SHELLS = ("/", "/run/")
+PAGE = PageSource(
+    template="editor.html",
+    main="editor.js",
+    styles=("page.css", "editor.css"),
+    libraries=("three.min.js",),
+    folders=(resources.files("armwright.editor") / "page", SHARED),
+)
 
-Text = Annotated[str, Field(max_length=MAX_BYTES)]
-Body = TypeVar("Body", bound=BaseModel)
 
-
-class TextsBody(BaseModel, frozen=True, extra="forbid"):
+class TextsBody(Texts, frozen=True, extra="forbid"):
     """The texts of both files; overwrite: even if they have changed on disk."""
 
-    task: Text
-    space: Text
     overwrite: bool = False
-
-    @property
-    def texts(self) -> Texts:
-        """The texts alone."""
-        return Texts(self.task, self.space)
 
 
 class AssessBody(TextsBody, frozen=True):
@@ -78,7 +74,7 @@ class DesignBody(TextsBody, frozen=True):
 class PointsBody(BaseModel, frozen=True, extra="forbid"):
     """Pasted points."""
 
-    text: Text
+    text: str = Field(max_length=MAX_BYTES)
     unit: str = "m"
 
 
@@ -106,11 +102,11 @@ class Editor:
             Route("/", self.page),
             Route("/opened", self.opened),
             Route("/job", self.job),
-            Route("/assess", self._post(AssessBody, self.assess), methods=["POST"]),
-            Route("/points", self._post(PointsBody, self.points), methods=["POST"]),
-            Route("/save", self._post(TextsBody, self.save), methods=["POST"]),
-            Route("/design", self._post(DesignBody, self.design), methods=["POST"]),
-            Route("/stop", self._post(StopBody, self.stop), methods=["POST"]),
+            post_route("/assess", AssessBody, self.assess, MAX_BODY),
+            post_route("/points", PointsBody, self.points, MAX_BODY),
+            post_route("/save", TextsBody, self.save, MAX_BODY),
+            post_route("/design", DesignBody, self.design, MAX_BODY),
+            post_route("/stop", StopBody, self.stop),
             Route("/run/", show_shell),
             Mount("/run", app=self.run),
         ]
@@ -122,77 +118,45 @@ class Editor:
             await asyncio.to_thread(self._job.close)
 
     async def page(self, request: Request) -> Response:
-        return Response(editor_shell(), media_type="text/html; charset=utf-8")
+        return HTMLResponse(assemble(PAGE, "armwright", connects=True, values={}))
 
     async def opened(self, request: Request) -> Response:
         files = self._files
         names = {"task": files.task.name, "space": files.space.name}
-        state = {"exist": files.exist, "notes": asdict(files.notes), "choices": choices()}
-        return _json({"files": names, **asdict(files.texts()), **state})
+        state = {"exist": files.exist, "notes": files.notes, "choices": choices()}
+        return to_response({"files": names, **dict(files.texts()), **state})
 
     async def job(self, request: Request) -> Response:
-        return _json(None if self._job is None else self._job.status())
+        return to_response(None if self._job is None else self._job.status())
 
     async def run(self, scope: Any, receive: Any, send: Any) -> None:
         """Answer the requests of the live page."""
         app = self._live or PlainTextResponse("no search has been started", 404)
         await app(scope, receive, send)
 
-    async def assess(self, body: AssessBody) -> Response:
-        return _json(await asyncio.to_thread(self._assess, body))
-
-    async def points(self, body: PointsBody) -> Response:
-        return _json(await asyncio.to_thread(parse_points, body.text, body.unit, "pasted text"))
-
-    async def save(self, body: TextsBody) -> Response:
-        await asyncio.to_thread(self._files.save, body.texts, body.overwrite)
-        return Response(status_code=204)
-
-    async def design(self, body: DesignBody) -> Response:
-        if self._job is not None and self._job.is_running:
-            return PlainTextResponse("a search is running; stop it first", status_code=409)
-        name = parse_document(body.task, Task, TaskError, self._files.task).name
-        await asyncio.to_thread(self._files.save, body.texts, body.overwrite)
-        self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
-        self._live = Router(LivePage(self._job.folder).routes())
-        return _json(self._job.status())
-
-    async def stop(self, body: StopBody) -> Response:
-        if self._job is not None:
-            self._job.stop()
-        return Response(status_code=204)
-
-    def _assess(self, body: AssessBody) -> dict[str, Any]:
+    def assess(self, body: AssessBody) -> dict[str, Any]:
         files = self._files
         texts = Texts(
-            edit_text(body.task, body.task_edits, str(files.task)) if body.task_edits else body.task,
-            edit_text(body.space, body.space_edits, str(files.space)) if body.space_edits else body.space,
+            task=edit_text(body.task, body.task_edits, str(files.task)),
+            space=edit_text(body.space, body.space_edits, str(files.space)),
         )
-        return {"texts": asdict(texts), **asdict(assess(texts, files))}
+        return {"texts": texts, **assess(texts, files)}
 
-    def _post(
-        self, schema: type[Body], handle: Callable[[Body], Awaitable[Response]]
-    ) -> Callable[[Request], Awaitable[Response]]:
-        """Return the handler of a request of the page with such a body."""
+    def points(self, body: PointsBody) -> Any:
+        return parse_points(body.text, body.unit, "pasted text")
 
-        async def answer(request: Request) -> Response:
-            body = await read_request(request, MAX_BODY)
-            if isinstance(body, Response):
-                return body
-            try:
-                return await handle(schema.model_validate_json(body))
-            except ValidationError:
-                return PlainTextResponse("the request is not one of the page", status_code=422)
-            except ChangedOnDiskError as fault:
-                return PlainTextResponse(str(fault), status_code=409)
-            except (TaskError, SpaceError) as fault:
-                return PlainTextResponse(str(fault), status_code=400)
-            except ArmwrightError as fault:
-                return PlainTextResponse(str(fault), status_code=500)
+    def save(self, body: TextsBody) -> None:
+        self._files.save(body, body.overwrite)
 
-        return answer
+    def design(self, body: DesignBody) -> dict[str, Any]:
+        if self._job is not None and self._job.is_running:
+            raise UsageError("a search is running; stop it first")
+        name = parse_document(body.task, Task, TaskError, self._files.task).name
+        self._files.save(body, body.overwrite)
+        self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
+        self._live = Router(LivePage(self._job.folder).routes())
+        return self._job.status()
 
-
-def _json(content: Any) -> Response:
-    """Return JSON; numbers that it lacks become null, and dates text."""
-    return Response(to_json(content, inf_nan_mode="null", fallback=str), media_type="application/json")
+    def stop(self, body: StopBody) -> None:
+        if self._job is not None:
+            self._job.stop()

@@ -1,7 +1,6 @@
 """What the texts of a task and a space mean, and what is wrong with them, for the page."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from typing import Any
 
 from armwright.editor.edited_files import EditedFiles, Texts
@@ -16,19 +15,7 @@ from armwright.tasks.task import Task
 from armwright.yaml_documents import load_document, parse_document
 
 
-@dataclass(frozen=True)
-class Assessment:
-    """What two texts mean."""
-
-    task: Any  # the content of the task text as read, valid or not; None if it is not YAML
-    space: Any  # likewise of the space text
-    errors: list[str]  # why no search can start
-    findings: list[dict[str, str]]  # what is suspicious
-    scene: dict[str, Any] | None  # what to draw; None for a task that is not valid
-    meaning: dict[str, str]  # the task and the space in words; empty unless both are valid
-
-
-def assess(texts: Texts, files: EditedFiles) -> Assessment:
+def assess(texts: Texts, files: EditedFiles) -> dict[str, Any]:
     """Return what the texts of the edited files mean; it needs no kernels."""
     names = str(files.task), str(files.space)
     faults: list[ArmwrightError] = []
@@ -53,14 +40,17 @@ def assess(texts: Texts, files: EditedFiles) -> Assessment:
     findings: list[Finding] = []
     if problem is not None:
         findings = attempt(lambda: check_instantly(problem)) or []
-    return Assessment(
-        task=contents[0],
-        space=contents[1],
-        errors=[*map(str, faults), *(str(finding) for finding in findings if finding.is_proven)],
-        findings=[asdict(finding) for finding in findings if not finding.is_proven],
-        scene=None if task is None else _scene(task, problem),
-        meaning={} if problem is None else _meaning(problem),
-    )
+    return {
+        "task": contents[0],  # as read, valid or not; None if it is not YAML
+        "space": contents[1],  # likewise
+        "errors": [
+            *map(str, faults),
+            *(str(finding) for finding in findings if finding.is_proven),
+        ],  # no search can start
+        "findings": [finding for finding in findings if not finding.is_proven],  # what is suspicious
+        "scene": None if task is None else _scene(task, problem),
+        "meaning": {} if problem is None else _meaning(problem),  # in words
+    }
 
 
 def _scene(task: Task, problem: Problem | None) -> dict[str, Any]:

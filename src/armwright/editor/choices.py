@@ -13,13 +13,8 @@ def choices() -> dict[str, Any]:
     """Return what a user can choose from, in JSON types."""
     return {
         "quantities": [
-            {
-                "name": quantity.name,
-                "label": quantity.label,
-                "unit": quantity.unit,
-                "description": quantity.description,
-                "is_objective": quantity.name in OBJECTIVES,
-            }
+            {name: getattr(quantity, name) for name in ("name", "label", "unit", "description")}
+            | {"is_objective": quantity.name in OBJECTIVES}
             for quantity in sorted(QUANTITIES.values(), key=lambda quantity: quantity.label)
         ],
         "modules": [
@@ -34,11 +29,5 @@ def choices() -> dict[str, Any]:
 
 def _describe(record: ActuatorRecord) -> dict[str, Any]:
     completed = record.completed()
-    return {
-        "name": record.name,
-        "maker": record.maker,
-        "torque": completed.peak_torque or completed.rated_torque,  # [N m]
-        "mass": record.mass,  # [kg]
-        "voltage": record.voltage,  # [V]
-        "price": record.price,  # [USD]
-    }
+    stated = {name: getattr(record, name) for name in ("name", "maker", "mass", "voltage", "price")}
+    return stated | {"torque": completed.peak_torque or completed.rated_torque}

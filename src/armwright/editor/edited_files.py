@@ -8,10 +8,11 @@ import codecs
 import os
 import re
 import stat
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from string import Template
+
+from pydantic import BaseModel, Field
 
 from armwright.exceptions import FailureError, TaskError, UsageError
 from armwright.files import naming_write_errors, read_bytes, replace_file
@@ -21,16 +22,11 @@ MAX_BYTES = 256 * 1024  # a task of 3,000 targets; forms for more would be slow
 SUFFIXES = (".yaml", ".yml")
 
 
-class ChangedOnDiskError(UsageError):
-    """A file that somebody else has changed since it was read."""
-
-
-@dataclass(frozen=True)
-class Texts:
+class Texts(BaseModel, frozen=True):
     """The text of a task file and of a space file, or about them."""
 
-    task: str
-    space: str
+    task: str = Field(max_length=MAX_BYTES)
+    space: str = Field(max_length=MAX_BYTES)
 
 
 class EditedFiles:
@@ -61,27 +57,28 @@ class EditedFiles:
         """Return the files as they were last read or written, or the templates."""
         task, space = self._seen[self.task], self._seen[self.space]
         return Texts(
-            task_template(self.task) if task is None else _decode(task, self.task),
-            space_template(self.space) if space is None else _decode(space, self.space),
+            task=task_template(self.task) if task is None else _decode(task, self.task),
+            space=space_template(self.space) if space is None else _decode(space, self.space),
         )
 
     @property
     def notes(self) -> Texts:
         """What saving a change of each file will change besides; empty for nothing."""
-        return Texts(_note(self.task, self._seen[self.task]), _note(self.space, self._seen[self.space]))
+        task, space = (_note(file, content) for file, content in self._seen.items())
+        return Texts(task=task, space=space)
 
     def save(self, texts: Texts, overwrite: bool = False) -> None:
         """Write both files; `overwrite` replaces even files that have changed since they were last read.
 
         Raises:
-            ChangedOnDiskError: A file has changed, and `overwrite` is False.
+            UsageError: A file has changed, and `overwrite` is False.
             FailureError: A file cannot be written.
         """
         given = {self.task: texts.task, self.space: texts.space}
         if not overwrite:
             for file in given:
                 if _read(file) != self._seen[file]:
-                    raise ChangedOnDiskError(f"{file} has changed on disk since it was opened")
+                    raise UsageError(f"{file} has changed on disk since it was opened")
         for file, text in given.items():
             former = self._seen[file]
             if overwrite or former is None or text != _decode(former, file):

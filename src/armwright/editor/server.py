@@ -28,13 +28,9 @@ def serve_editor(files: EditedFiles, tell: Callable[[str], None], port: int = 0,
         def announce(address: str) -> None:
             tell(address)
             if opens_browser:
-                _open(address, Path(private))
+                page = Path(private) / "open.html"  # other users see the arguments of processes
+                refresh = f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">\n'
+                page.write_text(refresh, encoding="utf-8")
+                webbrowser.open(page.as_uri())
 
         serve_app(editor_app(files), SHELLS, announce, port)
-
-
-def _open(address: str, private: Path) -> None:
-    """Open an address in the browser by a file: other users see the arguments of processes."""
-    page = private / "open.html"
-    page.write_text(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">\n', encoding="utf-8")
-    webbrowser.open(page.as_uri())

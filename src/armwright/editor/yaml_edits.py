@@ -114,17 +114,14 @@ def _name(path: Sequence[str | int]) -> str:
 
 def _styled(value: Any) -> Any:
     """Return a value with the style of task files: what holds no records and lists of lists is on one line."""
-    if isinstance(value, Mapping):
-        given = cast("Mapping[str, Any]", value)
-        record = CommentedMap((key, _styled(item)) for key, item in given.items())
+    if isinstance(value, (Mapping, list)):
+        is_record, given = isinstance(value, Mapping), cast("Any", value)
+        made: Any = (
+            CommentedMap((k, _styled(v)) for k, v in given.items()) if is_record else CommentedSeq(map(_styled, given))
+        )
         if _fits_a_line(value):
-            record.fa.set_flow_style()
-        return record
-    if isinstance(value, list):
-        items = CommentedSeq(map(_styled, cast("list[Any]", value)))
-        if _fits_a_line(value):
-            items.fa.set_flow_style()
-        return items
+            made.fa.set_flow_style()
+        return made
     if isinstance(value, str) and _reads_as(value) != value:
         return DoubleQuotedScalarString(value)
     return value

@@ -5,10 +5,10 @@ import logging
 import threading
 import time
 import warnings
-from collections.abc import Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from armwright.exceptions import SettingsError, UsageError
@@ -131,27 +131,21 @@ class ModelClient(LlmBackend):
         most_requests: int | None = None,
         earlier: Sequence[Turn] | None = None,
     ) -> Reply:
-        """Return the answer to a prompt; refusals of its output format are sent back to the model."""
-        if output is not None:
-            return self._ask_for(question, output, most_requests, earlier)
-        reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, earlier)
-        if not reply.answer.strip():
-            raise CallError("answer", f"{self.model} gave an empty answer", reply)
-        return reply
+        """Return the answer to a prompt; refusals of its output format are sent back to the model.
 
-    def _ask_for(
-        self,
-        question: Question,
-        output: OutputFormat,
-        most_requests: int | None,
-        earlier: Sequence[Turn] | None = None,
-    ) -> Reply:
-        """Ask in the first output mode that the server accepts and respects, which is used from then on."""
+        The first output mode that the server accepts and respects is used from then on.
+        """
+        if output is None:
+            reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, earlier)
+            if not reply.answer.strip():
+                raise CallError("answer", f"{self.model} gave an empty answer", reply)
+            return reply
         spent, modes = Reply(), self._modes
         for mode in modes:
             left = None if most_requests is None else most_requests - spent.requests
             try:
-                reply = self._ask_in(mode, question, output, left, earlier)
+                run = partial(self._run, question=question, most_requests=left, earlier=earlier)
+                reply = self._ask_in(mode, output, 0 if question is CHECK else REASKS, run)
             except (CallError, Interrupted) as fault:
                 fault.reply = spent = spent.plus(fault.reply)
                 others = modes[modes.index(mode) + 1 :]
@@ -173,15 +167,8 @@ class ModelClient(LlmBackend):
                 return replace(spent.plus(reply), output_mode=mode)
         raise AssertionError("there is at least one mode")
 
-    def _ask_in(
-        self,
-        mode: str,
-        question: Question,
-        output: OutputFormat,
-        most_requests: int | None,
-        earlier: Sequence[Turn] | None,
-    ) -> Reply:
-        """Ask in one output mode; refusals go back to the model, except in a check."""
+    def _ask_in(self, mode: str, output: OutputFormat, retries: int, run: Callable[[Agent[None, Any]], Reply]) -> Reply:
+        """Ask in one output mode; refusals go back to the model, so many times."""
         accepted: list[str] = []
         refusals: list[str] = []
 
@@ -195,20 +182,17 @@ class ModelClient(LlmBackend):
             return answer
 
         schema = _OUTPUTS[mode](StructuredDict(dict(output.schema)))
-        retries = 0 if question is CHECK else REASKS
         agent: Agent[None, Any] = Agent(self._model, output_type=schema, retries=retries)
         agent.output_validator(accept)
         try:
-            reply = self._run(agent, question, most_requests, earlier)
+            reply = run(agent)
         except CallError as fault:
             if fault.kind in ("answer", "limit") and fault.reply.requests and not refusals:
                 raise _FormError(fault.kind, str(fault), fault.reply) from fault
             if fault.kind != "limit" or not refusals:
                 raise
-            message = (
-                f"{self.model}: max_calls leaves no request after an invalid answer ({redacted_line(refusals[-1])})"
-            )
-            raise CallError(fault.kind, message, fault.reply) from fault
+            reason = f"max_calls leaves no request after an invalid answer ({redacted_line(refusals[-1])})"
+            raise CallError(fault.kind, f"{self.model}: {reason}", fault.reply) from fault
         return replace(reply, answer=accepted[-1])
 
     def cancel(self) -> None:

@@ -20,14 +20,9 @@ class ConfiguredModel:
     options: ModelOptions
     named_by: str
 
-    @property
-    def place(self) -> str:
-        """The server as a phrase; empty for the vendor's."""
-        return describe_server(self.options)
-
     def __str__(self) -> str:
         """Return the model, its server and who named it, in one phrase."""
-        return f"{self.options.model}{self.place}, named by {self.named_by}"
+        return f"{self.options.model}{describe_server(self.options)}, named by {self.named_by}"
 
 
 def configuration_path() -> Path:

@@ -33,7 +33,10 @@ def conversation(calls: Iterable[Call], trial: int | None = None) -> tuple[Turn,
         if call.step in FIRST_STEPS:
             asked[call.proposal] = call
         if call.step in LAST_STEPS and call.proposal in asked:
-            turns[call.proposal] = _turn(asked[call.proposal], call)
+            first = asked[call.proposal]
+            reasoning = without_thoughts(first.answer).strip()
+            answer = call.answer if first is call else f"{reasoning}\n\n{call.answer}".lstrip()
+            turns[call.proposal] = Turn(first.prompt, answer)
     return tuple(turns.values())
 
 
@@ -46,9 +49,3 @@ def new_part(prompt: str, turns: Sequence[Turn]) -> str:
     problem, heading, results = prompt.rpartition(f"\n{RESULTS}\n")
     latest = next((turn.question for turn in reversed(turns) if not turn.question.startswith(RESULTS)), "")
     return f"{RESULTS}\n{results}" if heading and latest.startswith(problem + heading) else prompt
-
-
-def _turn(first: Call, last: Call) -> Turn:
-    if first is last:
-        return Turn(first.prompt, last.answer)
-    return Turn(first.prompt, f"{without_thoughts(first.answer).strip()}\n\n{last.answer}".lstrip())

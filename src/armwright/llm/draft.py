@@ -17,15 +17,7 @@ from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
-from armwright.exceptions import (
-    ArmwrightError,
-    FailureError,
-    ModelError,
-    ProposalError,
-    SettingsError,
-    SpaceError,
-    TaskError,
-)
+from armwright.exceptions import FailureError, ModelError, ProposalError, SettingsError, SpaceError, TaskError
 from armwright.files import naming_write_errors, replace_file
 from armwright.llm.backend import MAX_REQUESTS, CallError, OutputFormat, Question
 from armwright.llm.budget import CallBudget
@@ -33,6 +25,7 @@ from armwright.llm.configuration import ConfiguredModel, configuration_path, con
 from armwright.llm.draft_prompt import draft_prompt, draft_schema
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import estimated_tokens
+from armwright.llm.servers import describe_server
 from armwright.llm.session import LlmSession
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
@@ -121,8 +114,8 @@ class Drafter(LlmSession):
         given, configured = _input_tokens(description), self.configured
         cost = describe_cost(configured.options, 1, given, ANSWER_TOKENS)
         return (
-            f"asking {self._by()}{configured.place}, named by {configured.named_by}: about {given:,} tokens in, "
-            f"{ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
+            f"asking {self._by()}{describe_server(configured.options)}, named by {configured.named_by}: "
+            f"about {given:,} tokens in, {ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
         )
 
     def _calls(self) -> Sequence[Call]:
@@ -249,7 +242,7 @@ def drafting_model(options: ModelOptions | str | None = None) -> ConfiguredModel
     return configured
 
 
-def _document(content: Any, schema: type[Model], error: type[ArmwrightError], where: str) -> tuple[Model, str]:
+def _document(content: Any, schema: type[Model], error: type[Exception], where: str) -> tuple[Model, str]:
     """Return the value of an answer's part, and the YAML that states it without the keys that have their default.
 
     The YAML is read back like a file: what is written is what was checked.

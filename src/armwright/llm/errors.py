@@ -10,25 +10,22 @@ from pydantic_ai import exceptions as faults
 from armwright.llm.transport import ResponseError
 
 # Kind of fault by exception; subclasses first.
-_KINDS: tuple[tuple[type[Exception], str], ...] = (
+_KINDS: tuple[tuple[type[Exception] | tuple[type[Exception], ...], str], ...] = (
     (faults.ModelAuthenticationError, "key"),
     (faults.ModelQuotaExceededError, "quota"),
     (faults.ModelRateLimitError, "rate_limit"),
     (faults.ModelNotFoundError, "unknown_model"),
     (faults.ModelContextWindowExceededError, "context"),
     (faults.ModelRequestRejectedError, "rejected"),
-    (faults.ModelRequestTimeout, "timeout"),
-    (faults.ModelTimeoutError, "timeout"),
+    ((faults.ModelRequestTimeout, faults.ModelTimeoutError), "timeout"),
     (faults.ModelConnectionError, "connection"),
-    (faults.ModelUnavailableError, "server"),
-    (faults.ModelServerError, "server"),
+    ((faults.ModelUnavailableError, faults.ModelServerError), "server"),
     (faults.ModelHTTPError, "rejected"),  # any other status
     (faults.ModelAPIError, "answer"),  # an unreadable response
     (faults.ContentFilterError, "refused"),
     (faults.UnexpectedModelBehavior, "answer"),
     (faults.UsageLimitExceeded, "limit"),
-    (faults.RunCancelled, "cancelled"),
-    (CancelledError, "cancelled"),
+    ((faults.RunCancelled, CancelledError), "cancelled"),
     (httpx2.TransportError, "connection"),
 )
 

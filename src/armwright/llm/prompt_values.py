@@ -1,6 +1,5 @@
 """The values of a prompt template: the problem as text, and what is shown of past designs."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -61,7 +60,7 @@ def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
         **_space_values(problem.space),
         **_task_values(problem),
         "constraints": problem.constraints,
-        "tolerance": problem.tolerance,
+        "problem": problem,
         "n_feasible": int(history.feasible.sum()),
         "reference_point": history.reference_point,
         "n_finished": len(history),
@@ -118,10 +117,8 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "tool": _describe_tool(task.tool),
         "payload": _describe_payload(task),
         "point_load": task.load_shape == POINT_LOAD,
-        "obstacles": [obstacle.describe() for obstacle in task.obstacles],
         "collisions": problem.uses("clearance"),
         "oriented": task.target_arrays.oriented,
-        "restarts": task.restarts,
         "cycle": task.cycle_description,
         "cycle_times": task.cycle.describe_times() if task.cycle and problem.uses("durations") else "",
         "workspace": [r.describe() for r in task.workspace] if problem.uses("workspace", "directions") else [],
@@ -129,7 +126,6 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "n_targets": len(task.target_positions),
         "updates": UPDATES,
         "objectives": [_task_specific(objective, task) for objective in problem.objectives],
-        "cases": task.cases_description,
     }
 
 
@@ -169,15 +165,9 @@ def _describe_payload(task: Task) -> str:
         return f"At every target the tip carries a rigid payload: {task.payload.describe()}."
     if np.ptp(payloads) == 0.0:
         return f"At every target the tip carries a payload of {payloads[0]:g} kg, a point mass."
-    listed, omission = _sample([f"{payload:g}" for payload in payloads])
-    each = "some of" if omission else "each"
+    listed = ", ".join(f"{payloads[i]:g}" for i in spread(len(payloads), MAX_TARGETS))
+    each = "some of" if len(payloads) > MAX_TARGETS else "each"
     return f"At the targets the tip carries payloads, point masses of [kg], for {each} TARGET in this order: {listed}."
-
-
-def _sample(items: Sequence[str]) -> tuple[str, str]:
-    """Join at most MAX_TARGETS of the items; the second text says if some are omitted."""
-    shown = spread(len(items), MAX_TARGETS)
-    return ", ".join(items[i] for i in shown), "" if len(shown) == len(items) else f" (some of {len(items)})"
 
 
 def shown_values(history: History, feedback: Feedback, most: Limits) -> dict[str, Any]:

@@ -62,13 +62,9 @@ def _blot(key: str, blot: str) -> Callable[[re.Match[str]], str]:
 def _keys() -> Iterator[tuple[str, str]]:
     """Yield names and values of keys; a value with white space in pieces, since errors write it in other ways."""
     for name, value in os.environ.items():
-        if _NAMES.search(name) and (_SENT.search(name) or _looks_secret(value)):
+        # An ordinary word, as in SORT_KEY=position_error, is no secret.
+        if _NAMES.search(name) and (_SENT.search(name) or len(value) >= LONG or _MIXED.search(value)):
             pieces = value.split()
             for piece in pieces:
                 if len(piece) >= SHORTEST and (len(pieces) == 1 or not piece.isalpha()):
                     yield name, piece
-
-
-def _looks_secret(value: str) -> bool:
-    """Return whether a value is not an ordinary word, as in SORT_KEY=position_error."""
-    return len(value) >= LONG or bool(_MIXED.search(value))

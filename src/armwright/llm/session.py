@@ -83,15 +83,11 @@ class LlmSession:
         except ProposalError as fault:
             if fault.kind == "budget":
                 return ""
-            raise ModelError(
-                f"{fault}. Check the model, its key and base_url; --proposer rules needs none",
-                final=fault.kind if fault.final else None,
-            ) from fault
+            advice = "Check the model, its key and base_url; --proposer rules needs none"
+            raise ModelError(f"{fault}. {advice}", final=fault.kind if fault.final else None) from fault
         if self._budget.max_cost is not None and total_cost(self._calls()) is None:
-            raise ModelError(
-                f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls",
-                final="budget",
-            )
+            reason = f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls"
+            raise ModelError(reason, final="budget")
         return self.backend.note
 
     def _begin(self, transcript: Path | None) -> None:

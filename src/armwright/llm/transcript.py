@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from io import FileIO
 from pathlib import Path
-from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -57,7 +56,8 @@ class Transcript:
             if self._path is None:
                 return
             with naming_write_errors(self._path), open_to_append(self._path) as file:
-                _append(file, (json.dumps(_record(call)) + "\n").encode())
+                stated = {name: value for name, value in asdict(call).items() if value or name != "output_mode"}
+                _append(file, (json.dumps(stated) + "\n").encode())
 
     def answered(self, proposal: str, step: str) -> Call | None:
         """Return the call that answered this step of a proposal, if any."""
@@ -92,10 +92,6 @@ def _append(file: FileIO, line: bytes) -> None:
         raise
 
 
-def _record(call: Call) -> dict[str, Any]:
-    return {name: value for name, value in asdict(call).items() if value or name != "output_mode"}
-
-
 def _read(path: Path, mend: bool) -> Iterator[Call]:
     """Read the calls of a file; `mend` removes a last line that a crash cut short."""
     end = 0
@@ -103,7 +99,11 @@ def _read(path: Path, mend: bool) -> Iterator[Call]:
         with path.open("rb") as file:
             for number, line in enumerate(read_records(file, path), start=1):
                 end += len(line) + 1
-                yield _call(line, f"{path}, line {number}")
+                try:
+                    yield CALL.validate_json(line)
+                except ValidationError as fault:
+                    where = f"{path}, line {number}"
+                    raise RunFolderError(f"{where} is damaged; restore the file or delete the line") from fault
             is_cut_short = file.tell() > end
     except FileNotFoundError:
         return
@@ -112,10 +112,3 @@ def _read(path: Path, mend: bool) -> Iterator[Call]:
     if mend and is_cut_short:
         with naming_write_errors(path):
             os.truncate(path, end)
-
-
-def _call(line: bytes, where: str) -> Call:
-    try:
-        return CALL.validate_json(line)
-    except ValidationError as fault:
-        raise RunFolderError(f"{where} is damaged; restore the file or delete the line") from fault

@@ -15,6 +15,7 @@ from importlib.resources.abc import Traversable
 
 SHARED = resources.files("armwright.page") / "web"  # modules, styles and libraries that several pages use
 _IMPORT = re.compile(r'^import \{([^{}]*)\} from "\./([\w-]+\.js)";\n', re.MULTILINE)
+_PLACEHOLDER = re.compile(r"\{\{ (\w+) \}\}")
 _EXPORT = re.compile(r"^export ((?:async )?function|class|const|let) ([\w$]+)", re.MULTILINE)
 
 
@@ -22,7 +23,7 @@ _EXPORT = re.compile(r"^export ((?:async )?function|class|const|let) ([\w$]+)", 
 class PageSource:
     """The files of a page."""
 
-    template: str  # the HTML, with placeholders such as {{ title }}
+    template: str  # the body of the HTML, with placeholders such as {{ title }}
     main: str  # the JavaScript module that imports the others
     styles: tuple[str, ...]  # the style sheets, in order
     libraries: tuple[str, ...]  # the scripts in vendor/ that run before the modules
@@ -38,7 +39,8 @@ def assemble(source: PageSource, title: str, connects: bool, values: Mapping[str
 
     `connects` lets it ask its own server; otherwise the policy forbids all connections.
     """
-    scripts = [*(_library(source, name) for name in source.libraries), program(source)]
+    libraries = (source.read(f"vendor/{name}").replace("</script", "<\\/script") for name in source.libraries)
+    scripts = [*libraries, program(source)]
     sums = " ".join(f"'sha256-{_sum(script)}'" for script in scripts)
     reach = "'self'" if connects else "'none'"
     policy = (
@@ -52,8 +54,9 @@ def assemble(source: PageSource, title: str, connects: bool, values: Mapping[str
         "style": "\n".join(map(source.read, source.styles)),
         "scripts": "\n".join(f"<script>{script}</script>" for script in scripts),
     }
-    # A single pass, so that inserted text is never taken for a placeholder.
-    return re.sub(r"\{\{ (\w+) \}\}", lambda found: given[found[1]], source.read(source.template))
+    # Each in a single pass, so that inserted text is never taken for a placeholder.
+    given["body"] = _PLACEHOLDER.sub(lambda found: given[found[1]], source.read(source.template))
+    return _PLACEHOLDER.sub(lambda found: given[found[1]], source.read("shell.html"))
 
 
 @cache
@@ -81,10 +84,6 @@ def _as_function(name: str, text: str) -> str:
 
 def _variable(name: str) -> str:
     return f"{name.removesuffix('.js').replace('-', '_')}_module"
-
-
-def _library(source: PageSource, name: str) -> str:
-    return source.read(f"vendor/{name}").replace("</script", "<\\/script")
 
 
 @cache

@@ -23,7 +23,6 @@ from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.config import FrontMethod, Method
 from armwright.runs.folder import read_run
-from armwright.runs.trial import FinishedTrial
 from armwright.sheet.record import NOT_MODELLED
 
 FILES = {"urdf": "arm.urdf", "mjcf": "arm.xml"}  # of designs of the front, by format
@@ -44,17 +43,12 @@ class RunContent:
         self.calls = Transcript(folder / TRANSCRIPTS, read_only=True).calls
         known: dict[int, DesignRecord] = {}
         if earlier is not None and self.summary is None:  # those of a finished run are its results
-            known = {
-                n: one for n, one in earlier.records.items() if self.history.trials[n : n + 1] == [earlier.trial(n)]
-            }
+            before, now = earlier.history.trials, self.history.trials
+            known = {n: one for n, one in earlier.records.items() if before[n : n + 1] == now[n : n + 1]}
         recommended = [self.history.member(one["design"]).number for one in (self.summary or {}).get("recommended", ())]
         numbers = dict.fromkeys([*(member.number for member in self.history.front), *recommended])
         known |= read_records(folder, self.history, [number for number in numbers if number not in known])
         self.records = {number: known[number] for number in numbers}
-
-    def trial(self, number: int) -> FinishedTrial:
-        """Return a trial."""
-        return self.history.trials[number]
 
     def packed(self, with_files: bool = False) -> bytes:
         """Pack the run; with the files of its front for a page without a server, if it has ended."""

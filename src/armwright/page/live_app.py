@@ -13,19 +13,18 @@ import asyncio
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
 from armwright.exceptions import ArmwrightError, RunFolderError
+from armwright.page.assembly import assemble
 from armwright.page.live_run import LiveRun
-from armwright.page.page import live_shell
-from armwright.page.request_guard import read_request
+from armwright.page.page import PAGE
+from armwright.page.request_guard import post_route
 from armwright.runs.control import stop_study
-
-MAX_BODY = 64 * 1024  # largest POST [bytes]
 
 
 class ControlRequest(BaseModel, frozen=True, extra="forbid"):
@@ -41,7 +40,7 @@ def live_app(folder: Path) -> Starlette:
 
 async def show_shell(request: Request) -> Response:
     """Answer with the live page, without data."""
-    return Response(live_shell(), media_type="text/html; charset=utf-8")
+    return HTMLResponse(assemble(PAGE, "armwright, live", connects=True, values={"data": ""}))
 
 
 class LivePage:
@@ -57,7 +56,7 @@ class LivePage:
             Route("/run", self.packed),
             Route("/file", self.file),
             Route("/status", self.status),
-            Route("/control", self.control, methods=["POST"]),
+            post_route("/control", ControlRequest, self.control),
         ]
 
     async def packed(self, request: Request) -> Response:
@@ -70,38 +69,20 @@ class LivePage:
         return Response(data, media_type="application/octet-stream")
 
     async def file(self, request: Request) -> Response:
-        number, kind = _natural(request, "design"), request.query_params.get("format", "")
+        given, kind = request.query_params.get("design", ""), request.query_params.get("format", "")
+        number = int(given) if given.isascii() and given.isdigit() and len(given) < 10 else None
         try:
             text = None if number is None else await asyncio.to_thread(self._run.file, number, kind)
         except ArmwrightError as fault:  # the arm of a data sheet that cannot be made
             return PlainTextResponse(str(fault), status_code=500)
         if text is None:
             return PlainTextResponse("no such file", status_code=404)
-        return Response(text, media_type="text/plain; charset=utf-8")  # the page saves it; nothing runs here
+        return PlainTextResponse(text)  # the page saves it; nothing runs here
 
     async def status(self, request: Request) -> Response:
         return JSONResponse(await asyncio.to_thread(self._run.status))
 
-    async def control(self, request: Request) -> Response:
-        body = await read_request(request, MAX_BODY)
-        if isinstance(body, Response):
-            return body
-        try:
-            ControlRequest.model_validate_json(body)
-            await asyncio.to_thread(self._stop)
-        except ValidationError:
-            return PlainTextResponse("expected stop", status_code=422)
-        except ArmwrightError as fault:
-            return PlainTextResponse(str(fault), status_code=409)
-        return Response(status_code=204)
-
-    def _stop(self) -> None:
+    def control(self, body: ControlRequest) -> None:
         if not self._folder.is_dir():
             raise RunFolderError("the run folder is gone")
         stop_study(self._folder)
-
-
-def _natural(request: Request, name: str) -> int | None:
-    """Return a whole number from the query; None if it is missing or invalid."""
-    text = request.query_params.get(name, "")
-    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else None

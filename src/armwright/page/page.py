@@ -21,15 +21,9 @@ def write_report(folder: str | Path) -> Path:
         raise RunFolderError(f"{folder} has no finished trial yet, so there is nothing to report")
     data = base64.b64encode(zlib.compress(content.packed(with_files=True), 6)).decode()
     holder = f'<script type="text/plain" id="content">{data}</script>'
-    page = assemble(
-        PAGE, f"{replace_surrogates(folder.resolve().name)}: armwright", connects=False, values={"data": holder}
-    )
+    title = f"{replace_surrogates(folder.resolve().name)}: armwright"
+    page = assemble(PAGE, title, connects=False, values={"data": holder})
     path = folder / REPORT
     with naming_write_errors(path, "; the trials are safe"):
         replace_file(path, page.encode())
     return path
-
-
-def live_shell() -> str:
-    """Return the HTML of the live page, which fetches its data."""
-    return assemble(PAGE, "armwright, live", connects=True, values={"data": ""})

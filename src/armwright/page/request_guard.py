@@ -5,15 +5,25 @@ address that the terminal shows, which browsers do not send. The page (page/key.
 which belongs to one port, and sends it as a header. A cookie would reach the servers of other users on other ports.
 """
 
+import asyncio
 import secrets
 import time
-from collections.abc import Collection
-from typing import Any
+from collections.abc import Callable, Collection
+from typing import Any, TypeVar
 
+from pydantic import BaseModel, ValidationError
+from pydantic_core import to_json
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
 
+from armwright.exceptions import ArmwrightError, UsageError
+
+Body = TypeVar("Body", bound=BaseModel)
+
+MAX_BODY = 64 * 1024  # [bytes] of a POST
 KEY_HEADER = "x-armwright-key"
 HEADERS = {
     "Cache-Control": "no-store",
@@ -66,18 +76,40 @@ class Guard:
         return PlainTextResponse("the key is missing or wrong; use the address that the server printed", 403)
 
 
-async def read_request(request: Request, limit: int) -> bytes | Response:
-    """Return the body of a POST of the page itself, of at most `limit` bytes, or the refusal of any other."""
+def post_route(path: str, schema: type[Body], handle: Callable[[Body], Any], limit: int = MAX_BODY) -> Route:
+    """Return the route of a POST of the page itself with a body of this schema; all others are refused.
+
+    `handle` runs in a thread and returns the content of the response, None for none.
+    """
+
+    async def answer(request: Request) -> Response:
+        try:
+            body = schema.model_validate_json(await _body(request, limit))
+            content = await asyncio.to_thread(handle, body)
+        except ValidationError:
+            raise HTTPException(422, "the request is not one of the page") from None
+        except ClientDisconnect:
+            return Response(status_code=400)  # nobody receives it
+        except ArmwrightError as fault:
+            raise HTTPException(400 if isinstance(fault, UsageError) else 500, str(fault)) from None
+        return Response(status_code=204) if content is None else to_response(content)
+
+    return Route(path, answer, methods=["POST"])
+
+
+def to_response(content: Any) -> Response:
+    """Return content as JSON; numbers that it lacks become null, and dates text."""
+    return Response(to_json(content, inf_nan_mode="null", fallback=str), media_type="application/json")
+
+
+async def _body(request: Request, limit: int) -> bytes:
     if request.headers.get("origin", "") != f"{request.url.scheme}://{request.headers.get('host', '')}":
-        return PlainTextResponse("only the page itself may send this", status_code=403)
+        raise HTTPException(403, "only the page itself may send this")
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        return PlainTextResponse("expected application/json", status_code=415)
+        raise HTTPException(415, "expected application/json")
     body = b""
-    try:
-        async for part in request.stream():
-            body += part
-            if len(body) > limit:
-                return PlainTextResponse("request too long", status_code=413)
-    except ClientDisconnect:
-        return Response(status_code=400)  # nobody receives it
+    async for part in request.stream():
+        body += part
+        if len(body) > limit:
+            raise HTTPException(413, "request too long")
     return body

@@ -12,15 +12,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from armwright.arrays import Array
+from armwright.kinematics.arms import forward
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.kinematics.arms.forward import (
-    column_solid,
-    forward_kinematics,
-    joint_positions,
-    link_lines,
-    motor_solids,
-    rails,
-)
 from armwright.pictures.drawing import legend_mark
 from armwright.pictures.solids import Extent, draw_edges, draw_obstacles, draw_solid, extent_of
 from armwright.pictures.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET
@@ -112,18 +105,18 @@ def _draw_panel(
             if motion.by == "line":
                 axes.plot(*plan.poses.position[[motion.start, motion.end]].T, **MOVE)
             axes.plot(*points.T, **TIP)
-    column = column_solid(arm)
+    column = forward.column_solid(arm)
     if column is not None:
         draw_solid(axes, column, extent, LINK)
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
         q = record.targets[target].q
-        places = joint_positions(arm, q)
-        for line in rails(arm, q):
+        places = forward.joint_positions(arm, q)
+        for line in forward.rails(arm, q):
             axes.plot(*line.T, color=FRONT, linewidth=1.0, alpha=alpha)
-        for line in link_lines(arm, q):
+        for line in forward.link_lines(arm, q):
             axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
-        for axis, body in motor_solids(arm, q):
+        for axis, body in forward.motor_solids(arm, q):
             draw_solid(axes, body, extent, JOINT[axis])
         for joint, place in zip(arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.nearest_axis], alpha=alpha)
@@ -144,7 +137,7 @@ def _tip_paths(arm: Arm, record: DesignRecord) -> list[Array]:
         columns: Array = np.array(points, dtype=np.float64).T
         values: list[Array] = [np.interp(at, shares, column) for column in columns]
         q: Array = np.stack(values, axis=-1)
-        found.append(forward_kinematics(stack_arms([arm], "float64"), q[None]).tip[0])
+        found.append(forward.forward_kinematics(stack_arms([arm], "float64"), q[None]).tip[0])
     return found
 
 
@@ -176,14 +169,19 @@ def frame(axes: Any, extent: Extent) -> None:
 
 def _extent(problem: Problem, drawn: Sequence[tuple[Arm, DesignRecord]]) -> Extent:
     """Return the cube that contains all targets, columns, postures and motions."""
-    task, plan = problem.task, problem.scenes[0].plan
-    places = [task.target_positions, *([] if plan is None else [plan.poses.position])]
-    places += [corner for region in task.workspace for corner in region.corners]
+    places = places_of(problem)
     for arm, record in drawn:
-        places += [joint_positions(arm, target.q) for target in record.targets] + _tip_paths(arm, record)
+        places += [forward.joint_positions(arm, target.q) for target in record.targets] + _tip_paths(arm, record)
         if arm.column is not None:
             places.append(np.array(arm.base) - (0.0, 0.0, arm.column.length))
-    return extent_of(places, task.obstacles)
+    return extent_of(places, problem.task.obstacles)
+
+
+def places_of(problem: Problem) -> list[Any]:
+    """Return the points of a task that are drawn: targets, poses of the cycle, and corners of the workspace."""
+    task, plan = problem.task, problem.scenes[0].plan
+    corners = [corner for region in task.workspace for corner in region.corners]
+    return [task.target_positions, *([] if plan is None else [plan.poses.position]), *corners]
 
 
 def _legend(problem: Problem, records: Sequence[DesignRecord]) -> list[Line2D | Patch]:

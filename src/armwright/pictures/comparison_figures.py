@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from armwright.experiments.compare_runs import Comparison
 from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.pictures.arm_figures import draw_arm, frame
-from armwright.pictures.drawing import draw_dominated, frame_plane, legend_below, one_panel, several_panels, write_drawn
+from armwright.pictures.drawing import draw_dominated, frame_plane, legend_below, one_panel, write_drawn
 from armwright.pictures.figures import draw_samples
 from armwright.pictures.reason_figures import draw_reasons
 from armwright.pictures.solids import extent_of
@@ -139,12 +139,11 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
         known = comparison.best_known(task)
         if known is not None:
             axes.axhline(known, **BEST_KNOWN)
-        axes.set(title=task, xlabel="Iteration")
+        label = "Hypervolume" if axes.get_subplotspec().is_first_col() else ""
+        axes.set(title=task, xlabel="Iteration", ylabel=label)
         axes.margins(y=0.08)
         axes.set_ylim(bottom=0)
         axes.set_xlim(left=0)
-    for axes in panels[:: _columns(comparison.tasks)]:
-        axes.set_ylabel("Hypervolume")
     styles = {method: line(comparison.methods.index(method)) for method in methods}
     handles = [Line2D([], [], **s.curve, marker=s.marker, label=comparison.label(m)) for m, s in styles.items()]
     if any(comparison.best_known(task) is not None for task in comparison.tasks):
@@ -157,14 +156,11 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
     return figure
 
 
-def _columns(tasks: Sequence[str]) -> int:
-    return min(len(tasks), COLUMNS if len(tasks) <= 2 * COLUMNS else COLUMNS + 2)
-
-
 def _panels(tasks: Sequence[str], height: float) -> tuple[Figure, Sequence[Any]]:
-    columns = _columns(tasks)
+    columns = min(len(tasks), COLUMNS if len(tasks) <= 2 * COLUMNS else COLUMNS + 2)
     rows = math.ceil(len(tasks) / columns)
-    figure = several_panels(max(5.2, min(3.5, 11.0 / columns) * columns), height * rows + 0.7)
+    width = max(5.2, min(3.5, 11.0 / columns) * columns)
+    figure = Figure(figsize=(width, height * rows + 0.7), layout="constrained")
     panels: list[Any] = list(np.atleast_1d(figure.subplots(rows, columns)).flat)
     for axes in panels[len(tasks) :]:
         axes.set_visible(False)

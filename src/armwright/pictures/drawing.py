@@ -1,6 +1,6 @@
 """Figures without a display, written as PNG and PDF; a folder of figures is replaced in one step."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -29,11 +29,6 @@ def one_panel(width: float, height: float, pad: float | None = None) -> tuple[Fi
     """Return a figure of this size and its only axes; pad: room around them, matplotlib's by default [inch]."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=pad, w_pad=pad))
     return figure, figure.subplots()
-
-
-def several_panels(width: float, height: float) -> Figure:
-    """Return a figure of this size [inch] without axes."""
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Array:
@@ -76,23 +71,15 @@ def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], limits:
 
 
 def draw_dominated(axes: Any, front: Array, reference: Sequence[float], **fill: Any) -> None:
-    """Draw a front (K, 2) within the reference box as a step line, and fill the area that it dominates."""
-    x, y = front_steps(front, reference)
-    axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=2)
-    axes.fill_between(x, y, reference[1], step="post", linewidth=0, **fill)
+    """Draw a front as a step line from the top to the right side of the reference box, and fill what it dominates.
 
-
-def front_steps(front: Array, reference: Sequence[float]) -> tuple[Array, Array]:
-    """Return the x and y of a front's step line from the top to the right side of the reference box.
-
-    The front (K, 2) holds points within the box, sorted by the first objective. Of the reference point, only the first
-    two objectives are used.
+    The front (K, 2) holds points within the box, at least one, sorted by the first objective. Of the reference point,
+    only the first two objectives are used.
     """
-    if not len(front):
-        return np.array([reference[0]]), np.array([reference[1]])
     x = np.concatenate([front[:1, 0], front[:, 0], [reference[0]]])
     y = np.concatenate([[reference[1]], front[:, 1], front[-1:, 1]])
-    return x, y
+    axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=2)
+    axes.fill_between(x, y, reference[1], step="post", linewidth=0, **fill)
 
 
 def legend_mark(label: str, marker: str, colour: str, **style: Any) -> Line2D:
@@ -102,10 +89,9 @@ def legend_mark(label: str, marker: str, colour: str, **style: Any) -> Line2D:
 
 def legend_below(figure: Figure, handles: Sequence[Any]) -> None:
     """Add a legend below the panels, with as many columns as fit."""
-    if handles:
-        widest = LEGEND_MARK + LEGEND_LETTER * max(len(str(handle.get_label())) for handle in handles)
-        columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))
-        figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+    widest = LEGEND_MARK + LEGEND_LETTER * max(len(str(handle.get_label())) for handle in handles)
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
 
 
 def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:
@@ -118,11 +104,12 @@ def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:
     return [place / name for name in names]
 
 
-def save_figure(figure: Figure, file: Path) -> None:
-    """Write a figure, in the format of the file's ending."""
+def save_figure(draw: Callable[[], Figure], file: Path) -> None:
+    """Write what `draw` draws, in the format of the file's ending."""
     content = BytesIO()
-    figure.savefig(content, format=file.suffix.removeprefix("."))
-    replace_file(file, content.getvalue())
+    with matplotlib.rc_context(RC), naming_write_errors(file):
+        draw().savefig(content, format=file.suffix.removeprefix("."))
+        replace_file(file, content.getvalue())
 
 
 def _save(figure: Figure, png: Path) -> str:

@@ -14,17 +14,8 @@ from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.existing.compare_arms import ComparedArm, read_existing_arms
 from armwright.pareto import front_indices, hypervolume, knee_index, paper_solution_indices
+from armwright.pictures import drawing
 from armwright.pictures.arm_figures import draw_arms
-from armwright.pictures.drawing import (
-    draw_dominated,
-    frame_plane,
-    legend_below,
-    legend_mark,
-    one_panel,
-    plane_limits,
-    several_panels,
-    write_drawn,
-)
 from armwright.pictures.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
 from armwright.proof.design_record import read_records
 from armwright.proof.front_gap import front_gap
@@ -46,7 +37,7 @@ def write_figures(folder: str | Path) -> list[Path]:
     config, history = read_run(folder)
     search = (read_summary(folder) or {}).get("search") if isinstance(config.method, FrontMethod) else None
     existing = read_existing_arms(folder, len(config.objectives))
-    return write_drawn(folder / FIGURES, _figures(folder, history, search, existing))
+    return drawing.write_drawn(folder / FIGURES, _figures(folder, history, search, existing))
 
 
 def _figures(
@@ -92,7 +83,7 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
 
 def draw_hypervolume(history: History) -> Figure:
     """Draw the hypervolume over the counted trials; proposals that enlarged it are marked."""
-    figure, axes = one_panel(5.2, 3.2)
+    figure, axes = drawing.one_panel(5.2, 3.2)
     curve = history.hypervolume
     start = hypervolume(history.masked_objectives[: history.n_init], _reference(history))
     values = np.array([start, *curve])
@@ -112,7 +103,7 @@ def draw_hypervolume(history: History) -> Figure:
 
 def draw_search(history: History, search: Mapping[str, Any]) -> Figure:
     """Draw the hypervolume of a direct search over its evaluations, with the best known value."""
-    figure, axes = one_panel(5.2, 3.2)
+    figure, axes = drawing.one_panel(5.2, 3.2)
     evaluations, volumes = np.array(search["hypervolume_history"]).T
     axes.step(evaluations, volumes, where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     axes.set_xscale("log")
@@ -126,17 +117,19 @@ def draw_search(history: History, search: Mapping[str, Any]) -> Figure:
 
 def _label_hypervolume(axes: Any, history: History, x_label: str) -> None:
     """Label axes of a hypervolume, with a line at the best known one of the task, if one is known."""
-    found = front_gap(history.problem, history.masked_objectives, _reference(history))
+    reference = _reference(history)
+    found = front_gap(history.problem, history.masked_objectives, reference)
     if found is not None:
         axes.axhline(found.hypervolume, **BEST_KNOWN, label=f"best known ({found.hypervolume:.2f})")
-    axes.set(xlabel=x_label, ylabel="Hypervolume", title=_title(history))
+    title = f"{history.problem.task.name}, reference point ({', '.join(f'{value:.4g}' for value in reference)})"
+    axes.set(xlabel=x_label, ylabel="Hypervolume", title=title)
     axes.set_ylim(bottom=0)
     axes.legend(loc="lower right")
 
 
 def draw_samples(history: History) -> Figure:
     """Draw all trials after 5, 35, 65 and 100 % of the counted ones, coloured by source, with the front."""
-    figure = several_panels(10.4, 3.4)
+    figure = Figure(figsize=(10.4, 3.4), layout="constrained")
     panels: Sequence[Any] = figure.subplots(1, len(SAMPLE_SHARES), sharex=True, sharey=True)
     counted, limits = len(history) - history.n_init, _limits(history)
     shown = sorted({max(1, round(share * counted)) for share in SAMPLE_SHARES}) if counted > 0 else [0]
@@ -148,7 +141,7 @@ def draw_samples(history: History) -> Figure:
         axes.label_outer()
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
-    legend_below(figure, _legend(history))
+    drawing.legend_below(figure, _legend(history))
     return figure
 
 
@@ -163,7 +156,7 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
     arms = [arm for arm in existing if None not in arm.values[:2]]
     # Marks on both sides keep apart.
     arms.sort(key=lambda arm: np.minimum(arm.values[0] or 0.0, limits[0, 1]), reverse=True)
-    figure, axes = one_panel(5.2, 4.2 + LINE * (len(marked) + len(arms)), MARK_PAD if arms else None)
+    figure, axes = drawing.one_panel(5.2, 4.2 + LINE * (len(marked) + len(arms)), MARK_PAD if arms else None)
     _scatter(axes, history, reference, limits, alpha=0.25)
     for member in history.front:
         style = look(member.source)
@@ -182,7 +175,7 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
         axes.scatter(*at, **EXISTING.points | {"edgecolors": FRONT}, zorder=6, clip_on=False)
         sides = (-1 if number % 2 else 1, -1 if at[1] > limits[1].mean() else 1)
         handles.append(_named(axes, at, sides, ascii_lowercase[number % 26], f"{arm.name}{beyond}"))
-    legend_below(figure, handles)
+    drawing.legend_below(figure, handles)
     return figure
 
 
@@ -192,15 +185,14 @@ def _named(axes: Any, place: Any, sides: tuple[int, int], mark: str, label: str)
     axes.plot(*place, marker="o", markersize=10, color=FRONT, markerfacecolor="none", clip_on=False, zorder=7)
     aligned = {"ha": "left" if x > 0 else "right", "va": "bottom" if y > 0 else "top"}
     axes.annotate(mark, place, (5 * x, 4 * y), textcoords="offset points", **aligned, weight="bold", zorder=7)
-    return legend_mark(f"{mark}: {label}", "", FRONT)
+    return drawing.legend_mark(f"{mark}: {label}", "", FRONT)
 
 
 def _limits(history: History) -> Array:
     """Return the drawn part of the plane (2, 2), low and high: where the feasible designs are, if there are any."""
     feasible = history.values[history.feasible]
-    return plane_limits(
-        (feasible if len(feasible) else history.values[~history.failed])[:, :2], _reference(history), SHOWN
-    )
+    shown = feasible if len(feasible) else history.values[~history.failed]
+    return drawing.plane_limits(shown[:, :2], _reference(history), SHOWN)
 
 
 def _scatter(axes: Any, history: History, reference: Sequence[float], limits: Array, alpha: float = 0.85) -> None:
@@ -213,8 +205,8 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], limits: Ar
     front = values[front_indices(history.masked_objectives)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside) and len(reference) == 2:  # more than two objectives have no front line
-        draw_dominated(axes, inside, reference, color="#F0E442", alpha=0.18, zorder=0.5)
-    frame_plane(axes, history.problem, reference, limits)
+        drawing.draw_dominated(axes, inside, reference, color="#F0E442", alpha=0.18, zorder=0.5)
+    drawing.frame_plane(axes, history.problem, reference, limits)
     if not len(inside):
         _explain_empty(axes, history)
 
@@ -227,19 +219,14 @@ def _sources(history: History) -> list[str]:
 def _legend(history: History) -> list[Line2D]:
     marks = [_mark(look(source)) for source in _sources(history)]
     if np.any(~history.feasible & ~history.failed):
-        marks.append(legend_mark("infeasible", "o", INFEASIBLE, markerfacecolor="none", markersize=4))
+        marks.append(drawing.legend_mark("infeasible", "o", INFEASIBLE, markerfacecolor="none", markersize=4))
     if len(history.problem.objectives) == 2:
         marks.append(Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front"))
     return marks
 
 
 def _mark(style: Look) -> Line2D:
-    return legend_mark(style.label, style.marker, style.colour, markersize=5)
-
-
-def _title(history: History) -> str:
-    values = ", ".join(f"{value:.4g}" for value in _reference(history))
-    return f"{history.problem.task.name}, reference point ({values})"
+    return drawing.legend_mark(style.label, style.marker, style.colour, markersize=5)
 
 
 def _reference(history: History) -> tuple[float, ...]:

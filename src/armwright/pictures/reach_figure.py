@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -13,11 +13,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from armwright.files import naming_write_errors
 from armwright.kinematics.reach.reach_map import PoseCoverage, ReachMap
-from armwright.pictures.drawing import legend_below, legend_mark, save_figure, several_panels
+from armwright.pictures.drawing import legend_below, legend_mark, save_figure
 from armwright.pictures.mapped_arm import MappedArm
-from armwright.pictures.style import FRONT, OBSTACLE, RC, TARGET
+from armwright.pictures.style import FRONT, OBSTACLE, TARGET
 from armwright.robot.arm import Arm
 from armwright.tasks.obstacles import Obstacle
 
@@ -48,8 +47,7 @@ class _Slice:
 
 def write_reach_figure(found: ReachMap, around: MappedArm, file: Path) -> None:
     """Write the slices of a reach map with the arm and its surroundings, in the format of the file's ending."""
-    with matplotlib.rc_context(RC), naming_write_errors(file):
-        save_figure(_draw(found, around), file)
+    save_figure(partial(_draw, found, around), file)
 
 
 def _draw(found: ReachMap, around: MappedArm) -> Figure:
@@ -57,7 +55,7 @@ def _draw(found: ReachMap, around: MappedArm) -> Figure:
     rows = [("within joint limits", found.bare)]
     if found.usable is not found.bare:
         rows.append((around.conditions, found.usable))
-    figure = several_panels(2 * PANEL + 0.8, PANEL * len(rows) + 0.9)
+    figure = Figure(figsize=(2 * PANEL + 0.8, PANEL * len(rows) + 0.9), layout="constrained")
     axes: Any = figure.subplots(len(rows), 2, squeeze=False)
     slices = (_vertical(found, around.body), _horizontal(found, around))
     image: Any = None
@@ -68,8 +66,11 @@ def _draw(found: ReachMap, around: MappedArm) -> Figure:
             axes[row, column].set_title(f"{across} = {plane.place(found):.3f} m, {name}")
     bar = figure.colorbar(image, ax=axes, shrink=0.8)
     bar.set_label(f"share of {len(found.directions)} directions reached [%]")
-    lines = [f"{around.title}", *(f"{name}: {describe_volumes(coverage)}" for name, coverage in rows)]
-    figure.suptitle("\n".join(lines), fontsize=10)
+    volumes = (
+        f"{name}: {coverage.volume:.3g} m³ reached, {coverage.dexterous_volume():.3g} m³ in all directions"
+        for name, coverage in rows
+    )
+    figure.suptitle("\n".join([around.title, *volumes]), fontsize=10)
     handles: list[Any] = [Patch(facecolor=POSITION_ONLY, label="reached, in none of the directions")]
     handles.append(legend_mark("base", "s", FRONT))
     if around.targets is not None:
@@ -78,11 +79,6 @@ def _draw(found: ReachMap, around: MappedArm) -> Figure:
         handles.append(Patch(facecolor="none", edgecolor=OBSTACLE, hatch="////", label="obstacle"))
     legend_below(figure, handles)
     return figure
-
-
-def describe_volumes(coverage: PoseCoverage) -> str:
-    """Return the volumes of a coverage on one line."""
-    return f"{coverage.volume:.3g} m³ reached, {coverage.dexterous_volume():.3g} m³ in all directions"
 
 
 def _vertical(found: ReachMap, arm: Arm) -> _Slice:

@@ -1,19 +1,18 @@
 """A picture of a task before any search: targets, tool directions, bases, obstacles and lines of the cycle."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from armwright.exceptions import TaskError
-from armwright.files import naming_write_errors
-from armwright.pictures.arm_figures import EDGE, MOVE, frame, scene_legend
+from armwright.pictures.arm_figures import EDGE, MOVE, frame, places_of, scene_legend
 from armwright.pictures.drawing import legend_mark, save_figure
 from armwright.pictures.solids import draw_edges, draw_obstacles, draw_solid, extent_of
-from armwright.pictures.style import FRONT, RC, TARGET
+from armwright.pictures.style import FRONT, TARGET
 from armwright.problem.checks.reach import base_box
 from armwright.problem.problem import Problem
 
@@ -33,8 +32,7 @@ def write_task_figure(problem: Problem, file: Path) -> None:
     """
     if file.suffix.lower() not in FORMATS:
         raise TaskError(f"--out {file}: expected a name that ends in {', '.join(FORMATS)}")
-    with matplotlib.rc_context(RC), naming_write_errors(file):
-        save_figure(draw_task(problem), file)
+    save_figure(partial(draw_task, problem), file)
 
 
 def draw_task(problem: Problem) -> Figure:
@@ -45,9 +43,7 @@ def draw_task(problem: Problem) -> Figure:
     axes: Any = figure.add_subplot(projection="3d")
     low, high = base_box(problem.space)
     plan = problem.scenes[0].plan
-    corners = [corner for region in task.workspace for corner in region.corners]
-    poses = [] if plan is None else [plan.poses.position]
-    extent = extent_of([task.target_positions, low, high, *corners, *poses], task.obstacles)
+    extent = extent_of([low, high, *places_of(problem)], task.obstacles)
     draw_obstacles(axes, task.obstacles, extent)
     for solid in task.bodies_at_targets:
         draw_solid(axes, solid, extent, TARGET)

@@ -47,7 +47,7 @@ def sheet_of(history: History, member: FrontMember, facts: Facts, verdict: Mappi
     problem, arm = history.problem, member.arm
     evaluation, payload = history.evaluation([member.number]), float(problem.task.payloads.max())
     lines = arm_lines(arm, payload, evaluation.targets)
-    parts = parts_list(arm, problem.space)
+    parts, objectives = parts_list(arm, problem.space), zip(problem.objectives, member.values, strict=True)
     return DataSheet(
         name=problem.task.name,
         design=member.number,
@@ -56,7 +56,7 @@ def sheet_of(history: History, member: FrontMember, facts: Facts, verdict: Mappi
         base_yaw=0.0,
         **verdict,
         violated=_violated(history, member.number),
-        objectives=_objectives(history, member),
+        objectives={one.name: (finite_or_none(value), one.unit) for one, value in objectives},
         payload=payload or None,
         facts={**reach_facts(arm, lines["over_reach"][-1]), **facts},
         joints=joint_lines(arm, evaluation),
@@ -79,11 +79,6 @@ def _verdict(run: Path, number: int, roles: Sequence[Mapping[str, Any]]) -> dict
     except (ValueError, LookupError, TypeError):  # none, or a damaged file
         status = NOT_SIMULATED
     return {"status": f"{status}; not among the recommended designs"}
-
-
-def _objectives(history: History, member: FrontMember) -> dict[str, tuple[float | None, str]]:
-    pairs = zip(history.problem.objectives, member.values, strict=True)
-    return {objective.name: (finite_or_none(value), objective.unit) for objective, value in pairs}
 
 
 def _violated(history: History, number: int) -> tuple[str, ...]:

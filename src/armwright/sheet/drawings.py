@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.reach.reach_outline import Outline
 from armwright.pictures.style import FRONT, LINK, TARGET
 from armwright.sheet.record import DataSheet
 
@@ -19,7 +18,7 @@ MM = 1e3
 
 def draw_side(axes: Any, sheet: DataSheet) -> None:
     """Draw the arm from the side, with its joints at 0 or the nearest limit, and what it reaches."""
-    drawing, outline = sheet.drawing, _points(sheet.drawing.side)
+    drawing, outline = sheet.drawing, np.array(sheet.drawing.side.points)
     axes.fill(*(MM * outline.T), facecolor=REACHED, edgecolor=LINK, linewidth=0.8, zorder=1)
     x, _, z = drawing.base
     if drawing.column is not None:
@@ -43,7 +42,7 @@ def draw_side(axes: Any, sheet: DataSheet) -> None:
 def draw_top(axes: Any, sheet: DataSheet) -> None:
     """Draw the outline of the reach from above, with its radius and the targets."""
     drawing = sheet.drawing
-    outline, base = _points(drawing.top), np.array(drawing.base[:2])
+    outline, base = np.array(drawing.top.points), np.array(drawing.base[:2])
     axes.fill(*(MM * outline.T), facecolor=REACHED, edgecolor=LINK, linewidth=0.8, zorder=1)
     targets = np.array([target[:2] for target in drawing.targets]).reshape(-1, 2)
     low, high = _limits(outline, targets)
@@ -65,10 +64,6 @@ def draw_top(axes: Any, sheet: DataSheet) -> None:
     _frame(axes, low, high, "x [mm]", "y [mm]")
     starred = "; stars: targets" if len(targets) else ""
     axes.set_title(f"Top view, tip within R = {MM * (sheet.facts['reach'].value or 0.0):.0f} mm{starred}")
-
-
-def _points(outline: Outline) -> Array:
-    return np.array(outline.points)
 
 
 def _ends(sheet: DataSheet) -> Array:

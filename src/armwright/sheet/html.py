@@ -5,36 +5,19 @@ import html
 import io
 import math
 from collections.abc import Callable, Sequence
+from importlib import resources
 from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
 
 from armwright.pictures.style import RC
-from armwright.sheet import tables as tables
+from armwright.sheet import tables
 from armwright.sheet.drawings import draw_side, draw_top
 from armwright.sheet.record import DataSheet
 from armwright.sheet.tables import Table
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
-STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #111; background: #fff; margin: 2rem auto; max-width: 60rem;
-       padding: 0 1rem; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.1em; margin: 1.6em 0 0.4em; }
-.wide { overflow-x: auto; } .pair { display: flex; flex-wrap: wrap; gap: 0 2em; }
-.pair > * { flex: 1 1 20rem; max-width: 100%; min-width: 0; }
-img { max-width: 100%; }
-table { border-collapse: collapse; font-size: 0.85em; }
-th, td { padding: 0.15em 0.6em 0.15em 0; border-bottom: 1px solid #ddd; text-align: right; vertical-align: top; }
-th { border-bottom-color: #111; } .left { text-align: left; } p, li { font-size: 0.85em; overflow-wrap: anywhere; }
-@page { size: A4; margin: 12mm; }
-@media print {
-  body { margin: 0; max-width: none; padding: 0; line-height: 1.25; } section { font-size: var(--size); }
-  section + section { break-before: page; } h1 { margin: 0; } h2 { margin: 0.8em 0 0.2em; break-after: avoid; }
-  tr, img { break-inside: avoid; } .wide { overflow-x: visible; } .pair > * { flex-basis: 40%; }
-  img { width: 100%; max-height: 80mm; } ul { margin: 0.2em 0; padding-left: 1.2em; } p { margin: 0.3em 0; }
-}
-"""
 SIZES = (9.5, 9.0, 8.5, 8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0, 4.5, 4.0)  # of printed text [pt]; the largest that fits
 PAGE = 500.0  # lines of 1 pt on a page of A4
 WIDTH = 1150.0  # letters of 1 pt in a line
@@ -43,7 +26,8 @@ DRAWN = 160.0  # lines of 1 pt that the drawings take
 
 def to_html(sheet: DataSheet) -> str:
     """Return the data sheet as HTML, which prints on two pages of A4; the same sheet gives the same text."""
-    title = html.escape(f"Data sheet: {tables.title_of(sheet)}")
+    design = "" if sheet.design is None else f", design {sheet.design} ({sheet.joint_letters})"
+    title = html.escape(f"Data sheet: {sheet.name}{design}")
     verdict = tables.verdict_of(sheet)
     left, right = (tables.key_figures, tables.reach_table), (tables.link_table, tables.mass_table)
     columns = [[make(sheet) for make in makers] for makers in (left, right)]
@@ -54,8 +38,10 @@ def to_html(sheet: DataSheet) -> str:
         _beside(_picture(sheet, draw_side, "side view"), _picture(sheet, draw_top, "top view")),
     ]
     joints, parts = tables.joint_table(sheet), tables.parts_table(sheet)
-    assumed = tuple(f"{about}: {text}." for about, text in sheet.assumptions.items())
-    bodies, sources = tables.body_lines(sheet), tables.source_lines(sheet)
+    assumed = [f"{about}: {text}." for about, text in sheet.assumptions.items()]
+    bodies = [f"actuator at joint {joint.number}: {joint.body}" for joint in sheet.joints if joint.body]
+    read = ((part.part, "; ".join(filter(None, (part.source, part.price_source)))) for part in sheet.parts)
+    sources = [f"{name}: {source}" for name, source in read if source]
     second = [
         *(_table(joints), _list(bodies), _table(parts), _list(sources)),
         *("<h2>What the values assume</h2>", _list(assumed)),
@@ -68,10 +54,11 @@ def to_html(sheet: DataSheet) -> str:
         f'<section style="--size: {size}pt">\n{chr(10).join(filter(None, texts))}\n</section>'
         for size, texts in zip(sizes, (first, second), strict=True)
     ]
+    style = (resources.files("armwright.sheet") / "datasheet.css").read_text(encoding="utf-8")
     head = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>{STYLE}</style></head>\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>\n{style}</style></head>\n'
     )
     return head + "<body>\n" + "\n".join(pages) + "\n</body></html>\n"
 
@@ -110,12 +97,9 @@ def _table(table: Table) -> str:
 
 
 def _row(table: Table, cells: tuple[str, ...], tag: str) -> str:
-    shown: list[str] = []
-    for column, cell in enumerate(cells):
-        aligned = ' class="left"' if column in table.left else ""
-        shown.append(f"<{tag}{aligned}>{html.escape(cell)}</{tag}>")
-    return f"<tr>{''.join(shown)}</tr>"
+    starts = [f'<{tag} class="left">' if column in table.left else f"<{tag}>" for column in range(len(cells))]
+    return f"<tr>{''.join(f'{start}{html.escape(c)}</{tag}>' for start, c in zip(starts, cells, strict=True))}</tr>"
 
 
-def _list(lines: tuple[str, ...]) -> str:
+def _list(lines: Sequence[str]) -> str:
     return f"<ul>{''.join(f'<li>{html.escape(line)}</li>' for line in lines)}</ul>" if lines else ""

@@ -1,13 +1,14 @@
 """What a task needs of each joint of an arm and of its drive."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from armwright.arrays import Array, finite_or_none
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arms.bearings import bearing_limits
-from armwright.kinematics.cycle.cycle_loads import CycleLoads, holding_torques
+from armwright.kinematics.cycle.cycle_loads import holding_torques
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.robot.arm import Arm
@@ -54,14 +55,6 @@ def _describe_body(body: MotorBody) -> str:
     return f"{body.shape} of {edges} mm along x, y and z, shaft along {body.axis}, middle at ({middle}) mm"
 
 
-def loads_of(evaluation: Evaluation) -> CycleLoads | None:
-    """Return the loads along the cycle; None without a cycle of known duration."""
-    try:
-        return evaluation.loads
-    except SettingsError:
-        return None
-
-
 def _used(evaluation: Evaluation, j: int) -> tuple[float, float]:
     """Return the smallest and the largest value of a joint at the targets and along the cycle."""
     values = [evaluation.q[0, :, j]]
@@ -76,7 +69,9 @@ def _needs(evaluation: Evaluation) -> dict[str, Array]:
     if evaluation.cycle_paths is not None:
         along = holding_torques(evaluation.cycle_paths, evaluation.torque_terms)[0]
         at_rest = np.maximum(at_rest, np.abs(along).max(axis=(0, 1)))
-    drives, loads = evaluation.arms.actuation, loads_of(evaluation)
+    drives, loads = evaluation.arms.actuation, None
+    with suppress(SettingsError):  # no cycle of known duration
+        loads = evaluation.loads
     need = {"torque": at_rest}
     if drives is not None:
         need["peak_utilisation"] = drives.safety_factor[0] * at_rest / drives.peak[0]

@@ -122,8 +122,3 @@ class DataSheet:
     assumptions: Mapping[str, str] = field(default_factory=dict[str, str])
     """What the values assume, by what they are about."""
     not_modelled: str = NOT_MODELLED  # what neither mass nor price include
-
-    @property
-    def reach(self) -> float:
-        """The horizontal reach of the tip from the first joint [m]."""
-        return self.over_reach[-1].distance

@@ -26,9 +26,7 @@ class Table:
 
 def number(value: float | None, factor: float = 1.0, missing: str = NOT_STATED) -> str:
     """Return a value in other units, with three significant digits and no exponent; never more than 3 decimals."""
-    if value is None:
-        return missing
-    return significant(factor * value)
+    return missing if value is None else significant(factor * value)
 
 
 def money(value: float | None, missing: str = NOT_STATED) -> str:
@@ -36,17 +34,11 @@ def money(value: float | None, missing: str = NOT_STATED) -> str:
     return missing if value is None else f"{value:,.2f}"
 
 
-def title_of(sheet: DataSheet) -> str:
-    """Return the title of a sheet."""
-    return sheet.name if sheet.design is None else f"{sheet.name}, design {sheet.design} ({sheet.joint_letters})"
-
-
 def verdict_of(sheet: DataSheet) -> str:
     """Return role, verdict and survival in one sentence; empty for an existing arm."""
     role = f"recommended ({sheet.role.replace('_', ' ')})" if sheet.role else ""
     broken = f"infeasible: {', '.join(sheet.violated)}" if sheet.violated else ""
-    parts = [part for part in (broken, role, sheet.status and f"simulation: {sheet.status}", sheet.survival) if part]
-    text = "; ".join(parts)
+    text = "; ".join(filter(None, (broken, role, sheet.status and f"simulation: {sheet.status}", sheet.survival)))
     return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
@@ -79,11 +71,6 @@ def joint_table(sheet: DataSheet) -> Table:
     }
     notes += [f"{label}: {NOT_STATED}, {reason}." for reason, label in reasons.items() if reason]
     return Table("Joints and drives", header, rows, (1, 2), " ".join(notes))
-
-
-def body_lines(sheet: DataSheet) -> tuple[str, ...]:
-    """Return where the bodies of the actuators are, if they count."""
-    return tuple(f"actuator at joint {joint.number}: {joint.body}" for joint in sheet.joints if joint.body)
 
 
 def link_table(sheet: DataSheet) -> Table:
@@ -121,16 +108,6 @@ def parts_table(sheet: DataSheet) -> Table:
     if not rows:
         notes.append("A URDF names no parts.")
     return Table("Parts", ("n", "part", "each [USD]", "price [USD]", "detail"), rows, (1, 4), " ".join(notes))
-
-
-def source_lines(sheet: DataSheet) -> tuple[str, ...]:
-    """Return where data and prices of the parts were read."""
-    lines = [
-        f"{part.part}: {'; '.join(text for text in (part.source, part.price_source) if text)}"
-        for part in sheet.parts
-        if part.source or part.price_source
-    ]
-    return tuple(lines)
 
 
 def reach_table(sheet: DataSheet) -> Table:

@@ -1,7 +1,7 @@
 // Tool, payload and obstacles.
 
-import { change, opened } from "./editor-document.js";
-import { angle, button, length, list, numberField, record, redraw, removal, set, textField, unitName } from "./editor-fields.js";
+import { change } from "./editor-document.js";
+import { angle, button, formLine, length, list, numberField, record, redraw, removal, set, task, textField, unitName } from "./editor-fields.js";
 import { $, element } from "./format.js";
 
 const NEW = {
@@ -11,12 +11,9 @@ const NEW = {
   ground: { kind: "ground", z: 0 },
 };
 
-const task = () => record(opened.assessed.task);
-
 export function drawLoad() {
   const tool = record(task().tool), payload = task().payload, tip = list(tool.tip);
-  const fields = [];
-  const line = (name, ...parts) => fields.push(element("span", {}, name), element("span", { class: "fields" }, ...parts));
+  const fields = [], line = formLine(fields);
   const tipEdit = (k) => (value) => ({ task: [task().tool === undefined
     ? set(["tool"], { tip: [0, 1, 2].map((axis) => (axis === k ? value : 0)) })
     : set(["tool", "tip"], [0, 1, 2].map((axis) => (axis === k ? value : Number(tip[axis] ?? 0))))] });

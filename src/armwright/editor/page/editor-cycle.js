@@ -1,14 +1,13 @@
 // The cycle: its steps, how long the tool rests, how far it comes straight in.
 
 import { change, opened } from "./editor-document.js";
-import { button, choiceField, length, list, numberField, record, redraw, removal, set, textField, unitName, word } from "./editor-fields.js";
+import { button, choiceField, length, list, numberField, record, redraw, removal, set, task, textField, unitName, word } from "./editor-fields.js";
 import { $, element } from "./format.js";
 
 const COUNTS = ["cycle_time", "price"]; // objectives of a task that gets a cycle and states none, if there are motors
 const APPROACH = 0.05; // [m] of a new cycle of picks and places
 const DWELL = 0.2; // [s] likewise
 
-const task = () => record(opened.assessed.task);
 const targets = () => list(task().targets);
 const nameOf = (t) => record(targets()[t]).name || t + 1;
 

@@ -111,7 +111,7 @@ function write(path, content = {}) {
     try {
       await ask(path, { ...texts, ...content });
     } catch (fault) {
-      if (fault.status !== 409 || !fault.message.includes("has changed on disk")) throw fault;
+      if (!fault.message.includes("has changed on disk")) throw fault;
       if (!confirm(`${fault.message}. Replace it by the text of this page?`)) throw fault;
       await ask(path, { ...texts, ...content, overwrite: true });
     }

@@ -1,6 +1,6 @@
 // Fields of forms. A field whose text is no number is marked and changes nothing.
 
-import { change } from "./editor-document.js";
+import { change, opened } from "./editor-document.js";
 import { $, element } from "./format.js";
 
 const DEGREE = Math.PI / 180;
@@ -11,6 +11,7 @@ export const unitName = () => (unit() === 1 ? "m" : "mm");
 
 export const list = (value) => (Array.isArray(value) ? value : []);
 export const record = (value) => (value !== null && typeof value === "object" && !Array.isArray(value) ? value : {});
+export const task = () => record(opened.assessed.task);
 export const isNumber = (value) => typeof value === "number" || (typeof value === "string" && value.trim() !== "" && Number.isFinite(Number(value)));
 
 // A factor turns a number of a form into one of the file.
@@ -59,6 +60,9 @@ export function choiceField({ id, value, options, label, edit }) {
 export const button = (text, press, attributes = {}) => element("button", { type: "button", onclick: press, ...attributes }, text);
 
 export const removal = (label, edit) => button("✕", () => change(edit()), { class: "quiet", "aria-label": `Remove ${label}`, title: `Remove ${label}` });
+
+// Returns what adds a line to a form: its name and its parts.
+export const formLine = (fields) => (name, ...parts) => fields.push(element("span", {}, name), element("span", { class: "fields" }, ...parts));
 
 // A word between fields.
 export const word = (text) => element("span", {}, text);

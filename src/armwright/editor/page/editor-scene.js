@@ -1,17 +1,18 @@
 // The task in space. Targets can be dragged: along the ground, or with Shift upwards and downwards.
 
 import { change, opened } from "./editor-document.js";
-import { $, colour, element, number, onTheme } from "./format.js";
+import { $, number, onTheme } from "./format.js";
 import { choose, chosen, listenToChoice, placeEdit } from "./editor-targets.js";
-import { arrow, ball, boxEdges, empty, floorParts, letters, segments } from "./shapes.js";
-import { solidParts } from "./solids.js";
-import { Stage, frameOf } from "./stage.js";
+import { drawTask, solid, thin } from "./scene.js";
+import { ball, boxEdges, empty, floorParts, letters, segments } from "./shapes.js";
+import { openStage } from "./stage.js";
 
 const VIEW = [0.55, -1, 0.55]; // initial direction of the camera
-const BALL = 0.025, ARROW = 0.14, LETTER = 0.09; // as shares of the frame's radius
+const BALL = 0.025, LETTER = 0.09; // as shares of the frame's radius
 const GRIP = 1.6; // times the radius of a ball, within which it is grabbed
 const GRID = 0.001; // [m] to which dragged targets are rounded
 const MOST_NAMED = 60; // targets with their names
+const GROUPS = ["floor", "bases", "obstacles", "around", "targets", "names"];
 const [TARGET, NOW, OBSTACLE, BASE] = ["#CC79A7", "#E69F00", "#6E7F91", "#0072B2"];
 
 let stage = null, groups = {}; // null without 3D graphics
@@ -19,18 +20,9 @@ let drawn = null; // the scene of the server that is shown
 let dragged = null; // { index, up, normal, place, from, mesh, moved }
 
 export function openScene() {
-  try {
-    begin();
-  } catch {
-    stage = null;
-    $("scene").replaceChildren(element("p", { class: "note" }, "This browser shows no 3D graphics (WebGL). The tables below do the same."));
-    $("reset").disabled = true;
-    return;
-  }
-  $("reset").addEventListener("click", () => {
-    Object.assign(stage, { frame: null, turned: false });
-    drawScene();
-  });
+  stage = openStage($("scene"), GROUPS, VIEW, drawScene, "The tables below do the same.", listenToPointer);
+  if (!stage) return;
+  ({ groups } = stage);
   listenToChoice(paintChoice);
   onTheme(drawScene);
 }
@@ -44,16 +36,12 @@ export function targetPlaces() {
   });
 }
 
-function begin() {
-  stage = new Stage($("scene"), ["floor", "bases", "obstacles", "lines", "targets", "ways", "names"], VIEW);
-  ({ groups } = stage);
-  const { canvas } = stage;
-  // Before the controls, which would turn the view.
+// Before the controls, which would turn the view.
+function listenToPointer(canvas) {
   canvas.addEventListener("pointerdown", grab, { capture: true });
   canvas.addEventListener("pointermove", drag);
   canvas.addEventListener("pointerup", drop);
   canvas.addEventListener("pointercancel", drop);
-  stage.open();
 }
 
 // Draws what the server reads in the files; while a file is not valid, the last scene stays.
@@ -64,30 +52,19 @@ export function drawScene() {
     $("scene-note").textContent = "The scene appears as soon as the task file is valid.";
     return;
   }
-  reframe();
+  const points = [...drawn.targets, ...(drawn.bases ?? []), ...drawn.workspace.flatMap(({ low, high }) => [low, high])];
+  if (stage.reframe(points, 1e-2, 0.4, 0.5)) stage.look();
   $("scene-note").textContent = opened.assessed.scene === null ? "The task file is not valid; this is how it was before." : describe();
   const { frame } = stage, { radius } = frame;
-  const solid = (paint) => new THREE.MeshLambertMaterial({ color: paint });
-  const thin = (paint) => new THREE.LineBasicMaterial({ color: paint });
   for (const group of Object.values(groups)) empty(group);
   groups.floor.add(...floorParts(frame).parts);
-  const faint = new THREE.MeshLambertMaterial({ color: OBSTACLE, transparent: true, opacity: 0.3, depthWrite: false });
-  for (const one of drawn.obstacles) groups.obstacles.add(...solidParts(one, frame, { face: faint, edge: thin(OBSTACLE) }));
-  const pale = new THREE.MeshLambertMaterial({ color: TARGET, transparent: true, opacity: 0.2, depthWrite: false });
-  for (const body of drawn.bodies) groups.obstacles.add(...solidParts(body, frame, { face: pale, edge: thin(TARGET) }));
+  drawTask(groups, drawn, frame, { obstacle: OBSTACLE, target: TARGET, axes: [TARGET, TARGET, TARGET] });
   if (drawn.bases) {
     groups.bases.add(segments(boxEdges(...drawn.bases), thin(BASE)));
     groups.bases.add(letters("base", drawn.bases[1], LETTER * radius, "left"));
   }
-  if (drawn.lines.length) groups.lines.add(segments(drawn.lines.flat(2), thin(TARGET)));
-  for (const { low, high } of drawn.workspace) groups.lines.add(segments(boxEdges(low, high), thin(colour("soft"))));
   drawn.targets.forEach((target, t) => {
     groups.targets.add(ball(target, BALL * radius, solid(TARGET)));
-    const axes = { 0: [], 2: [2], 3: [0, 1, 2] }[drawn.n_angular[t]];
-    for (const k of axes) {
-      const way = drawn.rotation[t].map((row) => row[k]), long = (k === 2 ? 1 : 0.6) * ARROW * radius;
-      groups.ways.add(...arrow(target, way, long, 0.005 * radius, solid(TARGET)));
-    }
     if (t < MOST_NAMED) groups.names.add(letters(drawn.names[t], target, LETTER * radius, "left"));
   });
   paintChoice();
@@ -105,16 +82,6 @@ function paintChoice() {
     mesh.scale.setScalar((t === chosen() ? 1.5 : 1) * BALL * stage.frame.radius);
   });
   stage.render();
-}
-
-function reframe() {
-  const { frame } = stage;
-  const wanted = frameOf([...drawn.targets, ...(drawn.bases ?? []), ...drawn.workspace.flatMap(({ low, high }) => [low, high])], 1e-2);
-  const isFar = frame === null || wanted.radius > 1.2 * frame.radius || wanted.radius < 0.5 * frame.radius
-    || wanted.low.some((v, k) => v < frame.low[k] - 0.4 * frame.radius) || wanted.high.some((v, k) => v > frame.high[k] + 0.4 * frame.radius);
-  if (!isFar) return;
-  stage.frame = wanted;
-  stage.look();
 }
 
 // Returns the line of sight through a point of the canvas: { from, way }.

@@ -1,7 +1,7 @@
 // The design space: joints, ranges, tubes and motors.
 
 import { change, opened } from "./editor-document.js";
-import { angle, choiceField, length, list, numberField, numberOf, plainNumber, record, redraw, set, unitName } from "./editor-fields.js";
+import { angle, choiceField, formLine, length, list, numberField, numberOf, plainNumber, record, redraw, set, unitName } from "./editor-fields.js";
 import { $, element, number, plural } from "./format.js";
 
 const RANGES = [["origin_x", "Base, x", [-1, 1], length], ["origin_y", "Base, y", [-1, 1], length], ["origin_z", "Base, z", [-1, 1], length], ["link", "Link length", [0.03, 0.3], length], ["joint_range", "Joint angle", [-2.4, 2.4], angle]];
@@ -19,8 +19,7 @@ export function openMotors(choices) {
 }
 
 export function drawSpace() {
-  const fields = [], { joints = 4, link_section: section } = space();
-  const line = (name, ...parts) => fields.push(element("span", {}, name), element("span", { class: "fields" }, ...parts));
+  const fields = [], line = formLine(fields), { joints = 4, link_section: section } = space();
   const [low, high] = Array.isArray(joints) ? joints : [joints, joints];
   const jointsEdit = (a, b) => ({ space: [set(["joints"], a === b ? a : [a, b])] });
   line("Joints",

@@ -2,7 +2,7 @@
 
 import { ask, change, complain, opened } from "./editor-document.js";
 import { choiceField, isNumber, length, list, numberField, record, redraw, removal, set, textField, unitName } from "./editor-fields.js";
-import { $, element, plural } from "./format.js";
+import { $, element, markRows, plural } from "./format.js";
 
 const MOST_ROWS = 300; // a longer table would be slow
 const WAYS = [["any", "any"], ["0,0,-1", "down"], ["0,0,1", "up"], ["1,0,0", "+x"], ["-1,0,0", "−x"], ["0,1,0", "+y"], ["0,-1,0", "−y"]];
@@ -16,7 +16,7 @@ export const listenToChoice = (listener) => listeners.push(listener);
 
 export function choose(index) {
   picked = index;
-  for (const row of $("targets").querySelectorAll("tbody tr")) row.classList.toggle("chosen", Number(row.dataset.target) === index);
+  markRows($("targets").querySelectorAll("tbody tr"), "target", index);
   for (const listener of listeners) listener();
 }
 
@@ -25,10 +25,11 @@ const asRecord = (entry) => Array.isArray(entry) ? { position: entry } : entry;
 const hasDirection = (entry) => wayOf(entry) !== "any";
 const positionOf = (entry) => list(Array.isArray(entry) ? entry : record(entry).position);
 
+const placeOf = (index) => (Array.isArray(entries()[index]) ? ["targets", index] : ["targets", index, "position"]);
+
 // Returns the edits that move a target.
 export function placeEdit(index, position) {
-  const path = Array.isArray(entries()[index]) ? ["targets", index] : ["targets", index, "position"];
-  return position.map((value, k) => set([...path, k], Number(value.toFixed(6))));
+  return position.map((value, k) => set([...placeOf(index), k], Number(value.toFixed(6))));
 }
 
 // Returns the edits that set a key of a target; a plain point becomes a record.
@@ -103,12 +104,11 @@ export function drawTargets() {
 function row(entry, t) {
   const position = positionOf(entry), one = record(entry), way = wayOf(entry);
   const ways = WAYS.some(([key]) => key === way) ? WAYS : [...WAYS, [way, way === "orientation" ? "orientation" : `(${way})`]];
-  const place = Array.isArray(entry) ? ["targets", t] : ["targets", t, "position"];
   const cells = [
     String(t + 1),
     textField({ id: `target-${t}-name`, value: one.name, label: `Name of target ${t + 1}`, edit: (text) => ({ task: keyEdit(t, "name", text || null) }) }),
     ...[0, 1, 2].map((k) => numberField({
-      id: `target-${t}-${k}`, value: position[k], kind: length, label: `${"xyz"[k]} of target ${t + 1}`, edit: (value) => ({ task: [set([...place, k], value)] }),
+      id: `target-${t}-${k}`, value: position[k], kind: length, label: `${"xyz"[k]} of target ${t + 1}`, edit: (value) => ({ task: [set([...placeOf(t), k], value)] }),
     })),
     choiceField({ id: `target-${t}-way`, value: way, options: ways, label: `Tool direction at target ${t + 1}`, edit: (key) => ({ task: wayEdit(t, key) }) }),
     numberField({

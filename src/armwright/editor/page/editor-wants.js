@@ -1,7 +1,7 @@
 // Objectives and constraints, chosen from the list of quantities.
 
-import { change, opened } from "./editor-document.js";
-import { button, choiceField, list, numberField, record, redraw, removal, set } from "./editor-fields.js";
+import { change } from "./editor-document.js";
+import { button, choiceField, list, numberField, record, redraw, removal, set, task } from "./editor-fields.js";
 import { $, element, why } from "./format.js";
 
 const CONSTRAINT = /^\s*([A-Za-z_]\w*)\s*(<=|>=)\s*(\S+)\s*$/;
@@ -13,8 +13,6 @@ const named = (name) => quantities.find((one) => one.name === name);
 export function openWants(choices) {
   quantities = choices.quantities;
 }
-
-const task = () => record(opened.assessed.task);
 
 // A stated reference point belongs to the stated objectives.
 const objectivesEdit = (names) => ({ task: [set(["objectives"], names), ...(task().reference_point === undefined ? [] : [set(["reference_point"], null)])] });

@@ -38,9 +38,9 @@ function drawForms() {
 function drawCheck({ errors, findings, meaning }) {
   $("verdict").textContent = errors.length ? "No search can start yet"
     : findings.length ? `Ready, with ${plural(findings.length, "warning")}` : "Ready";
-  $("verdict").className = errors.length ? "error" : "good";
+  $("verdict").className = errors.length ? "missed" : "passed";
   $("findings").replaceChildren(
-    ...errors.map((text) => element("li", { class: "error" }, text)),
+    ...errors.map((text) => element("li", { class: "missed" }, text)),
     ...findings.map(({ message, evidence }) => element("li", {}, `${message} (${evidence})`)),
   );
   $("meaning").replaceChildren(...Object.entries(meaning).flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]));

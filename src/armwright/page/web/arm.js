@@ -3,20 +3,20 @@
 import { during } from "./cycle.js";
 import { describeReason, postures } from "./design.js";
 import { FIXED, PRISMATIC, chain, columnBody, length, motorBody, rail } from "./kinematics.js";
-import { arrow, ball, boxEdges, empty, floorParts, rod, segments } from "./shapes.js";
+import { drawTask, faint, glass, solid } from "./scene.js";
+import { ball, empty, floorParts, rod, segments } from "./shapes.js";
 import { solidParts } from "./solids.js";
-import { Stage, frameOf } from "./stage.js";
+import { openStage } from "./stage.js";
 import { listen, set, state } from "./state.js";
-import { $, colour, element, number, onTheme, shown } from "./format.js";
+import { $, colour, dot, element, number, onTheme, shown } from "./format.js";
 
 const REST = 1200; // [ms] at a target while playing
 const VIEW = [0.55, -1, 0.42]; // initial direction of the camera
 const PICTURE = [480, 320], BORDER = 0.12, CLOSEST = 2; // [px] of snapshots, what they leave free, and their largest zoom
 const FILLS = 0.8; // an arm smaller than this share of the frame's radius gets a new frame
-const ARROW = 0.16; // length of arrows, as a share of the frame's radius
 const SLACK = 0.2; // share of the frame's radius by which an arm may leave it before it grows
 
-const GROUPS = ["floor", "obstacles", "lines", "workspace", "targets", "goals", "ghost", "compared", "arm"];
+const GROUPS = ["floor", "obstacles", "around", "targets", "ghost", "compared", "arm"];
 const [HIT, NOW] = ["#009E73", "#E69F00"]; // colours of targets
 
 let content = null;
@@ -33,7 +33,6 @@ export function openArm(shownContent) {
   $("next").addEventListener("click", () => step(1));
   $("play").addEventListener("click", () => play(!playing));
   $("ghost").addEventListener("change", drawArm);
-  $("reset").addEventListener("click", () => { if (stage) Object.assign(stage, { frame: null, turned: false }); drawArm(); });
   $("compare").addEventListener("click", () => set({ compared: state.compared === null ? state.design : null }));
   addEventListener("keydown", (event) => {
     if (event.target.closest("input, select, textarea, table, .plot") || event.altKey || event.ctrlKey || event.metaKey) return;
@@ -43,15 +42,12 @@ export function openArm(shownContent) {
     }
   });
   legend();
-  try {
-    begin();
-  } catch {
-    stage = null;
-    const note = document.createElement("p");
-    note.className = "note";
-    note.textContent = "This browser shows no 3D graphics (WebGL). Everything else on this page works without.";
-    $("arm").replaceChildren(note);
-    for (const id of ["ghost", "reset", "play"]) $(id).disabled = true;
+  stage = openStage($("arm"), GROUPS, VIEW, drawArm, "Everything else on this page works without.");
+  for (const id of ["ghost", "play"]) $(id).disabled = !stage;
+  if (stage) {
+    ({ groups } = stage);
+    paint();
+    onTheme(() => { paint(); stage.frame = null; drawArm(); });
   }
   listen((changed) => {
     const isDriven = began !== null;
@@ -102,25 +98,14 @@ export function drawn(kind) {
   });
 }
 
-function begin() {
-  stage = new Stage($("arm"), GROUPS, VIEW);
-  ({ groups } = stage);
-  stage.open();
-  paint();
-  onTheme(() => { paint(); stage.frame = null; drawArm(); });
-}
-
 function paint() {
-  const { joint, target, missed, obstacle } = content.head.colours;
-  const solid = (paint_) => new THREE.MeshLambertMaterial({ color: paint_ });
-  const faint = (paint_, opacity) => new THREE.MeshLambertMaterial({ color: paint_, transparent: true, opacity, depthWrite: false });
+  const { joint, target, missed } = content.head.colours;
   materials = {
     link: solid(colour("arm")), base: solid(shown("#111111")), joints: ["x", "y", "z"].map((axis) => solid(joint[axis])),
-    motors: ["x", "y", "z"].map((axis) => ({ face: faint(joint[axis], 0.3), edge: new THREE.LineBasicMaterial({ color: joint[axis] }) })),
-    ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45), comparedMotor: { face: faint(target, 0.2), edge: new THREE.LineBasicMaterial({ color: target }) },
+    motors: ["x", "y", "z"].map((axis) => glass(joint[axis])),
+    ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45), comparedMotor: glass(target, 0.2),
     reached: solid(HIT), missed: solid(missed), now: solid(NOW),
-    column: { face: faint(colour("arm"), 0.3), edge: new THREE.LineBasicMaterial({ color: colour("arm") }) },
-    obstacle: { face: faint(obstacle, 0.3), edge: new THREE.LineBasicMaterial({ color: obstacle }) },
+    column: glass(colour("arm")),
     gap: new THREE.LineDashedMaterial({ color: missed, dashSize: 0.02, gapSize: 0.012 }),
   };
 }
@@ -137,11 +122,7 @@ function legend() {
   ];
   parts.push([content.head.colours.target, ofTask.join(", ")]);
   if (content.head.workspace.length) parts.push([colour("soft"), "workspace (edges)"]);
-  $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
-    const dot = element("span", { class: "dot" });
-    dot.style.background = paint_;
-    return element("span", { class: "key" }, dot, text);
-  }));
+  $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => element("span", { class: "key" }, dot(paint_), text)));
 }
 
 // Returns the points of the selected design that must be visible: targets, and the arm in all postures.
@@ -157,18 +138,12 @@ function extent() {
 
 // Fits the frame to the design; an existing frame stays unless the arm leaves it.
 function reframe() {
-  const { frame } = stage, wanted = frameOf(extent(), 1e-3);
-  if (frame !== null) {
-    const slack = SLACK * frame.radius;
-    const holds = wanted.low.every((v, k) => v >= frame.low[k] - slack) && wanted.high.every((v, k) => v <= frame.high[k] + slack);
-    if (holds && wanted.radius > FILLS * frame.radius) return;
-  }
-  stage.frame = wanted;
+  if (!stage.reframe(extent(), 1e-3, SLACK, FILLS)) return;
+  const { joint, target, obstacle } = content.head.colours;
   drawFloor();
-  drawObstacles();
-  drawLines();
-  drawWorkspace();
-  drawTargets();
+  drawTask(groups, content.head, stage.frame, { obstacle, target, axes: ["x", "y", "z"].map((axis) => joint[axis]) });
+  empty(groups.targets);
+  for (const place of content.targets) groups.targets.add(ball(place, ballSize(), materials.missed));
   stage.look();
 }
 
@@ -178,43 +153,6 @@ function drawFloor() {
   groups.floor.add(...parts);
   const where = isSeen ? "the axes are at the world's origin" : "the axes are at the grid's corner, not at the world's origin";
   $("arm-note").textContent = `Grid of ${number(cell)} m; ${where}; z is up. Drag to rotate; use the wheel or two fingers to zoom, and the arrow keys to step through the targets.`;
-}
-
-function drawObstacles() {
-  empty(groups.obstacles);
-  for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, stage.frame, materials.obstacle));
-}
-
-// Draws the lines of the cycle, and tool and payload at the targets.
-function drawLines() {
-  empty(groups.lines);
-  for (const body of content.head.bodies) groups.lines.add(...solidParts(body, stage.frame, materials.comparedMotor));
-  const points = content.head.lines.flat(2);
-  if (points.length) groups.lines.add(segments(points, new THREE.LineBasicMaterial({ color: content.head.colours.target })));
-}
-
-// Draws the edges of the boxes to cover.
-function drawWorkspace() {
-  empty(groups.workspace);
-  const points = content.head.workspace.flatMap(({ low, high }) => boxEdges(low, high));
-  if (points.length) groups.workspace.add(segments(points, new THREE.LineBasicMaterial({ color: colour("soft") })));
-}
-
-function drawTargets() {
-  empty(groups.targets);
-  for (const target of content.targets) groups.targets.add(ball(target, ballSize(), materials.missed));
-  empty(groups.goals);
-  content.targets.forEach(drawGoal);
-}
-
-// Draws the required tool direction: an arrow along z, and for a full orientation also along x and y.
-function drawGoal(target, t) {
-  const { n_angular, rotation } = content.head, size = ARROW * stage.frame.radius;
-  if (!n_angular[t]) return;
-  for (const k of n_angular[t] === 3 ? [0, 1, 2] : [2]) {
-    const way = rotation[t].map((row) => row[k]), long = k === 2 ? size : 0.6 * size;
-    groups.goals.add(...arrow(target, way, long, 0.006 * stage.frame.radius, n_angular[t] === 3 ? materials.joints[k] : materials.missed));
-  }
 }
 
 const ballSize = () => 0.028 * stage.frame.radius;

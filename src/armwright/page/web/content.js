@@ -8,7 +8,7 @@ const OF_ARM = ["base", "up", "tip", "tool_axis", "tool_side", "column_half"];
 const OF_JOINTS = ["motion", "lower", "upper", "offset", "radius", "body_shape", "body_half", "body_centre"];
 
 // A JSON head, and arrays that are views of the bytes (see page/content.py, pack).
-export function unpack(buffer) {
+function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const arrays = {};
@@ -78,14 +78,12 @@ export class Content {
   }
 
   // The joint types in order, such as "PYR".
-  joints(i) {
-    return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
-  }
+  joints(i) { return this.chosen(i, "joint").join(""); }
 
   // The value of a parameter; undefined if it is not active.
   param(i, name) { return this.params(i).find((p) => p.name === name)?.value; }
 
-  // The choices of KIND_1, KIND_2, … in order; KIND is "motor", "tube" or "direction".
+  // The choices of KIND_1, KIND_2, … in order; KIND is "joint", "motor", "tube" or "direction".
   chosen(i, kind) {
     return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
   }

@@ -2,7 +2,7 @@
 
 import { set } from "./state.js";
 import { axis, marker, onClick, plot } from "./plot.js";
-import { $, colour, element, number, onTheme, percent, plain } from "./format.js";
+import { $, colour, dot, element, number, onTheme, percent, plain } from "./format.js";
 
 let content = null;
 
@@ -76,8 +76,6 @@ function gains() {
   const whole = curve.at(-1) || 1;
   $("gains").replaceChildren(...[...gained].map(([source, sum]) => {
     const look = content.head.looks[source];
-    const dot = element("span", { class: "dot" });
-    dot.style.background = look.colour;
-    return element("span", {}, dot, `${look.label}: ${number(sum, 3)} (${percent(sum / whole, 0)})`);
+    return element("span", {}, dot(look.colour), `${look.label}: ${number(sum, 3)} (${percent(sum / whole, 0)})`);
   }));
 }

@@ -2,7 +2,7 @@
 
 import { FIXED, angleOff, chain, distance, length, linkLength } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
-import { $, element, metres, millimetres, number, quantity, save } from "./format.js";
+import { $, element, markRows, metres, millimetres, number, quantity, save } from "./format.js";
 
 const AT_LIMIT = 1e-3; // rad or m
 const ONLY_FRONT = "Torques are stated of the designs of the front";
@@ -17,7 +17,7 @@ export function openDesign(shownContent, fetched) {
   content = shownContent;
   fetchFile = fetched;
   for (const button of document.querySelectorAll(".download")) {
-    button.addEventListener("click", () => download(button.dataset.format));
+    button.addEventListener("click", () => downloadOf(state.design, button.dataset.format));
   }
   listen((changed) => {
     if (changed.has("design")) drawDesign();
@@ -180,16 +180,12 @@ function describeIdle(i, posed) {
 }
 
 function mark() {
-  for (const row of $("postures").querySelectorAll("tbody tr")) {
-    const isChosen = Number(row.dataset.target) === state.target;
-    row.classList.toggle("chosen", isChosen);
-    row.setAttribute("aria-current", isChosen);
-    if (isChosen) showRow(row);
-  }
+  showRow(markRows($("postures").querySelectorAll("tbody tr"), "target", state.target));
 }
 
-// Scrolls a table's own box, never the page.
+// Scrolls a table's own box to a row, if there is one, never the page.
 export function showRow(row) {
+  if (row === null) return;
   const box = row.closest(".scroll"), head = box.querySelector("thead").offsetHeight;
   const foot = box.querySelector("tfoot")?.offsetHeight ?? 0, end = row.offsetTop + row.offsetHeight + foot;
   if (row.offsetTop - head < box.scrollTop) box.scrollTop = row.offsetTop - head;
@@ -198,8 +194,6 @@ export function showRow(row) {
 
 // Whether a server writes what this page does not hold.
 export const hasServer = () => fetchFile !== null;
-
-const download = (format) => downloadOf(state.design, format);
 
 // Saves a design as a file.
 export async function downloadOf(i, format) {

@@ -1,7 +1,7 @@
 // Existing arms beside the recommended designs: what an arm that can be bought does better, and what worse.
 
 import { listen, set, state } from "./state.js";
-import { $, element, plural, quantity, why } from "./format.js";
+import { $, element, markRows, plural, quantity, why } from "./format.js";
 
 const MORE = ["reach", "payload_at_full_reach", "payload_capacity"]; // of which more is better
 
@@ -85,5 +85,5 @@ export function describeDominance({ violated, values }) {
 }
 
 function mark() {
-  for (const row of $("existing").querySelectorAll("tr[data-design]")) row.classList.toggle("chosen", Number(row.dataset.design) === state.design);
+  markRows($("existing").querySelectorAll("tr[data-design]"), "design", state.design);
 }

@@ -13,6 +13,25 @@ export function element(tag, attributes = {}, ...children) {
   return made;
 }
 
+// A coloured dot, as in legends.
+export function dot(paint) {
+  const made = element("span", { class: "dot" });
+  made.style.background = paint;
+  return made;
+}
+
+// Marks the rows of the chosen design or target, by the number in their data attribute; returns the row that is.
+export function markRows(rows, name, chosen) {
+  let found = null;
+  for (const row of rows) {
+    const isChosen = Number(row.dataset[name]) === chosen;
+    row.classList.toggle("chosen", isChosen);
+    row.setAttribute("aria-current", isChosen);
+    if (isChosen) found = row;
+  }
+  return found;
+}
+
 export function number(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (Math.abs(value) < 1e-12) return "0";

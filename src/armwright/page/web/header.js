@@ -1,7 +1,7 @@
 // The title of the run, its key figures and its configuration.
 
 import { isForEngineers } from "./recommended.js";
-import { $, duration, element, number, percent, plural } from "./format.js";
+import { $, dot, duration, element, number, percent, plural } from "./format.js";
 
 let content = null;
 
@@ -16,11 +16,7 @@ export function openHeader(shownContent) {
   drawHeader();
 }
 
-function fact(name, value, paint) {
-  const item = element("li", {}, paint ? element("span", { class: "dot" }) : null, `${name} `, element("b", {}, value));
-  if (paint) item.querySelector(".dot").style.background = paint;
-  return item;
-}
+const fact = (name, value, paint) => element("li", {}, paint ? dot(paint) : null, `${name} `, element("b", {}, value));
 
 export function drawHeader() {
   const { head } = content, { result } = head, facts = [], research = isForEngineers(head) ? [] : facts;

@@ -22,7 +22,7 @@ export function openLive(shownContent, taken) {
   openKey();
   $("live").hidden = false;
   $("loading").textContent = "The first designs are being evaluated …";
-  $("stop").addEventListener("click", () => send({ action: "stop" }));
+  $("stop").addEventListener("click", stop);
   follow();
   setInterval(show, 1000); // updates the elapsed seconds
 }
@@ -72,14 +72,12 @@ async function catchUp(latest) {
   take(news);
 }
 
-async function send(action) {
+async function stop() {
   try {
-    await post("control", action);
+    await post("control", { action: "stop" });
     complain("refusal", "");
-    return true;
   } catch (fault) {
     complain("refusal", fault.status ? `Refused: ${fault.message}` : "The request did not reach the server.");
-    return false;
   }
 }
 

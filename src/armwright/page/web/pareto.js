@@ -38,9 +38,7 @@ export function openPareto(shownContent) {
     set({ iteration: value >= Number($("iteration").max) ? null : value });
   });
   draw();
-  for (const id of ["ring-selected", "ring-compared"]) {
-    $("pareto").append(element("div", { class: "ring", id }));
-  }
+  for (const id of ["ring-selected", "ring-compared"]) $("pareto").append(element("div", { class: "ring", id }));
   $("ring-compared").style.borderColor = content.head.colours.target;
   mark();
   for (const event of ["plotly_relayout", "plotly_relayouting", "plotly_afterplot"]) $("pareto").on(event, mark);
@@ -89,7 +87,7 @@ const until = () => (state.iteration === null ? content.n : content.nInit + stat
 const placed = (value, axis) => (log && axis === 0 ? Math.max(value, floor) : value);
 
 // Returns the feasible designs among the first n that are non-dominated in the shown objectives, by rising x.
-export function frontUntil(n) {
+function frontUntil(n) {
   const order = [...Array(n).keys()].sort((a, b) => {
     const [u, v] = [content.values(a), content.values(b)];
     return u[x] - v[x] || u[y] - v[y] || a - b;
@@ -110,14 +108,8 @@ function slider() {
   const list = [...new Set(marks)];
   if (list.join() === $("marks").dataset.list) return; // keeps the focus of a button
   $("marks").dataset.list = list.join();
-  $("marks").replaceChildren(...list.map((mark) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = mark;
-    button.title = `After ${mark} iterations`;
-    button.addEventListener("click", () => set({ iteration: mark >= counted() ? null : mark }));
-    return button;
-  }));
+  $("marks").replaceChildren(...list.map((mark) => element("button",
+    { type: "button", title: `After ${mark} iterations`, onclick: () => set({ iteration: mark >= counted() ? null : mark }) }, String(mark))));
 }
 
 function draw() {

@@ -14,9 +14,8 @@ let names = [];
 
 export function openPick(shownContent) {
   content = shownContent;
-  names = [...content.objectives.map((o) => o.name), ...new Set(content.head.front.flatMap((i) => Object.keys(content.head.arms[i]))),
-    ...content.head.parameters.filter((p) => !p.choices).map((p) => p.name)];
-  names = [...new Set(names)];
+  names = [...new Set([...content.objectives.map((o) => o.name), ...content.head.front.flatMap((i) => Object.keys(content.head.arms[i])),
+    ...content.head.parameters.filter((p) => !p.choices).map((p) => p.name)])];
   $("pick-by").append(new Option("the knee", KNEE), ...names.map((name) => new Option(`least ${name}`, name)));
   $("pick-where").placeholder = `such as ${content.objectives[0].name}<=0.05, length<1`;
   $("pick").addEventListener("submit", (event) => {

@@ -3,7 +3,7 @@
 import { snapshot } from "./arm.js";
 import { downloadOf, hasServer } from "./design.js";
 import { listen, set, state } from "./state.js";
-import { $, element, millimetres, onTheme, plural, quantity, why } from "./format.js";
+import { $, element, markRows, millimetres, onTheme, plural, quantity, why } from "./format.js";
 
 const ROLES = {
   knee: "Best compromise", safe: "Safe", "least price": "Cheapest", "least deflection": "Stiffest", "least cycle time": "Fastest", "least mass": "Lightest",
@@ -103,5 +103,5 @@ function drawPictures() {
 }
 
 function mark() {
-  for (const one of $("recommended").querySelectorAll(".card")) one.classList.toggle("chosen", Number(one.dataset.design) === state.design);
+  markRows($("recommended").querySelectorAll(".card"), "design", state.design);
 }

@@ -1,8 +1,28 @@
 // A 3D view: its light, its camera, which fits a frame and can be turned, and the groups of its parts.
 
+import { $, element } from "./format.js";
+
 const MARGIN = 1.05; // distance of the camera, as a multiple of that at which the sphere around the frame just fits
 
-export class Stage {
+// Returns an open view in a box, in which `draw` draws again after a reset; null without 3D graphics, as a note then says.
+export function openStage(box, names, view, draw, otherwise, prepare = () => {}) {
+  try {
+    const stage = new Stage(box, names, view);
+    prepare(stage.canvas);
+    stage.open();
+    $("reset").addEventListener("click", () => {
+      Object.assign(stage, { frame: null, turned: false });
+      draw();
+    });
+    return stage;
+  } catch {
+    box.replaceChildren(element("p", { class: "note" }, `This browser shows no 3D graphics (WebGL). ${otherwise}`));
+    $("reset").disabled = true;
+    return null;
+  }
+}
+
+class Stage {
   // names: of the groups; view: the initial direction of the camera. Throws without WebGL.
   constructor(box, names, view) {
     this.box = box;
@@ -60,13 +80,22 @@ export class Stage {
     this.render();
   }
 
+  // Fits the frame to points unless it holds them with a slack, and they fill this share of it; returns whether it has.
+  reframe(points, least, slack, share) {
+    const { frame } = this, wanted = frameOf(points, least), more = slack * (frame?.radius ?? 0);
+    const holds = frame !== null && wanted.low.every((v, k) => v >= frame.low[k] - more) && wanted.high.every((v, k) => v <= frame.high[k] + more);
+    if (holds && wanted.radius > share * frame.radius) return false;
+    this.frame = wanted;
+    return true;
+  }
+
   render() {
     this.renderer.render(this.scene, this.camera);
   }
 }
 
 // The frame of points: { low, high, centre, radius }.
-export function frameOf(points, least) {
+function frameOf(points, least) {
   const low = [0, 1, 2].map((k) => points.reduce((lowest, p) => Math.min(lowest, p[k]), Infinity));
   const high = [0, 1, 2].map((k) => points.reduce((highest, p) => Math.max(highest, p[k]), -Infinity));
   const radius = Math.max(least, Math.hypot(...high.map((v, k) => v - low[k])) / 2);

@@ -2,7 +2,7 @@
 
 import { showRow } from "./design.js";
 import { listen, set, state } from "./state.js";
-import { $, element, heading, metres, number, plural } from "./format.js";
+import { $, element, heading, markRows, metres, number, plural } from "./format.js";
 
 let content = null;
 let sorted = { key: "0", up: true };
@@ -108,10 +108,5 @@ function step(event) {
 }
 
 function mark() {
-  for (const row of $("table").querySelectorAll("tbody tr")) {
-    const chosen = Number(row.dataset.design) === state.design;
-    row.classList.toggle("chosen", chosen);
-    row.setAttribute("aria-current", chosen);
-    if (chosen) showRow(row);
-  }
+  showRow(markRows($("table").querySelectorAll("tbody tr"), "design", state.design));
 }
