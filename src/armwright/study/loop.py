@@ -17,7 +17,6 @@ from armwright.runs.folder import RunFolder
 from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
 from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory
-from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
 from armwright.study.overlapping_schedule import OverlappingSchedule
@@ -313,4 +312,4 @@ class Study:
         """Return the errors of the surrogate's predictions; None with another sampler."""
         if not isinstance(self._sampler, SurrogateFactory):
             return None
-        return left_out_errors(self._sampler.surrogate, history)
+        return self._sampler.surrogate.left_out_errors(history)

@@ -16,7 +16,6 @@ from armwright.exceptions import SettingsError
 from armwright.proof.results import read_summary
 from armwright.runs.history import BBO, RANDOM, History
 from armwright.search.samplers import SamplerFactory, sampler_for, sampler_name
-from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
 from armwright.spaces.optuna_distributions import distributions
 
@@ -67,7 +66,7 @@ def test_summary_and_terminal_state_the_errors_of_predictions(tmp_path: Path) ->
     run = aw.optimize(problem(), proposer="none", n_init=10, n_total=2, out=tmp_path)
     summary = read_summary(tmp_path)
     assert summary is not None
-    assert summary["surrogate"] == left_out_errors(Surrogate(problem()), run.history)
+    assert summary["surrogate"] == Surrogate(problem()).left_out_errors(run.history)
     output = io.StringIO()
     show_result(Console(file=output, width=200), run, [])
     assert f", span {summary['surrogate']['errors']['span']:.2g}\n" in output.getvalue()
@@ -87,16 +86,16 @@ def test_errors_tell_what_is_predictable_from_what_is_not() -> None:
     designs = problem().space.sample(40, 3)
     length = np.array([sum(design.links) for design in designs])
     noise = 2.0 + np.sin(1e4 * length)
-    found = left_out_errors(Surrogate(problem()), history_of(problem(), np.column_stack([noise, length])))
+    found = Surrogate(problem()).left_out_errors(history_of(problem(), np.column_stack([noise, length])))
     assert found is not None
     assert found["errors"]["span"] < 0.1
     assert found["errors"]["height"] > 0.8
 
 
 def test_constant_objective_and_few_designs_have_no_error() -> None:
-    assert left_out_errors(Surrogate(problem()), history_of(problem(), np.ones((9, 2)))) is None
+    assert Surrogate(problem()).left_out_errors(history_of(problem(), np.ones((9, 2)))) is None
     values = np.column_stack([np.full(12, 3.0), np.random.default_rng(8).uniform(1.0, 2.0, 12)])
-    found = left_out_errors(Surrogate(problem()), history_of(problem(), values))
+    found = Surrogate(problem()).left_out_errors(history_of(problem(), values))
     assert found is not None
     assert found["errors"]["height"] is None
 
