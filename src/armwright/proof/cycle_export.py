@@ -77,33 +77,19 @@ def modelled(arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row:
     """Return the model and the trajectory of an arm, which is row `row` of an evaluation; SettingsError without one."""
     trajectory = trajectory_of(arm, evaluation, row)
     peaks = np.abs(trajectory.tau).max(axis=0)
-    return CycleModel(task_model(arm, target_names, evaluation, row, peaks, name), trajectory)
-
-
-def task_model(
-    arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, peak_torques: Array, name: str
-) -> str:
-    """Return the MJCF of an arm, row `row` of an evaluation, in the surroundings in which it was evaluated.
-
-    peak_torques: (D,) largest torques of the moving joints [N m] or [N].
-    """
-    postures = evaluation.q[row][:, _moving(arm)]
-    return to_simulation_mjcf(arm, evaluation, target_names, postures, peak_torques, name)
+    return CycleModel(to_simulation_mjcf(arm, evaluation, target_names, evaluation.q[row], peaks, name), trajectory)
 
 
 def peak_torques(arm: Arm, evaluation: Evaluation, row: int) -> Array:
     """Return (D,) the largest torques of an arm's moving joints [N m] or [N]: along its cycle, else at its targets."""
-    at_targets = np.abs(evaluation.joint_torques[row][:, _moving(arm)]).max(axis=0)
+    moving = [joint for joint, one in enumerate(arm.joints) if one.kind != "fixed"]
+    at_targets = np.abs(evaluation.joint_torques[row][:, moving]).max(axis=0)
     if evaluation.plan is None:
         return at_targets
     try:
         return np.abs(trajectory_of(arm, evaluation, row).tau).max(axis=0)
     except SettingsError:  # a step of unknown duration
         return at_targets
-
-
-def _moving(arm: Arm) -> list[int]:
-    return [joint for joint, one in enumerate(arm.joints) if one.kind != "fixed"]
 
 
 def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:

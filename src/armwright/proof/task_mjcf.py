@@ -1,7 +1,8 @@
 """`aw.to_mjcf`: an arm as MJCF, alone or in a task."""
 
 from armwright.problem.evaluation import evaluate
-from armwright.proof.cycle_export import peak_torques, task_model
+from armwright.proof.cycle_export import peak_torques
+from armwright.proof.simulation_model import to_simulation_mjcf
 from armwright.robot import mjcf
 from armwright.robot.arm import Arm
 from armwright.spaces.tool_mount import carrying_tool
@@ -35,4 +36,5 @@ def to_mjcf(arm: Arm, task: Task | None = None, *, name: str = "arm") -> str:
         return mjcf.to_mjcf(arm, name)
     equipped = carrying_tool(arm, task.tool)
     evaluation = evaluate(equipped, task)
-    return task_model(equipped, task.target_names, evaluation, 0, peak_torques(equipped, evaluation, 0), name)
+    peaks = peak_torques(equipped, evaluation, 0)
+    return to_simulation_mjcf(equipped, evaluation, task.target_names, evaluation.q[0], peaks, name)
