@@ -30,7 +30,7 @@ from armwright.robot.arm import AXES, NO_INERTIA, Arm, Joint, Link, Vector
 from armwright.robot.link_inertia import point_inertia, tube_inertia
 from armwright.robot.motor_body import placed_body
 from armwright.spaces.design_columns import DesignColumns, Indices
-from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS, mounted_body
+from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS, SIGNS, WORLD_AXES, mounted_body
 from armwright.spaces.space_schema import SpaceSchema
 from armwright.spaces.supply_voltages import supplied, supplied_ratings, supply_voltages
 from armwright.spaces.tool_mount import mounted_tools
@@ -46,9 +46,6 @@ _PLANS = np.full(
 for _row, _module in zip(_PLANS, MODULES.values(), strict=True):
     for _slot, (_kind, _axis) in enumerate(_module.joints, start=2 - len(_module.joints)):
         _row[_slot] = _KINDS[_kind] + (0 if _kind == "fixed" else AXES.index(_axis))
-# (mounts, 3) the world axis that each local axis lies along, and 1 if it points the same way, else -1
-_WORLD_AXES = np.array([[AXES.index(world[1]) for world in row] for row in MOUNTS.values()])  # pyright: ignore[reportArgumentType]
-_SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row in MOUNTS.values()])
 _VECTORS = np.array(list(DIRECTIONS.values()))  # (directions, 3)
 _UPRIGHT = tuple(DIRECTIONS).index("+z")  # from the surface that the arm is mounted on to the first joint
 
@@ -142,7 +139,7 @@ class _Parts:
         own, mount = self._plan % PRISMATIC, self._columns.mount
         if not mount.any():
             return own, np.ones(own.shape)
-        return _WORLD_AXES[mount[:, None, None], own], _SIGNS[mount[:, None, None], own]
+        return WORLD_AXES[mount[:, None, None], own], SIGNS[mount[:, None, None], own]
 
     def _columns_below(self) -> Array:
         """Return the (N,) lengths of the columns below the bases [m]."""
@@ -261,7 +258,7 @@ class _Parts:
         for i, slot in np.argwhere(self._has[row]).tolist():
             here, motion = (row, i, slot), int(self._plan[row, i, slot])
             if motion == FIXED:
-                joints.append(Joint("fixed", AXES[int(_WORLD_AXES[self._columns.mount[row], AXES.index("z")])]))
+                joints.append(Joint("fixed", AXES[int(WORLD_AXES[self._columns.mount[row], AXES.index("z")])]))
                 continue
             actuator = None
             if self._motor is not None and self._volts is not None:
@@ -334,7 +331,7 @@ def _rotate(vectors: Array, mount: Indices) -> Array:
         return np.array(vectors)
     rotated = np.zeros(vectors.shape)
     for axis in range(3):
-        world, sign = _WORLD_AXES[mount, axis], _SIGNS[mount, axis]
+        world, sign = WORLD_AXES[mount, axis], SIGNS[mount, axis]
         np.put_along_axis(rotated, np.broadcast_to(world[:, None, None], (*vectors.shape[:2], 1)),
                           (sign[:, None] * vectors[..., axis])[..., None], axis=2)  # fmt: skip
     return rotated

@@ -101,7 +101,5 @@ def success_labels(failed: NDArray[np.bool_]) -> Array:
 
 
 def _fitted(name: str, inputs: Mapping[str, Array], values: Array, transform: Transform) -> ResponseModel:
-    observations = transform(values)
-    process = GaussianProcess(inputs[name], observations, fit(inputs[name], observations))
-    log_posterior = process.log_posterior + transform.log_slopes(values)
-    return ResponseModel(name, transform, process.hyperparameters, log_posterior)
+    hyperparameters, log_posterior = fit(inputs[name], transform(values))
+    return ResponseModel(name, transform, hyperparameters, log_posterior + transform.log_slopes(values))
