@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.spaces.design_parameters import conditional_parameters
+from armwright.spaces.design_parameters import named_parameters
 from armwright.spaces.joint_modules import MOUNTS
 from armwright.spaces.parameters import CategoricalParameter
 from armwright.spaces.space_schema import SpaceSchema
@@ -24,7 +24,7 @@ class DesignColumns:
 
     def __init__(self, space: SpaceSchema, matrix: Array) -> None:
         self.matrix = matrix
-        self._parameters = [entry.parameter for entry in conditional_parameters(space).values()]
+        self._parameters = list(named_parameters(space).values())
         self._column = {parameter.name: i for i, parameter in enumerate(self._parameters)}
         self.n, self.modules = len(matrix), space.max_joints
         self.present = np.ones((self.n, self.modules), dtype=bool)
