@@ -7,9 +7,10 @@ would repeat its first draws after a resume.
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import optuna
+from optuna.distributions import BaseDistribution, CategoricalDistribution, IntDistribution
 from optuna.exceptions import ExperimentalWarning
 from optuna.samplers import BaseSampler, GPSampler, NSGAIISampler, RandomSampler, TPESampler
 from optuna.storages import InMemoryStorage
@@ -27,7 +28,7 @@ from armwright.search.surrogate.sampler import SurrogateFactory, surrogate_sampl
 from armwright.seeding import SAMPLING, derived_seed
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.optuna_distributions import distributions
-from armwright.spaces.parameters import Design, FloatParameter, Parameter, ParameterValue
+from armwright.spaces.parameters import Design, ParameterValue
 
 SamplerFactory = Callable[[int], BaseSampler]
 
@@ -218,7 +219,7 @@ class BlackBox:
         for parameter in self._space.parameters:
             if not self._space.is_free(parameter.name, self._space.from_free_values(params).params):
                 continue
-            params[parameter.name] = _suggested(trial, parameter)
+            params[parameter.name] = _suggested(trial, parameter.name, self._distributions[parameter.name])
         return self._space.from_free_values(params)
 
     def _assign_generation(self, sampler: BaseSampler, trial: Trial) -> None:
@@ -228,14 +229,13 @@ class BlackBox:
             assign(self.study, self.study.get_trials(deepcopy=False)[trial.number])
 
 
-def _suggested(trial: Trial, parameter: Parameter) -> ParameterValue:
+def _suggested(trial: Trial, name: str, distribution: BaseDistribution) -> ParameterValue:
     """Return the value that a trial suggests for a parameter."""
-    if not isinstance(parameter, FloatParameter):
-        return trial.suggest_categorical(parameter.name, parameter.choices)
-    name, low, high = parameter.name, parameter.low, parameter.high
-    if parameter.integer:
-        return trial.suggest_int(name, round(low), round(high), step=round(parameter.step), log=parameter.log)
-    return trial.suggest_float(name, low, high, step=parameter.step or None, log=parameter.log)
+    if isinstance(distribution, CategoricalDistribution):
+        return trial.suggest_categorical(name, cast("tuple[str, ...]", distribution.choices))
+    low, high, step, log = (getattr(distribution, key) for key in ("low", "high", "step", "log"))
+    suggest = trial.suggest_int if isinstance(distribution, IntDistribution) else trial.suggest_float
+    return suggest(name, low, high, step=step, log=log)
 
 
 def _notes(attributes: Mapping[str, Any], constraints: Sequence[str]) -> dict[str, Any]:

@@ -80,7 +80,7 @@ class Study:
         self._first_of: dict[Design, int] = {}  # the first trial of each design
         for trial in self._record.trials:
             self._first_of.setdefault(trial.design, trial.number)
-        self._backend: LocalBackend | DaskBackend = LocalBackend(problem)
+        self._backend: LocalBackend | DaskBackend
         self._schedule = Schedule()
         self._pending: dict[int, PendingTrial] = {}  # by number; a trial is recorded when all before it are
 
@@ -97,8 +97,6 @@ class Study:
             is_deliberate = isinstance(end, (KeyboardInterrupt, StoppedError))
             self._channel.report("stopped", self._n_finished, None if is_deliberate else str(end) or type(end).__name__)
             raise
-        finally:
-            self._backend.close()
         self._channel.finish(self._n_finished)
         return result
 
@@ -109,9 +107,7 @@ class Study:
         if self._folder is not None:
             discard_results(self._folder.path)  # those of fewer trials
             self._record.config = self._folder.note_versions(self._record.config, self._problem.evaluator)
-        self._backend = self._new_backend()
-        self._schedule = self._new_schedule()
-        with closing(self._schedule):
+        with closing(self._new_backend()) as self._backend, closing(self._new_schedule()) as self._schedule:
             for number in range(first, self._method.n_trials):
                 self._wait_for_start(number)
                 self._start_trial(number)
