@@ -5,7 +5,7 @@ trajectory, interpolated between its rows. What damps is the friction of the joi
 torque that it passes on, or in braking of the torque before it, by the step before.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
@@ -221,8 +221,7 @@ def simulate_design(number: int, model_xml: str, trajectory: Trajectory, names: 
     driver = _Driver(model_xml, trajectory, names)
     found, alone = driver.run(), driver.run(feed_forward=False)
     targets = tuple(
-        Arrival(one.step, one.target, one.tip_error, one.angle_error, other.tip_error)
-        for one, other in zip(found.arrivals, alone.arrivals, strict=True)
+        replace(one, droop=other.tip_error) for one, other in zip(found.arrivals, alone.arrivals, strict=True)
     )
     saturated = (np.abs(found.tau) >= AT_LIMIT * driver.torque_limits).mean(axis=0)
     joints = tuple(

@@ -141,11 +141,6 @@ class _Parts:
             return own, np.ones(own.shape)
         return WORLD_AXES[mount[:, None, None], own], SIGNS[mount[:, None, None], own]
 
-    def _columns_below(self) -> Array:
-        """Return the (N,) lengths of the columns below the bases [m]."""
-        column = self._space.column
-        return np.zeros(self._columns.n) if column is None else column.lengths(self._columns.matrix[:, 2])
-
     def stacked(self, tool: Tool, precision: Precision) -> ArmArrays:
         """Return the arms, stacked."""
         space, columns = self._space, self._columns
@@ -154,7 +149,8 @@ class _Parts:
         links, com = self._bodies()
         motion = np.where(self._moves, self._plan // PRISMATIC * PRISMATIC + axis, FIXED)
         travel = self._at_joints(np.where(self._slides, space.travel, 1.0))
-        below, column = self._columns_below(), space.column
+        column, below = space.column, np.zeros(columns.n)  # (N,) length of the column [m]
+        below = below if column is None else column.lengths(columns.matrix[:, 2])
         prices = space.tube_values("price_per_metre")[columns.tubes] * columns.links
         return exact_arms(
             precision,

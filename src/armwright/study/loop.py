@@ -14,7 +14,7 @@ from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
-from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
+from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM
 from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory
 from armwright.search.surrogate.sampler import SurrogateFactory
@@ -299,13 +299,9 @@ class Study:
         if summary is None:
             verification = verify_front(history) if verify and folder is not None else None
             proposer = None if self._proposer is None else self._proposer.summary()
-            summary = summarize(history, config, proposer, verification, self._surrogate_errors(history))
+            sampler = self._sampler
+            errors = sampler.surrogate.left_out_errors(history) if isinstance(sampler, SurrogateFactory) else None
+            summary = summarize(history, config, proposer, verification, errors)
             if folder is not None:
                 write_results(folder, history, config, summary, verification)
         return StudyResult(history, config, summary, None if folder is None else folder.path, resumed)
-
-    def _surrogate_errors(self, history: History) -> dict[str, Any] | None:
-        """Return the errors of the surrogate's predictions; None with another sampler."""
-        if not isinstance(self._sampler, SurrogateFactory):
-            return None
-        return self._sampler.surrogate.left_out_errors(history)

@@ -67,6 +67,6 @@ def test_objective_of_a_custom_parameter_is_predicted_with_the_physics() -> None
     matrix, none = problem.space.matrix(designs), np.zeros(20, dtype=bool)
     surrogate = Surrogate(problem)
     screen = Screen(surrogate, Observations(matrix[:20], values[:20], none, matrix[:0]))
-    mean = screen.forecast(surrogate.describe(matrix[20:])).mean
+    mean = screen.forecast(surrogate.features.describe(matrix[20:])).mean
     for objective in range(2):
         assert np.corrcoef(np.log(values[20:, objective]), mean[:, objective])[0, 1] > 0.7

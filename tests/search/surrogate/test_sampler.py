@@ -168,7 +168,7 @@ def test_pending_design_gains_less() -> None:
     known, surrogate = observed(p, 12), Surrogate(problem())
     best = surrogate.choose(known, 0)[None]
     waiting = Observations(known.matrix, known.values, known.failed, best)
-    before, after = (Screen(surrogate, k).gain(surrogate.describe(best))[0] for k in (known, waiting))
+    before, after = (Screen(surrogate, k).gain(surrogate.features.describe(best))[0] for k in (known, waiting))
     assert 0.0 < after < before
 
 

@@ -37,7 +37,8 @@ def study_prompt(
         [_record(trial, parameters, objectives) for trial in group]
         for group in _sample(complete, best_trials(complete, study.directions), seed, ranked=len(objectives) == 1)
     )
-    under_way = [_params(given_params(trial), parameters) for trial in trials if _is_proposal_under_way(trial)]
+    unfinished = [trial for trial in trials if not trial.state.is_finished()]
+    under_way = [_params(given_params(trial), parameters) for trial in unfinished if "proposal" in trial.user_attrs]
     values = {
         "description": description.strip(),
         "parameters": parameters,
@@ -97,7 +98,3 @@ def _record(
 
 def _params(params: Mapping[str, Any], parameters: Sequence[Parameter]) -> str:
     return ", ".join(f"{p.key} = {value_text(params[p.name], p.distribution)}" for p in parameters if p.name in params)
-
-
-def _is_proposal_under_way(trial: FrozenTrial) -> bool:
-    return "proposal" in trial.user_attrs and not trial.state.is_finished()

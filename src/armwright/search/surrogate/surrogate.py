@@ -65,7 +65,7 @@ class Surrogate:
 
     def __post_init__(self) -> None:
         """Prepare inputs and sources of candidates."""
-        self._features = CheapFeatures(self.problem, self.function)
+        self.features = CheapFeatures(self.problem, self.function)
         self._candidates = Candidates(self.problem)
 
     def choose(self, observations: Observations, seed: int) -> Array:
@@ -84,7 +84,7 @@ class Surrogate:
         space, rng = self.problem.space, np.random.default_rng(seed)
         matrix = space.normalised(space.matrix(space.sample(RANDOM, seed)))
         matrix = np.vstack([matrix, self._mutants(observations, ~observations.failed, rng)])
-        known, success = self._features.describe(matrix), self.success(observations)
+        known, success = self.features.describe(matrix), self.success(observations)
         violation = total_violation(known.violations)
         probability = np.ones(len(matrix)) if success is None else success.probability(known.inputs)
         return matrix[int(np.lexsort((-probability, violation))[0])]
@@ -95,7 +95,7 @@ class Surrogate:
         matrix, known = self._screened(observations)
         mutants = self._mutants(observations, screen.feasible, rng)
         if len(mutants):
-            matrix, known = np.vstack([matrix, mutants]), known + self._features.describe(mutants)
+            matrix, known = np.vstack([matrix, mutants]), known + self.features.describe(mutants)
         return matrix, known
 
     def rejection(self, observations: Observations, row: Array, seed: int) -> tuple[float, tuple[float, ...]] | None:
@@ -135,17 +135,13 @@ class Surrogate:
         }
         return {"designs": len(trials), "errors": errors}
 
-    def describe(self, matrix: Array) -> Description:
-        """Return the description of designs (N, P)."""
-        return self._features.describe(matrix)
-
     def describe_known(self, matrix: Array) -> Description:
         """Return the description of evaluated or pending designs (N, P), each of which is computed once and alone."""
         found: list[Description] = []
         for row in matrix:
             key = row.tobytes()
             if key not in self._known:
-                self._known[key] = self._features.describe(row[None])
+                self._known[key] = self.features.describe(row[None])
             found.append(self._known[key])
         inputs = {name: np.vstack([one.inputs[name] for one in found]) for name in found[0].inputs}
         return Description(inputs, np.vstack([one.violations for one in found]))
@@ -204,7 +200,7 @@ class Surrogate:
 
         def screened() -> tuple[Array, Description]:
             matrix = self._candidates.screened(derived_seed(first, n // REFRESH))
-            return matrix, self._features.describe(matrix)
+            return matrix, self.features.describe(matrix)
 
         return self._remembered("screened", (first, n // REFRESH), screened)
 
