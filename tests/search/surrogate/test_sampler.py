@@ -122,8 +122,8 @@ def longest_link(design: aw.Design) -> list[float]:
 def test_custom_features_are_inputs() -> None:
     designs = problem().space.sample(6, 0)
     matrix = problem().space.matrix(designs)
-    found = Surrogate(problem(), longest_link).describe(matrix).inputs["physics"]
-    assert found.shape[1] == Surrogate(problem()).describe(matrix).inputs["physics"].shape[1] + 1
+    found = Surrogate(problem(), longest_link).features.describe(matrix).inputs["physics"]
+    assert found.shape[1] == Surrogate(problem()).features.describe(matrix).inputs["physics"].shape[1] + 1
     assert np.corrcoef(found[:, -1], [max(design.links) for design in designs])[0, 1] == pytest.approx(1.0)
 
 
@@ -144,14 +144,14 @@ def test_features_with_another_sampler_are_refused(sampler: str | SamplerFactory
 @pytest.mark.parametrize("value", [[np.nan], [np.inf, 1.0], [[1.0]], "long", {"length": 1.0}, [1.0, [2.0]], [None]])
 def test_features_that_are_not_finite_numbers_are_refused(value: Any) -> None:
     with pytest.raises(SettingsError, match=r"features: expected (\d finite )?numbers.*, got"):
-        Surrogate(problem(), lambda design: value).describe(observed(problem(), 2).matrix)
+        Surrogate(problem(), lambda design: value).features.describe(observed(problem(), 2).matrix)
 
 
 def test_features_of_varying_length_are_refused() -> None:
     p = problem(aw.load_space("desk-sorting"))
     matrix = p.space.matrix(p.space.sample(20, 0))
     with pytest.raises(SettingsError, match=r"expected \d finite numbers for every design"):
-        Surrogate(p, lambda design: design.links).describe(matrix)
+        Surrogate(p, lambda design: design.links).features.describe(matrix)
 
 
 @pytest.mark.parametrize("pending", [0, 3])
