@@ -85,10 +85,7 @@ SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row in
 MOUNT_DESCRIPTIONS: Mapping[Mount, str] = {
     "floor": "stands on a floor, local z up",
     "ceiling": "hangs from a ceiling, local z down",
-    "wall+x": "on a wall, local z along world +x",
-    "wall-x": "on a wall, local z along world -x",
-    "wall+y": "on a wall, local z along world +y",
-    "wall-y": "on a wall, local z along world -y",
+    **{mount: f"on a wall, local z along world {up}" for mount, (_, _, up) in MOUNTS.items() if up[1] != "z"},
 }
 
 
