@@ -13,7 +13,7 @@ from armwright.spaces.column import ColumnKeys
 from armwright.spaces.custom_parameters import MAX_CUSTOM, Custom, check_names
 from armwright.spaces.field_types import Choices, Ordered, Pairs
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
-from armwright.spaces.link_mass import Length, MassModel, MassPerMetre
+from armwright.spaces.link_mass import Length, MassModel, MassPerMetre, link_mass
 from armwright.spaces.link_section import LinkSection
 from armwright.spaces.parameters import Design, Range
 
@@ -198,7 +198,7 @@ class SpaceSchema(
     def link_mass(self, length: Length, tube: Any = 0) -> Length:
         """Return the mass of links or rails [kg], from their lengths [m] and the indices of their tubes."""
         if self.link_section.material is None:
-            return (self.mass or MassPerMetre()).mass(length)
+            return link_mass(self.mass or MassPerMetre(), length)
         return self.tube_values("mass_per_metre")[tube] * length
 
     @property
@@ -216,7 +216,9 @@ class SpaceSchema(
         """The mass of the links in a few words."""
         if self.link_section.material is not None:
             return self.link_section.description
-        return (self.mass or MassPerMetre()).description
+        model = self.mass or MassPerMetre()
+        each = "per metre of link" if model.kind == "per_metre" else "for each link, whatever its length"
+        return f"{model.kg:g} kg {each}"
 
     def tube_values(self, name: str) -> Any:
         """Return a (K,) value of `LinkTube` for each of the K tubes; NaN where it is None."""
