@@ -1,5 +1,6 @@
 """The task: points that the tip of the arm should reach, and which way it should point there."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any, Self, cast
 
@@ -138,11 +139,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
                 f"workspace: expected at most {MAX_POSES} points x directions in all boxes together, got {n_poses}; "
                 "try fewer points"
             )
-        seen: set[str] = set()
-        for name in filter(None, self._names):
-            if name in seen:
-                raise ValueError(f'targets: two are named "{name}"; give each its own name')
-            seen.add(name)
+        repeated = [name for name, count in Counter(filter(None, self._names)).items() if count > 1]
+        if repeated:
+            raise ValueError(f'targets: two are named "{repeated[0]}"; give each its own name')
         allowed_depths(self._records, self.target_arrays, self.obstacles, {})  # raises for unknown names
         if self.cycle is not None:
             _check_obstacles(self.plan(self.target_positions), self.obstacles)
