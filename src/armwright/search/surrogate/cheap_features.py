@@ -121,14 +121,15 @@ class CheapFeatures:
         return columns, violations
 
     def _values(self, matrix: Array) -> tuple[Array, Array]:
-        """Return all quantities of designs, the dynamic ones last, and their violations (N, C)."""
+        """Return all quantities of designs, the dynamic ones last, and their violations (N, C) in the worst case."""
         tables: list[Array] = []
         violations = np.empty((len(matrix), len(self._problem.constraints)))
         for rows in self._problem.chunks(len(matrix)):
             evaluation = self._problem.physics(matrix[rows])
             physics = [quantity(evaluation) for quantity in self._quantities]
             tables.append(np.column_stack([*physics, *dynamic_quantities(evaluation).values()]))
-            violations[rows] = self._worst_violations(matrix[rows], evaluation)
+            others = (self._problem.physics(matrix[rows], case) for case in range(1, len(self._problem.scenes)))
+            violations[rows] = np.max([self._problem.violations(one) for one in (evaluation, *others)], axis=0)
         return np.concatenate(tables), violations
 
     def _features(self, matrix: Array) -> Array:
@@ -136,14 +137,6 @@ class CheapFeatures:
         if self._function is None:
             return np.empty((len(matrix), 0))
         return _checked_features(self._function, self._problem.space.designs(matrix))
-
-    def _worst_violations(self, matrix: Array, evaluation: Evaluation) -> Array:
-        """Return the (N, C) violations of designs in the worst case of the task."""
-        problem = self._problem
-        cases = [problem.violations(evaluation)]
-        for case in range(1, len(problem.scenes)):
-            cases.append(problem.violations(problem.physics(matrix, case)))
-        return np.max(cases, axis=0)
 
     def _parameters(self, matrix: Array) -> Array:
         """Return (N, R) the parameters of designs: real ones on the unit cube, choices as indicators."""
