@@ -20,6 +20,7 @@ from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
+from armwright.text import one_line
 
 # Settings that may differ when a run resumes. The objectives of the task are those of the run.
 MAY_DIFFER = {
@@ -28,6 +29,7 @@ MAY_DIFFER = {
     "earlier_versions": True,
     "reference_point": True,
 }
+SHOWN = 80  # characters of a setting in a message; custom prompts are long
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
 
 
@@ -181,7 +183,7 @@ def check_same_run(path: Path, stored: RunConfig, requested: RunConfig) -> None:
     """Raise RunConflictError if `requested` differs from the stored run; a larger n_total is allowed."""
     old, new = _identity(stored), _identity(requested)
     differences = [
-        f"{key}: {_brief(old.get(key))} stored, {_brief(new.get(key))} requested"
+        f"{key}: {one_line(str(old.get(key)), SHOWN)} stored, {one_line(str(new.get(key)), SHOWN)} requested"
         for key in {**old, **new}
         if old.get(key) != new.get(key)
     ]
@@ -193,12 +195,6 @@ def check_same_run(path: Path, stored: RunConfig, requested: RunConfig) -> None:
             f"{path} holds a run with other settings ({'; '.join(differences)}). "
             "Give another --out DIR, or the same settings"
         )
-
-
-def _brief(value: Any) -> str:
-    """Return a setting on one short line; custom prompts are long."""
-    text = " ".join(str(value).split())
-    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _identity(config: RunConfig) -> dict[str, Any]:
