@@ -40,11 +40,11 @@ def page(rows: list[dict[str, str]]) -> str:
     return f"""\
 # The benchmark suite
 
-After reading this page you can place a search method of your own next to the usual ones on
+Place a search method of your own next to the usual ones on
 {len(suite_tasks())} tasks.
 
-Each task has its points, a reference point and the best known front. `armwright tasks NAME` shows everything about one
-task, including its points and their source. `random-N` is one of a seeded family.
+Each task has its points, a reference point and the best known front. `armwright tasks NAME` shows one
+task, its points and their source. `random-N` is one of a seeded family.
 
 The table gives the hypervolume within the task's reference point over {runs} runs (seeds 0 to {runs - 1}) of 10 random
 and 200 counted trials in the paper's design space. "Final" is the mean share of the best known hypervolume at the end.

@@ -14,8 +14,10 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import check_simulation
+import mujoco
 import numpy as np
 from motor_clearance import motor_clearance
 
@@ -24,7 +26,7 @@ from armwright.arrays import Array
 from armwright.proof.cycle_export import MODEL
 from armwright.proof.recommendation import recommend
 from armwright.proof.simulated_run import SimulatedMember, Simulator
-from armwright.proof.simulation import PASS, read_limits
+from armwright.proof.simulation import PASS
 
 BUILT_IN = ("desk-sorting", "box-palletising", "lathe-tending", "screwing", "casting-inspection", "dispensing")
 EXAMPLES = ("2-assembly", "3-long-shelf", "4-wall-painting", "5-obstacle-reach", "6-price", "7-compare-arms")
@@ -155,8 +157,8 @@ def jumps(member: SimulatedMember) -> bool:
 def deviations(member: SimulatedMember) -> Array:
     """Return (D,) by how much simulated and claimed peaks differ, relative to the claim or a tenth of the limit."""
     peaks = np.array([(joint.peak_torque, joint.claimed_peak_torque) for joint in member.result.joints])
-    torque = read_limits(member.files[MODEL]).torque
-    limit = np.where(np.isfinite(torque), torque, 0.0)
+    model: Any = mujoco.MjModel.from_xml_string(member.files[MODEL])  # pyright: ignore
+    limit = np.where(model.jnt_actfrclimited.astype(bool), model.jnt_actfrcrange[:, 1], 0.0)
     return np.abs(peaks[:, 0] - peaks[:, 1]) / np.maximum(peaks[:, 1], FLOOR * limit)
 
 

@@ -9,7 +9,7 @@ from armwright.problem.problem import Problem
 from armwright.search.front.front_search import FrontSearch
 from armwright.search.front.screening import Screen, pays
 from armwright.search.front.variation import offspring
-from armwright.spaces.design_parameters import conditional_parameters
+from armwright.spaces.design_parameters import named_parameters
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import CategoricalParameter
 from armwright.study.front.direct_search import SHORT, SHORT_FIRST_BATCH
@@ -53,7 +53,7 @@ def by_number(space: DesignSpace) -> Iterator[tuple[str, DesignSpace]]:
 
 def by_sequence(space: DesignSpace) -> Iterator[tuple[str, DesignSpace]]:
     """The arms of each joint sequence."""
-    parameters = {name: entry.parameter for name, entry in conditional_parameters(space).items()}
+    parameters = named_parameters(space)
     for number in range(space.min_joints, space.max_joints + 1):
         joints = [parameters[f"joint_{j}"] for j in range(1, number + 1)]
         for types in itertools.product(*(p.choices for p in joints if isinstance(p, CategoricalParameter))):

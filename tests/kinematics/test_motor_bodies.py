@@ -228,7 +228,7 @@ def touching_solids(arm: Arm, q: Array, obstacles: tuple[Obstacle, ...] = ()) ->
     """For each of (T, J) postures the names of the solids that touch each other in the exported simulation."""
     moves = [joint.kind != "fixed" for joint in arm.joints]
     scene = Scene(np.zeros((1, 3)), np.zeros(1), position_targets(1), obstacles)
-    text = to_simulation_mjcf(arm, scene, ("one",), np.zeros((1, sum(moves))), np.ones(sum(moves)))
+    text = to_simulation_mjcf(arm, scene, ("one",), np.zeros((1, len(moves))), np.ones(sum(moves)))
     model = mujoco.MjModel.from_xml_string(text)
     data, found = mujoco.MjData(model), []
     for row in q:

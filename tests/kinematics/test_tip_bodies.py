@@ -51,7 +51,7 @@ class ExportedTip:
         rules = TipRules(np.ones(1, dtype=np.bool_), np.empty((1, 0)), tip_solids(tool, LOAD))
         scene = Scene(np.zeros((1, 3)), np.ones(1), position_targets(1), tuple(obstacles), tip_rules=rules)
         n = sum(self._moves)
-        text = to_simulation_mjcf(arm, scene, ("one",), np.zeros((1, n)), np.ones(n))
+        text = to_simulation_mjcf(arm, scene, ("one",), np.zeros((1, len(arm.joints))), np.ones(n))
         self.model = mujoco.MjModel.from_xml_string(text)
         self._data = mujoco.MjData(self.model)
         excluded = ElementTree.fromstring(text).findall("contact/exclude")

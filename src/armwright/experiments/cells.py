@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -73,9 +73,11 @@ def plan_cells(
     for seed, (task, task_name), key in itertools.product(chosen_seeds, found, chosen_methods):
         if seed not in plan.seeds_of(key):
             continue
+        method, task_folder = plan.methods[key], out.resolve() / RUNS / key / task_name / f"seed{seed}"
+        replay, reason = _model_source(method, task_name, seed, folder)
         cell = Cell(
             method=key,
-            plan=plan.methods[key],
+            plan=method,
             task=task,
             task_name=task_name,
             space=space,
@@ -83,9 +85,11 @@ def plan_cells(
             n_init=plan.n_init,
             n_total=plan.n_total,
             robust=plan.robust,
-            folder=out.resolve() / RUNS / key / task_name / f"seed{seed}",
+            folder=task_folder,
+            replay=replay,
+            reason=reason,
         )
-        cells.append(_with_model_source(cell, folder))
+        cells.append(cell)
     return [cell for cell in cells if not cell.reason], [cell for cell in cells if cell.reason]
 
 
@@ -100,18 +104,16 @@ def _chosen(what: str, chosen: Sequence[T], available: Sequence[T], experiment: 
     return [one for one in available if one in chosen] if chosen else available
 
 
-def _with_model_source(cell: Cell, folder: Path) -> Cell:
-    """Return the cell with its recording, if it replays one, or with the reason why it has no answers of a model."""
-    recording = cell.plan.recording(cell.task_name, cell.seed)
-    if recording is not None:
-        if recording not in shipped_recordings():
-            recording = str((folder / recording).resolve())
-            if not Path(recording).exists():
-                return replace(cell, reason=f"there is no {cell.plan.proposer.removeprefix('replay:')}")
-        return replace(cell, replay=recording)
-    if cell.plan.needs_a_model and cell.plan.model_options.model is None:
-        return replace(cell, reason="no language model is configured; name one by --model")
-    return cell
+def _model_source(plan: MethodPlan, task: str, seed: int, folder: Path) -> tuple[str | None, str]:
+    """Return the recording that a method replays, if it does, and the reason why it has no answers of a model."""
+    if plan.needs_a_model and plan.model_options.model is None:
+        return None, "no language model is configured; name one by --model"
+    recording = plan.recording(task, seed)
+    if recording is not None and recording not in shipped_recordings():
+        recording = str((folder / recording).resolve())
+        if not Path(recording).exists():
+            return None, f"there is no {plan.proposer.removeprefix('replay:')}"
+    return recording, ""
 
 
 def _task(name: str, folder: Path) -> tuple[str, str]:

@@ -31,7 +31,7 @@ def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
         for key, by_task in plan.published.items()
         for task, numbers in by_task.items()
     }
-    baseline = plan.methods[plan.baseline_key].label
+    baseline = plan.methods[plan.baseline or next(iter(plan.methods))].label
     return Comparison(records, labels, tasks, baseline, against, published, plan.published_in)
 
 

@@ -136,11 +136,6 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         return suite_tasks() if self.tasks == ALL_TASKS else tuple(self.tasks)
 
     @property
-    def baseline_key(self) -> str:
-        """Key of the method that the others are compared with; by default the first one."""
-        return self.baseline or next(iter(self.methods))
-
-    @property
     def drawn(self) -> tuple[dict[str, tuple[str, list[str]]], list[str]]:
         """Title and methods of each figure, and the samples; all methods by their labels."""
         labels = {key: method.label for key, method in self.methods.items()}

@@ -25,5 +25,5 @@ def find_runs(folders: Iterable[Path]) -> list[Path]:
 def read_finished_runs(folders: Iterable[str | Path]) -> tuple[list[RunSummary], list[Path]]:
     """Return the finished runs in these folders and below them, and the folders of unfinished runs."""
     runs = list(dict.fromkeys(find_runs(map(Path, folders))))
-    finished = [run for run in runs if read_summary(run) is not None]
-    return [read_run_summary(run) for run in finished], [run for run in runs if run not in finished]
+    unfinished = [run for run in runs if read_summary(run) is None]
+    return [read_run_summary(run) for run in runs if run not in unfinished], unfinished

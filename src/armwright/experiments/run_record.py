@@ -1,7 +1,7 @@
 """A finished run, read from its summary."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -55,14 +55,10 @@ class RunSummary:
     @cached_property
     def gained(self) -> Mapping[str, float]:
         """Share of the final hypervolume that each source's trials added when they were evaluated."""
-        if self._has_own_reference_point:
-            gained = {
-                source: attribution["hypervolume_gained"] or 0.0
-                for source, attribution in self.summary["attribution"].items()
-            }
-        else:
-            attributions = attribution_by_source(self.history())
-            gained = {source: attribution.hypervolume_gained or 0.0 for source, attribution in attributions.items()}
+        attributions: Mapping[str, Any] = self.summary["attribution"]
+        if not self._has_own_reference_point:
+            attributions = {source: asdict(one) for source, one in attribution_by_source(self.history()).items()}
+        gained = {source: one["hypervolume_gained"] or 0.0 for source, one in attributions.items()}
         total = sum(gained.values())
         return {source: share / total for source, share in gained.items()} if total else dict.fromkeys(gained, 0.0)
 

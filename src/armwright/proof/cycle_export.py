@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arms.arm_arrays import FIXED, carrying, stack_arms
 from armwright.kinematics.cycle.motion_path import MotionPath
@@ -38,8 +37,6 @@ class CycleModel:
 
 def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, name: str) -> Mapping[str, str]:
     """Return the files of an arm, row `row` of an evaluation, by name; none without a cycle of known durations."""
-    if evaluation.plan is None:
-        return {}
     try:
         model = modelled(arm, problem.task.target_names, evaluation, row, name)
     except SettingsError:
@@ -77,33 +74,7 @@ def modelled(arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row:
     """Return the model and the trajectory of an arm, which is row `row` of an evaluation; SettingsError without one."""
     trajectory = trajectory_of(arm, evaluation, row)
     peaks = np.abs(trajectory.tau).max(axis=0)
-    return CycleModel(task_model(arm, target_names, evaluation, row, peaks, name), trajectory)
-
-
-def task_model(
-    arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, peak_torques: Array, name: str
-) -> str:
-    """Return the MJCF of an arm, row `row` of an evaluation, in the surroundings in which it was evaluated.
-
-    peak_torques: (D,) largest torques of the moving joints [N m] or [N].
-    """
-    postures = evaluation.q[row][:, _moving(arm)]
-    return to_simulation_mjcf(arm, evaluation, target_names, postures, peak_torques, name)
-
-
-def peak_torques(arm: Arm, evaluation: Evaluation, row: int) -> Array:
-    """Return (D,) the largest torques of an arm's moving joints [N m] or [N]: along its cycle, else at its targets."""
-    at_targets = np.abs(evaluation.joint_torques[row][:, _moving(arm)]).max(axis=0)
-    if evaluation.plan is None:
-        return at_targets
-    try:
-        return np.abs(trajectory_of(arm, evaluation, row).tau).max(axis=0)
-    except SettingsError:  # a step of unknown duration
-        return at_targets
-
-
-def _moving(arm: Arm) -> list[int]:
-    return [joint for joint, one in enumerate(arm.joints) if one.kind != "fixed"]
+    return CycleModel(to_simulation_mjcf(arm, evaluation, target_names, evaluation.q[row], peaks, name), trajectory)
 
 
 def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:

@@ -5,11 +5,13 @@ from pathlib import Path
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.proof.selection import pick
+from armwright.robot.arm import Arm
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.ros2_control import to_ros2_control
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
-from armwright.runs.history import FrontMember, History
+
+FORMATS: dict[str, Callable[[Arm, str], str]] = {"urdf": to_urdf, "mjcf": to_mjcf, "ros2_control": to_ros2_control}
 
 
 def export_design(run: Path, number: int | None, kind: str) -> str:
@@ -18,15 +20,4 @@ def export_design(run: Path, number: int | None, kind: str) -> str:
         raise SettingsError(f'unknown format "{kind}".{did_you_mean(kind, FORMATS)} Formats: {", ".join(FORMATS)}')
     _, history = read_run(run)
     member = pick(history)[0] if number is None else history.member(number)
-    return FORMATS[kind](history, member)
-
-
-def _name(history: History, member: FrontMember) -> str:
-    return f"{history.problem.task.name}-{member.number}"
-
-
-FORMATS: dict[str, Callable[[History, FrontMember], str]] = {
-    "urdf": lambda history, member: to_urdf(member.arm, _name(history, member)),
-    "mjcf": lambda history, member: to_mjcf(member.arm, _name(history, member)),
-    "ros2_control": lambda history, member: to_ros2_control(member.arm, _name(history, member)),
-}
+    return FORMATS[kind](member.arm, f"{history.problem.task.name}-{member.number}")

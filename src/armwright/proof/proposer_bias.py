@@ -49,10 +49,10 @@ def source_bias(history: History, source: str, planes: Array) -> SourceBias | No
     on_plane = [distance_to_planes(np.array(design.origin), points, planes) <= TOLERANCE for design in designs]
     equal = [joint == after for design in designs for joint, after in pairwise(design.joints)]
     return SourceBias(
-        lengths_5_cm=_share([are_round(design.links, 0.05) for design in designs]),
-        lengths_1_cm=_share([are_round(design.links, 0.01) for design in designs]),
-        base_on_symmetry_plane=_share(on_plane) if len(planes) else None,
-        equal_neighbours=_share(equal) if equal else None,
+        lengths_5_cm=float(np.mean([are_round(design.links, 0.05) for design in designs])),
+        lengths_1_cm=float(np.mean([are_round(design.links, 0.01) for design in designs])),
+        base_on_symmetry_plane=float(np.mean(on_plane)) if len(planes) else None,
+        equal_neighbours=float(np.mean(equal)) if equal else None,
     )
 
 
@@ -60,7 +60,3 @@ def are_round(lengths: Sequence[float], step: float) -> bool:
     """Return whether all `lengths` are multiples of `step` [m], within 1e-9 m."""
     values = np.array(lengths)
     return bool(np.all(np.abs(values - step * np.round(values / step)) <= EXACT))
-
-
-def _share(found: Sequence[bool]) -> float:
-    return float(np.mean(found))

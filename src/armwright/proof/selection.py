@@ -73,7 +73,8 @@ def pick(
         raise FailureError(describe_infeasibility(history))
     asked = [*(condition.name for condition in where), *([] if by is None else [by])]
     quantities = quantities_of_front(history, asked, facts)
-    units = _units(history)
+    reals = (p for p in history.problem.space.parameters if isinstance(p, FloatParameter))
+    units = {one.name: one.unit for one in (*QUANTITIES.values(), *reals, *history.problem.objectives)}
     where = [condition.in_unit(units[condition.name]) for condition in where]
     left = [
         member
@@ -152,12 +153,6 @@ def _value(name: str, facts: Facts) -> float:
         known = [other for other, fact in facts.items() if fact.value is not None and other in QUANTITIES]
         raise SettingsError(f"{name} is not known: {facts[name].reason}; known: {', '.join(known)}")
     return value
-
-
-def _units(history: History) -> dict[str, str]:
-    """Return the unit of each quantity by name."""
-    reals = (p for p in history.problem.space.parameters if isinstance(p, FloatParameter))
-    return {one.name: one.unit for one in (*QUANTITIES.values(), *reals, *history.problem.objectives)}
 
 
 def _check_name(name: str, known: Sequence[str]) -> None:

@@ -5,7 +5,7 @@ trajectory, interpolated between its rows. What damps is the friction of the joi
 torque that it passes on, or in braking of the torque before it, by the step before.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
@@ -89,37 +89,43 @@ def mujoco_version() -> str:
     return str(import_module("mujoco").__version__)
 
 
-def drive(model_xml: str, trajectory: Trajectory, target_names: tuple[str, ...], feed_forward: bool = True) -> Drive:
-    """Drive a model of `to_simulation_mjcf` through a trajectory; without feed-forward, by its servos alone."""
-    return _Driver(model_xml, trajectory, target_names, feed_forward).run()
-
-
 class _Driver:
-    """A model, its state and what is recorded."""
+    """A model of `to_simulation_mjcf`, its state and what is recorded."""
 
-    def __init__(self, model_xml: str, trajectory: Trajectory, names: tuple[str, ...], feed_forward: bool) -> None:
+    def __init__(self, model_xml: str, trajectory: Trajectory, names: tuple[str, ...]) -> None:
         self._mujoco: Any = import_module("mujoco")
         self._model = self._mujoco.MjModel.from_xml_string(model_xml)
         self._data = self._mujoco.MjData(self._model)
-        self._trajectory, self._names, self._feed_forward = trajectory, names, feed_forward
+        self._trajectory, self._names = trajectory, names
         self._n = trajectory.q.shape[1]
         self._payload = self._model.body("payload").id
         self._full = float(self._model.body_mass[self._payload]), self._model.body_inertia[self._payload].copy()
         self._tip = self._model.site("tip").id
         self._contacts: dict[tuple[str, str], Contact] = {}
+        self.joints = [str(self._model.joint(i).name) for i in range(self._model.njnt)]
+        is_limited = self._model.jnt_actfrclimited.astype(bool)
+        self.torque_limits = np.where(is_limited, self._model.jnt_actfrcrange[:, 1], np.inf)  # (D,) [N m] or [N]
         self._coulomb, user = self._model.dof_frictionloss.copy(), self._model.jnt_user
         self._gear = user[:, 0] if user.shape[1] else np.zeros(self._n)  # share of friction
         geoms = (str(self._model.geom(i).name) for i in range(self._model.ngeom))
         self._obstacles = {name: o for o, name in enumerate(filter(lambda name: name.startswith("obstacle_"), geoms))}
 
-    def run(self) -> Drive:
-        """Drive the whole cycle."""
+    def tolerance(self, target: str) -> tuple[float, float]:
+        """Return the tolerance of a target's position [m] and angle [rad]."""
+        user = self._model.site(f"target_{target}").user
+        return float(user[0]), float(user[1])
+
+    def run(self, feed_forward: bool = True) -> Drive:
+        """Drive the whole cycle from its start; without feed-forward, by the servos alone."""
+        self._mujoco.mj_resetData(self._model, self._data)
+        self._contacts.clear()
         trajectory, data, model, n = self._trajectory, self._data, self._model, self._n
         rows = len(trajectory.time)
         tau, speed = np.empty((2, (rows - 1) * SUBSTEPS, n))
         arrivals: list[Arrival] = []
         data.qpos[:] = trajectory.q[0]
         servo, forward = self._commands()
+        forward *= feed_forward
         carried = np.nan
         at = 0
         for row in range(rows):
@@ -162,7 +168,7 @@ class _Driver:
         def between(values: Array) -> Array:
             return (values[:-1, None] + share * (values[1:] - values[:-1])[:, None]).reshape(-1, self._n)
 
-        return between(trajectory.q), self._feed_forward * between(trajectory.tau)
+        return between(trajectory.q), between(trajectory.tau)
 
     def _carry(self, mass: float) -> None:
         """Give the payload this mass, and in proportion its inertia; NOTHING for 0."""
@@ -210,40 +216,14 @@ def angle_between(first: Array, second: Array, n_angular: int) -> float:
     return float(np.arctan2(np.linalg.norm(vector), 0.5 * (np.trace(change) - 1.0)))
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What a model states: names and torque limits of its joints, tolerances of its targets [m], [rad]."""
-
-    joints: tuple[str, ...]  # names of the D joints
-    torque: Array  # (D,) limits [N m], or forces [N]; infinite without
-    tolerances: dict[str, tuple[float, float]]  # of the position [m] and the angle [rad], by target
-
-
-def read_limits(model_xml: str) -> Limits:
-    """Return what a model states."""
-    mujoco: Any = import_module("mujoco")
-    model = mujoco.MjModel.from_xml_string(model_xml)
-    limited = model.jnt_actfrclimited.astype(bool)
-    prefix, tolerances = "target_", dict[str, tuple[float, float]]()
-    for i in range(model.nsite):
-        site = model.site(i)
-        name = str(site.name)
-        if name.startswith(prefix):
-            tolerances[name.removeprefix(prefix)] = float(site.user[0]), float(site.user[1])
-    joints = tuple(str(model.joint(i).name) for i in range(model.njnt))
-    return Limits(joints, np.where(limited, model.jnt_actfrcrange[:, 1], np.inf), tolerances)
-
-
 def simulate_design(number: int, model_xml: str, trajectory: Trajectory, names: tuple[str, ...]) -> SimulatedDesign:
     """Drive a design with and without feed-forward, and return the verdict."""
-    limits = read_limits(model_xml)
-    found = drive(model_xml, trajectory, names)
-    alone = drive(model_xml, trajectory, names, feed_forward=False)
+    driver = _Driver(model_xml, trajectory, names)
+    found, alone = driver.run(), driver.run(feed_forward=False)
     targets = tuple(
-        Arrival(one.step, one.target, one.tip_error, one.angle_error, other.tip_error)
-        for one, other in zip(found.arrivals, alone.arrivals, strict=True)
+        replace(one, droop=other.tip_error) for one, other in zip(found.arrivals, alone.arrivals, strict=True)
     )
-    saturated = (np.abs(found.tau) >= AT_LIMIT * limits.torque).mean(axis=0)
+    saturated = (np.abs(found.tau) >= AT_LIMIT * driver.torque_limits).mean(axis=0)
     joints = tuple(
         JointLoad(
             joint=name,
@@ -254,9 +234,9 @@ def simulate_design(number: int, model_xml: str, trajectory: Trajectory, names: 
             peak_speed=float(np.abs(found.speed[:, i]).max()),
             saturated_fraction=float(saturated[i]),
         )
-        for i, name in enumerate(limits.joints)
+        for i, name in enumerate(driver.joints)
     )
-    reasons = _reasons(found, targets, joints, limits)
+    reasons = _reasons(found, targets, joints, driver)
     energy = float(np.maximum(found.tau * found.speed, 0.0).sum() * TIMESTEP)
     verdict = FAIL if reasons else PASS
     time = float(trajectory.time[-1])
@@ -264,12 +244,12 @@ def simulate_design(number: int, model_xml: str, trajectory: Trajectory, names: 
 
 
 def _reasons(
-    found: Drive, targets: tuple[Arrival, ...], joints: tuple[JointLoad, ...], limits: Limits
+    found: Drive, targets: tuple[Arrival, ...], joints: tuple[JointLoad, ...], driver: _Driver
 ) -> tuple[str, ...]:
     """Return why a design fails, the same rule as `benchmarks/check_simulation.py` applies."""
     reasons = [] if found.stable else ["the simulation became unstable"]
     for one in targets:
-        distance, angle = limits.tolerances[one.target]
+        distance, angle = driver.tolerance(one.target)
         if not one.tip_error < distance:
             reasons.append(
                 f"step {one.step}: the tip is {1e3 * one.tip_error:.3g} mm off target {one.target} "

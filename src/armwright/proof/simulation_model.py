@@ -69,7 +69,7 @@ def to_simulation_mjcf(
     tolerance of the position [m], of the angle [rad], and how many angles count (2: the z axis, 3: all). The keyframe
     NAME is the posture there.
 
-    postures: (T, D) values of the moving joints at the targets [rad] or [m].
+    postures: (T, J) values of the joints at the targets [rad] or [m].
     peak_torques: (D,) largest torques of the moving joints, for the gains of joints without actuators.
     """
     root = Element("mujoco", model=name)
@@ -103,7 +103,8 @@ def to_simulation_mjcf(
     _add_exclusions(root, arm, motor_names)
     _add_actuators(root, arm, peak_torques)
     frames = SubElement(root, "keyframe")
-    for target, q in zip(target_names, postures.tolist(), strict=True):
+    moving = [n - 1 for n, _ in moving_joints(arm)]
+    for target, q in zip(target_names, postures[:, moving].tolist(), strict=True):
         SubElement(frames, "key", name=target, qpos=numbers(q), ctrl=numbers([*q, *np.zeros(len(q))]))
     return to_xml(root)
 

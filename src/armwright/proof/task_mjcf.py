@@ -1,7 +1,11 @@
 """`aw.to_mjcf`: an arm as MJCF, alone or in a task."""
 
+import numpy as np
+
+from armwright.exceptions import SettingsError
 from armwright.problem.evaluation import evaluate
-from armwright.proof.cycle_export import peak_torques, task_model
+from armwright.proof.cycle_export import modelled
+from armwright.proof.simulation_model import to_simulation_mjcf
 from armwright.robot import mjcf
 from armwright.robot.arm import Arm
 from armwright.spaces.tool_mount import carrying_tool
@@ -35,4 +39,9 @@ def to_mjcf(arm: Arm, task: Task | None = None, *, name: str = "arm") -> str:
         return mjcf.to_mjcf(arm, name)
     equipped = carrying_tool(arm, task.tool)
     evaluation = evaluate(equipped, task)
-    return task_model(equipped, task.target_names, evaluation, 0, peak_torques(equipped, evaluation, 0), name)
+    try:
+        return modelled(equipped, task.target_names, evaluation, 0, name).mjcf
+    except SettingsError:  # no cycle, or a step of unknown duration
+        moving = [joint.kind != "fixed" for joint in equipped.joints]
+        peaks = np.abs(evaluation.joint_torques[0][:, moving]).max(axis=0)
+        return to_simulation_mjcf(equipped, evaluation, task.target_names, evaluation.q[0], peaks, name)

@@ -34,13 +34,10 @@ class ManualBackend(LlmBackend):
         """Stop waiting."""
         self._cancelled.set()
 
-    def files(self, number: int) -> tuple[Path, Path]:
-        """Return the paths of the question and the answer for trial `number`."""
-        return self.folder / f"{number:03d}-prompt.md", self.folder / f"{number:03d}-answer.md"
-
-    def is_answered(self, number: int) -> bool:
-        """Return whether there is an answer that has not been refused."""
-        return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
+    def files(self, number: int) -> tuple[Path, list[Path]]:
+        """Return the paths of the question for trial `number`, and of its possible answers."""
+        answers = [self.folder / f"{number:03d}-answer.{ending}" for ending in ENDINGS]
+        return self.folder / f"{number:03d}-prompt.md", answers
 
     def ask(
         self,
@@ -52,8 +49,7 @@ class ManualBackend(LlmBackend):
         """Return the answer; one that is refused is moved aside with the reason."""
         started = time.perf_counter()
         number = question.trial
-        prompt_file, _ = self.files(number)
-        answers = self._answers(number)
+        prompt_file, answers = self.files(number)
         self._ask(prompt_file, answers, question.prompt)
         while True:
             answer = next(filter(self._is_ready, answers), None)
@@ -67,9 +63,6 @@ class ManualBackend(LlmBackend):
                     continue  # another file may hold a valid answer
             if self._cancelled.wait(LOOK_EVERY):
                 raise CallError("cancelled", "waiting for the answer was cancelled", Reply())
-
-    def _answers(self, number: int) -> list[Path]:
-        return [self.folder / f"{number:03d}-answer.{ending}" for ending in ENDINGS]
 
     def _ask(self, file: Path, answers: Sequence[Path], prompt: str) -> None:
         if os.path.isfile(file):
@@ -132,7 +125,6 @@ class ManualProposer(PromptedProposer):
 
     def announce(self, number: int) -> str:
         """Name the files of the question and of its answer, until it is answered."""
-        question, answer = self.manual.files(number)
-        if self.manual.is_answered(number):
-            return ""
-        return f"{question} waits for your answer in {answer}"
+        question, answers = self.manual.files(number)
+        is_answered = any(file.is_file() and file.stat().st_size > 0 for file in answers)  # and not refused
+        return "" if is_answered else f"{question} waits for your answer in {answers[0]}"

@@ -8,7 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, Field, field_validator
+from pydantic import AfterValidator, BaseModel, Field
 
 from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import RunConflictError, RunFolderError
@@ -20,6 +20,7 @@ from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
+from armwright.text import one_line
 
 # Settings that may differ when a run resumes. The objectives of the task are those of the run.
 MAY_DIFFER = {
@@ -28,13 +29,23 @@ MAY_DIFFER = {
     "earlier_versions": True,
     "reference_point": True,
 }
+SHOWN = 80  # characters of a setting in a message; custom prompts are long
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
+
+
+def _check_proposer(settings: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Check the settings that a resumed run passes to its proposer."""
+    for key in ("name", "prompt", "memory", "answer") if "prompt" in (settings or {}) else ("name",):
+        if settings is not None and not isinstance(settings.get(key), str):
+            raise ValueError(f"{key}: expected str, got {settings.get(key)!r}")
+    return settings
 
 
 class Method(BaseModel, frozen=True, extra="forbid"):
     """The search settings of a study."""
 
-    proposer: dict[str, Any] | None  # its name and settings; None for black-box trials only
+    # Its name and settings; None for black-box trials only
+    proposer: Annotated[dict[str, Any] | None, AfterValidator(_check_proposer)]
     sampler: str
     n_init: int = Field(ge=1)  # number of random trials
     n_step: int = Field(ge=1)  # trials of a block; one of each block is the proposer's
@@ -42,17 +53,6 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     in_flight: int | None = Field(default=None, ge=1)  # requests while black-box trials go on; None to wait for each
     initial_designs: tuple[dict[str, float | str], ...] = ()  # designs of the first of the n_init trials
     screen: bool = False  # whether the surrogate decides which proposals are evaluated
-
-    @field_validator("proposer")
-    @classmethod
-    def _check_proposer(cls, settings: dict[str, Any] | None) -> dict[str, Any] | None:
-        """Check the settings that a resumed run passes to its proposer."""
-        if settings is None:
-            return None
-        for key in ("name", "prompt", "memory", "answer") if "prompt" in settings else ("name",):
-            if not isinstance(settings.get(key), str):
-                raise ValueError(f"{key}: expected str, got {settings.get(key)!r}")
-        return settings
 
     @property
     def n_trials(self) -> int:
@@ -183,7 +183,7 @@ def check_same_run(path: Path, stored: RunConfig, requested: RunConfig) -> None:
     """Raise RunConflictError if `requested` differs from the stored run; a larger n_total is allowed."""
     old, new = _identity(stored), _identity(requested)
     differences = [
-        f"{key}: {_brief(old.get(key))} stored, {_brief(new.get(key))} requested"
+        f"{key}: {one_line(str(old.get(key)), SHOWN)} stored, {one_line(str(new.get(key)), SHOWN)} requested"
         for key in {**old, **new}
         if old.get(key) != new.get(key)
     ]
@@ -195,12 +195,6 @@ def check_same_run(path: Path, stored: RunConfig, requested: RunConfig) -> None:
             f"{path} holds a run with other settings ({'; '.join(differences)}). "
             "Give another --out DIR, or the same settings"
         )
-
-
-def _brief(value: Any) -> str:
-    """Return a setting on one short line; custom prompts are long."""
-    text = " ".join(str(value).split())
-    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _identity(config: RunConfig) -> dict[str, Any]:

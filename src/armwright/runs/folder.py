@@ -15,10 +15,9 @@ import os
 import re
 import sys
 from collections.abc import Iterable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from io import FileIO
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from filelock import BaseFileLock, FileLock, Timeout
@@ -49,7 +48,7 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._lock: BaseFileLock | None = None
+        self._held = ExitStack()  # the lock, and the file of the trials
         self._stat: os.stat_result | None = None
         self._trials: FileIO | None = None
 
@@ -58,9 +57,8 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
         check_no_links(self.path)
         with naming_write_errors(self.path / LOCK, KEPT):
-            self._lock = _private_lock(self.path / LOCK)
             try:
-                self._lock.acquire()
+                self._held.enter_context(_private_lock(self.path / LOCK))
             except Timeout as fault:
                 raise RunFolderError(
                     f"{self.path} is in use by another armwright process; wait for it, or give another --out DIR"
@@ -68,14 +66,8 @@ class RunFolder:
             self._stat = self.path.stat()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._trials is not None:
-            self._trials.close()
-            self._trials = None
-        if self._lock is not None:
-            self._lock.release()
+    def __exit__(self, *_: object) -> None:
+        self._held.close()
 
     def adopt(self, config: RunConfig) -> RunConfig:
         """Return the folder's configuration: `config` for a folder without trials, or for one whose run it extends.
@@ -127,7 +119,7 @@ class RunFolder:
         path = self.path / TRIALS
         trials, intact = read_trials(path, config)
         with naming_write_errors(path, KEPT):
-            self._trials = open_to_append(path)
+            self._trials = self._held.enter_context(open_to_append(path))
             if intact < self._trials.tell():  # otherwise the file keeps its modification time
                 self._trials.truncate(intact)
         return trials

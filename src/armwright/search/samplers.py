@@ -4,11 +4,13 @@ Each trial is drawn by a new sampler, seeded from (seed, trial number). One samp
 would repeat its first draws after a resume.
 """
 
+import threading
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import optuna
+from optuna.distributions import BaseDistribution, CategoricalDistribution, IntDistribution
 from optuna.exceptions import ExperimentalWarning
 from optuna.samplers import BaseSampler, GPSampler, NSGAIISampler, RandomSampler, TPESampler
 from optuna.storages import InMemoryStorage
@@ -25,8 +27,8 @@ from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.search.surrogate.sampler import SurrogateFactory, surrogate_sampler
 from armwright.seeding import SAMPLING, derived_seed
 from armwright.spaces.design_space import DesignSpace
-from armwright.spaces.optuna_distributions import distributions, quietly
-from armwright.spaces.parameters import Design, FloatParameter, Parameter, ParameterValue
+from armwright.spaces.optuna_distributions import distributions
+from armwright.spaces.parameters import Design, ParameterValue
 
 SamplerFactory = Callable[[int], BaseSampler]
 
@@ -38,6 +40,7 @@ SamplerFactory = Callable[[int], BaseSampler]
 #
 # Three seeds separate 10 from 50, but not from 5.
 POPULATION = 10
+_verbosity = threading.Lock()  # global to the process: two threads would restore each other's level
 FAILED = "evaluation failed"  # the constraint that failed trials violate by 1
 
 
@@ -133,20 +136,15 @@ class BlackBox:
         self._seed = seed
         self._distributions = distributions(space)
         self._storage = InMemoryStorage()
-        self._study = quiet_study(self._storage, [StudyDirection.MINIMIZE] * n_objectives)
-        self._study_id = self._storage.get_study_id_from_name(self._study.study_name)
+        self.study = quiet_study(self._storage, [StudyDirection.MINIMIZE] * n_objectives)
+        self._study_id = self._storage.get_study_id_from_name(self.study.study_name)
         self._study_notes = self._storage.get_study_system_attrs(self._study_id)
-
-    @property
-    def study(self) -> optuna.Study:
-        """Study of Optuna."""
-        return self._study
 
     def restore(self, trials: Iterable[FinishedTrial]) -> None:
         """Add the finished trials of a run that is resumed."""
         for trial in trials:
             params = self._space.free_values(trial.design)
-            self._study.add_trial(
+            self.study.add_trial(
                 create_trial(
                     params=params,
                     distributions={name: self._distributions[name] for name in params},
@@ -163,10 +161,10 @@ class BlackBox:
         """Return a trial with the sampler's next design, drawn uniformly if `source` is `random`."""
         seed = derived_seed(self._seed, SAMPLING, number)
         sampler = self._factory(seed)
-        self._study.sampler = RandomSampler(seed=seed) if source == RANDOM else sampler
+        self.study.sampler = RandomSampler(seed=seed) if source == RANDOM else sampler
         with warnings.catch_warnings():  # of infinite values, which failed trials have
             warnings.filterwarnings("ignore", "Clip non-finite values", UserWarning)
-            trial = self._study.ask()
+            trial = self.study.ask()
             design = self._suggest(trial)
         self._assign_generation(sampler, trial)
         return trial, design
@@ -179,9 +177,9 @@ class BlackBox:
         """
         # Optuna only warns of values out of range, and leaves a trial with an unknown category RUNNING for ever.
         checked = self._space.design(design.params)
-        sampler = self._study.sampler = self._factory(derived_seed(self._seed, SAMPLING, number))
-        self._study.enqueue_trial(self._space.free_values(checked))
-        trial = self._study.ask()
+        sampler = self.study.sampler = self._factory(derived_seed(self._seed, SAMPLING, number))
+        self.study.enqueue_trial(self._space.free_values(checked))
+        trial = self.study.ask()
         self._suggest(trial)
         self._assign_generation(sampler, trial)
         return trial, checked
@@ -190,7 +188,7 @@ class BlackBox:
         """Return the gain and the prediction of a design that the surrogate would not evaluate in trial `number`."""
         if not isinstance(self._factory, SurrogateFactory):
             return None
-        return self._factory(derived_seed(self._seed, SAMPLING, number)).rejection(self._study, design)
+        return self._factory(derived_seed(self._seed, SAMPLING, number)).rejection(self.study, design)
 
     def tell(
         self, trial: Trial, values: Iterable[float], violations: Iterable[float] = (), has_failed: bool = False
@@ -202,7 +200,7 @@ class BlackBox:
         """
         for name, violation in self._constraint_values(violations, has_failed).items():
             trial.set_constraint(name, violation)
-        finished = self._study.tell(trial, list(values))
+        finished = self.study.tell(trial, list(values))
         before, self._study_notes = self._study_notes, self._storage.get_study_system_attrs(self._study_id)
         notes = {
             "trial": _notes(finished.system_attrs, self._constraints),
@@ -221,24 +219,23 @@ class BlackBox:
         for parameter in self._space.parameters:
             if not self._space.is_free(parameter.name, self._space.from_free_values(params).params):
                 continue
-            params[parameter.name] = _suggested(trial, parameter)
+            params[parameter.name] = _suggested(trial, parameter.name, self._distributions[parameter.name])
         return self._space.from_free_values(params)
 
     def _assign_generation(self, sampler: BaseSampler, trial: Trial) -> None:
         """Assign a generation: genetic samplers ignore trials without one, and assign it only if they draw values."""
         assign = getattr(sampler, "get_trial_generation", None)
         if assign is not None:
-            assign(self._study, self._study.get_trials(deepcopy=False)[trial.number])
+            assign(self.study, self.study.get_trials(deepcopy=False)[trial.number])
 
 
-def _suggested(trial: Trial, parameter: Parameter) -> ParameterValue:
+def _suggested(trial: Trial, name: str, distribution: BaseDistribution) -> ParameterValue:
     """Return the value that a trial suggests for a parameter."""
-    if not isinstance(parameter, FloatParameter):
-        return trial.suggest_categorical(parameter.name, parameter.choices)
-    name, low, high = parameter.name, parameter.low, parameter.high
-    if parameter.integer:
-        return trial.suggest_int(name, round(low), round(high), step=round(parameter.step), log=parameter.log)
-    return trial.suggest_float(name, low, high, step=parameter.step or None, log=parameter.log)
+    if isinstance(distribution, CategoricalDistribution):
+        return trial.suggest_categorical(name, cast("tuple[str, ...]", distribution.choices))
+    low, high, step, log = (getattr(distribution, key) for key in ("low", "high", "step", "log"))
+    suggest = trial.suggest_int if isinstance(distribution, IntDistribution) else trial.suggest_float
+    return suggest(name, low, high, step=step, log=log)
 
 
 def _notes(attributes: Mapping[str, Any], constraints: Sequence[str]) -> dict[str, Any]:
@@ -248,6 +245,11 @@ def _notes(attributes: Mapping[str, Any], constraints: Sequence[str]) -> dict[st
 
 
 def quiet_study(storage: InMemoryStorage, directions: Sequence[StudyDirection]) -> optuna.Study:
-    """Create a study without Optuna's log message."""
-    with quietly():
-        return optuna.create_study(storage=storage, directions=directions)
+    """Create a study without Optuna's log message; the user's verbosity is restored afterwards."""
+    with _verbosity:
+        verbosity = optuna.logging.get_verbosity()
+        optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
+        try:
+            return optuna.create_study(storage=storage, directions=directions)
+        finally:
+            optuna.logging.set_verbosity(verbosity)

@@ -25,19 +25,17 @@ from armwright.kinematics.arms.arm_arrays import (
     stack_columns,
     stack_tools,
 )
-from armwright.kinematics.arms.motor_bodies import MotorBodies, bodies_in, body_values, without_bodies
+from armwright.kinematics.arms.motor_bodies import bodies_in, body_values, without_bodies
 from armwright.kinematics.arms.rigid_bodies import Bodies, Tools
 from armwright.robot.arm import AXES, NO_INERTIA, Arm, Joint, Link, Vector
 from armwright.robot.link_inertia import point_inertia, tube_inertia
 from armwright.robot.motor_body import placed_body
 from armwright.spaces.design_columns import DesignColumns, Indices
-from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS, mounted_body
+from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS, SIGNS, WORLD_AXES, mounted_body
 from armwright.spaces.space_schema import SpaceSchema
 from armwright.spaces.supply_voltages import supplied, supplied_ratings, supply_voltages
 from armwright.spaces.tool_mount import mounted_tools
 from armwright.tasks.tool import NO_TOOL, Tool
-
-Bools = NDArray[np.bool_]
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
@@ -49,9 +47,6 @@ _PLANS = np.full(
 for _row, _module in zip(_PLANS, MODULES.values(), strict=True):
     for _slot, (_kind, _axis) in enumerate(_module.joints, start=2 - len(_module.joints)):
         _row[_slot] = _KINDS[_kind] + (0 if _kind == "fixed" else AXES.index(_axis))
-# (mounts, 3) the world axis that each local axis lies along, and 1 if it points the same way, else -1
-_WORLD_AXES = np.array([[AXES.index(world[1]) for world in row] for row in MOUNTS.values()])  # pyright: ignore[reportArgumentType]
-_SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row in MOUNTS.values()])
 _VECTORS = np.array(list(DIRECTIONS.values()))  # (directions, 3)
 _UPRIGHT = tuple(DIRECTIONS).index("+z")  # from the surface that the arm is mounted on to the first joint
 
@@ -145,69 +140,62 @@ class _Parts:
         own, mount = self._plan % PRISMATIC, self._columns.mount
         if not mount.any():
             return own, np.ones(own.shape)
-        return _WORLD_AXES[mount[:, None, None], own], _SIGNS[mount[:, None, None], own]
-
-    def _columns_below(self) -> Array:
-        """Return the (N,) lengths of the columns below the bases [m]."""
-        column = self._space.column
-        return np.zeros(self._columns.n) if column is None else column.lengths(self._columns.matrix[:, 2])
+        return WORLD_AXES[mount[:, None, None], own], SIGNS[mount[:, None, None], own]
 
     def stacked(self, tool: Tool, precision: Precision) -> ArmArrays:
         """Return the arms, stacked."""
-        space, columns, n_slots = self._space, self._columns, self._plan.shape[2]
+        space, columns = self._space, self._columns
         axis, sign = self._world_axes()
         lower, upper = self._limits(sign)
-        bodies, com = self._bodies()
-        per_joint: dict[str, Any] = {
-            "motion": np.where(self._moves, self._plan // PRISMATIC * PRISMATIC + axis, FIXED),
-            "lower": lower,
-            "upper": upper,
-            "travel": np.where(self._slides, space.travel, 1.0),
-            "com": _in_last_slot(com, n_slots),
-            "total_mass": _in_last_slot(bodies.total_mass, n_slots),
-            "link_radius": _in_last_slot(self._of_links("radius", 0.0), n_slots),
-        }
-        for name in ("bending_stiffness", "torsional_stiffness"):
-            per_joint[name] = _in_last_slot(self._of_links(name, np.inf), n_slots, np.inf)
-        per_joint |= {f"body_{f.name}": _in_last_slot(getattr(bodies, f.name), n_slots) for f in fields(Bodies)}
-        if self._motor is not None:
-            assert self._volts is not None
-            ratings = np.repeat(supplied_ratings(space, self._motor, self._volts)[:, :, None], n_slots, axis=2)
-            ratings[~self._moves] = FIXED_RATINGS
-            per_joint["ratings"] = ratings
-        if space.has_motor_bodies:
-            per_joint |= {f"motor_{f.name}": self._motor_bodies[f.name] for f in fields(MotorBodies)}
-        present = _flatten(self._has)
-        flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
-        below, column = self._columns_below(), space.column
+        links, com = self._bodies()
+        motion = np.where(self._moves, self._plan // PRISMATIC * PRISMATIC + axis, FIXED)
+        travel = self._at_joints(np.where(self._slides, space.travel, 1.0))
+        column, below = space.column, np.zeros(columns.n)  # (N,) length of the column [m]
+        below = below if column is None else column.lengths(columns.matrix[:, 2])
         prices = space.tube_values("price_per_metre")[columns.tubes] * columns.links
         return exact_arms(
             precision,
             base=columns.matrix[:, :3],
-            motion=np.ascontiguousarray(flat["motion"], dtype=np.int32),
-            axis=MOTION_AXES[flat["motion"]],
-            lower=flat["lower"],
-            upper=flat["upper"],
-            offset=flat["body_offset"].copy(),
-            com=flat["com"],
-            mass=flat["total_mass"],
-            radius=flat["link_radius"],
-            bending_stiffness=flat["bending_stiffness"],
-            torsional_stiffness=flat["torsional_stiffness"],
+            motion=np.ascontiguousarray(self._at_joints(motion), dtype=np.int32),
+            axis=MOTION_AXES[self._at_joints(motion)],
+            lower=self._at_joints(lower),
+            upper=self._at_joints(upper),
+            offset=self._after_joints(links.offset),
+            com=self._after_joints(com),
+            mass=self._after_joints(links.total_mass),
+            radius=self._after_joints(self._of_links("radius", 0.0)),
+            bending_stiffness=self._after_joints(self._of_links("bending_stiffness", np.inf), np.inf),
+            torsional_stiffness=self._after_joints(self._of_links("torsional_stiffness", np.inf), np.inf),
             tool=_stacked_tools(tool)[columns.mount],
-            n_joints=present.sum(axis=1).astype(np.int32),
-            travel=flat["travel"],
+            n_joints=self._has.sum(axis=(1, 2)).astype(np.int32),
+            travel=travel,
             length=np.cumsum(columns.links, axis=1)[:, -1],
             base_mass=self._carried[:, 0] + (0.0 if column is None else column.mass_per_metre * below),
             structure_price=np.cumsum(prices, axis=1)[:, -1]
             + (0.0 if column is None else column.price_per_metre * below),
-            bodies=Bodies(**{f.name: flat[f"body_{f.name}"] for f in fields(Bodies)}),
-            actuation=self._actuation(flat),
-            motor_bodies=bodies_in({f.name: flat[f"motor_{f.name}"] for f in fields(MotorBodies)}, precision)
+            bodies=Bodies(*(self._after_joints(getattr(links, field.name)) for field in fields(Bodies))),
+            actuation=self._actuation(travel),
+            motor_bodies=bodies_in({k: self._at_joints(v) for k, v in self._motor_bodies.items()}, precision)
             if space.has_motor_bodies
             else None,
             columns=None if column is None else stack_columns(column.outer_diameter, below, precision),
         )
+
+    def _at_joints(self, values: Any) -> Any:
+        """Return values of slots (N, M, K, ...) as (N, D, ...), those of joints that an arm has first."""
+        n, modules, n_slots, *size = values.shape
+        flat = values.reshape(n, modules * n_slots, *size)
+        if self._has.all():
+            return flat
+        order = np.argsort(~self._has.reshape(n, -1), axis=1, kind="stable")
+        return flat[np.arange(n)[:, None], order]
+
+    def _after_joints(self, values: Array, fill: float = 0.0) -> Any:
+        """Return values of links (N, M, ...) at the last joints of their modules, (N, D, ...); `fill` at the others."""
+        n, modules, *size = values.shape
+        slots = np.full((n, modules, self._plan.shape[2], *size), fill)
+        slots[:, :, -1] = values
+        return self._at_joints(slots)
 
     def _of_links(self, name: str, without: float) -> Array:
         """Return the (N, M) values of links, from those of the tubes; `without` for links without length."""
@@ -222,13 +210,15 @@ class _Parts:
         section = np.where(self._columns.present, self._space.tube_values("section")[self._columns.tubes], 0.0)
         return Bodies(mass, self._middle, self._offset, section, end_mass, place, self._end_inertia), com
 
-    def _actuation(self, flat: dict[str, Any]) -> Actuation | None:
-        if self._motor is None:
+    def _actuation(self, travel: Array) -> Actuation | None:
+        if self._motor is None or self._volts is None:
             return None
+        each = supplied_ratings(self._space, self._motor, self._volts)[:, :, None]
+        ratings = np.where(self._moves[..., None], each, FIXED_RATINGS)
         count, prices = self._moves.sum(axis=2), _catalogue(self._space)[1]
         price = np.where(count > 0, count * prices[self._motor], 0.0).sum(axis=1)
         factor = np.full(self._columns.n, self._space.safety_factor)
-        return actuation_at_joints(flat["ratings"], flat["travel"], price, factor)
+        return actuation_at_joints(self._at_joints(ratings), travel, price, factor)
 
     def _carriers(self) -> Indices:
         """Return the (N, M) direction of the link before each module, or from the surface to the first joint."""
@@ -266,7 +256,7 @@ class _Parts:
         for i, slot in np.argwhere(self._has[row]).tolist():
             here, motion = (row, i, slot), int(self._plan[row, i, slot])
             if motion == FIXED:
-                joints.append(Joint("fixed", AXES[int(_WORLD_AXES[self._columns.mount[row], AXES.index("z")])]))
+                joints.append(Joint("fixed", AXES[int(WORLD_AXES[self._columns.mount[row], AXES.index("z")])]))
                 continue
             actuator = None
             if self._motor is not None and self._volts is not None:
@@ -339,32 +329,7 @@ def _rotate(vectors: Array, mount: Indices) -> Array:
         return np.array(vectors)
     rotated = np.zeros(vectors.shape)
     for axis in range(3):
-        world, sign = _WORLD_AXES[mount, axis], _SIGNS[mount, axis]
+        world, sign = WORLD_AXES[mount, axis], SIGNS[mount, axis]
         np.put_along_axis(rotated, np.broadcast_to(world[:, None, None], (*vectors.shape[:2], 1)),
                           (sign[:, None] * vectors[..., axis])[..., None], axis=2)  # fmt: skip
     return rotated
-
-
-def _in_last_slot(values: Array, n_slots: int, fill: float = 0.0) -> Array:
-    """Return values of modules (N, M, ...) in the last of K slots of each (N, M, K, ...); `fill` in the others."""
-    if n_slots == 1:
-        return values[:, :, None]
-    n, modules, *size = values.shape
-    slots = np.full((n, modules, n_slots, *size), fill)
-    slots[:, :, -1] = values
-    return slots
-
-
-def _flatten(values: Any) -> Any:
-    """Return (N, M, K, ...) as (N, M K, ...)."""
-    n, modules, n_slots, *size = values.shape
-    return values.reshape(n, modules * n_slots, *size)
-
-
-def _compact(arrays: dict[str, Any], present: Bools) -> dict[str, Any]:
-    """Move the joints (N, D, ...) that a design has to the front, in their order."""
-    if present.all():
-        return arrays
-    order = np.argsort(~present, axis=1, kind="stable")
-    rows = np.arange(len(present))[:, None]
-    return {name: values[rows, order] for name, values in arrays.items()}

@@ -43,7 +43,7 @@ class ColumnKeys(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     def under(self, height: float) -> Column | None:
         """Return the column below a base at this height [m]; None if the base is not above the foot."""
-        length = max(height - (self.foot or 0.0), 0.0)
+        length = float(self.lengths(np.array(height)))
         if length == 0.0:
             return None
         mass, price = self.mass_per_metre * length, self.price_per_metre * length

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, cast
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, PlainSerializer, ValidationError, model_validator
 
 from armwright.spaces.field_types import Ordered
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter, ParameterValue
@@ -78,7 +78,7 @@ class CustomParameter(
         return FloatParameter(name, low, high, self.unit, step, log=self.scale == "log", integer=self.integer)
 
 
-def read_custom(value: Any) -> Any:
+def _read(value: Any) -> Any:
     """Return a mapping's pairs of name and parameter, other values as they are; ValueError names a wrong entry."""
     if not isinstance(value, dict):
         return value
@@ -89,6 +89,13 @@ def read_custom(value: Any) -> Any:
         except ValidationError as fault:
             raise ValueError(f"{name}: {describe_fault(fault, CustomParameter, content)}") from fault
     return tuple(pairs)
+
+
+def _to_mapping(custom: Sequence[tuple[str, CustomParameter]]) -> dict[str, Any]:
+    return {name: entry.model_dump(mode="json", exclude_defaults=True) for name, entry in custom}
+
+
+Custom = Annotated[tuple[tuple[str, CustomParameter], ...], BeforeValidator(_read), PlainSerializer(_to_mapping)]
 
 
 def check_names(names: Iterable[str]) -> None:

@@ -4,8 +4,8 @@ A parameter of module j is inactive if the arm has fewer modules, or if its type
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 from armwright.exceptions import did_you_mean
@@ -16,7 +16,6 @@ from armwright.spaces.parameters import (
     CategoricalParameter,
     FloatParameter,
     Parameter,
-    ParameterValue,
     Range,
 )
 from armwright.spaces.space_schema import MAX_LENGTH, Restriction, SpaceSchema
@@ -24,57 +23,33 @@ from armwright.spaces.space_schema import MAX_LENGTH, Restriction, SpaceSchema
 GRID_KINDS = ("origin", "link", "stroke", "limit")
 
 
-@dataclass(frozen=True)
-class ConditionalParameter:
-    """A parameter and the condition under which it is active."""
-
-    parameter: Parameter
-    # The module, counted from 1, that the arm must have; None if the parameter is always active
-    module: int | None = None
-    types: frozenset[str] | None = None  # the types that this module may have; None for any
-
-    @property
-    def name(self) -> str:
-        """The name of the parameter."""
-        return self.parameter.name
-
-    def is_active(self, params: Mapping[str, ParameterValue], max_joints: int) -> bool:
-        """Return whether the parameter is active, given the values of the parameters before it."""
-        if self.module is None:
-            return True
-        if self.module > int(params.get("n_joints", max_joints)):
-            return False
-        return self.types is None or params.get(f"joint_{self.module}") in self.types
-
-
 # The cache is outside the model: a copy of a space with other ranges would inherit a cached property.
 @lru_cache(maxsize=64)
-def conditional_parameters(space: SpaceSchema) -> dict[str, ConditionalParameter]:
+def named_parameters(space: SpaceSchema) -> dict[str, Parameter]:
     """Return all parameters of a space by name, in their fixed order, restrictions and grids applied."""
     steps, restrictions = dict(space.grid), dict(space.restrict)
-    entries: dict[str, ConditionalParameter] = {}
-    for entry in _unrestricted(space):
-        parameter = entry.parameter
+    found: dict[str, Parameter] = {}
+    for parameter in _unrestricted(space):
         if parameter.name in restrictions:
             parameter = _restrict(parameter, restrictions[parameter.name])
         step = steps.get(parameter.name, steps.get(_kind(parameter.name), 0.0))
         if step > 0.0 and isinstance(parameter, FloatParameter):
             parameter = _on_grid(parameter, step)
-        entries[entry.name] = replace(entry, parameter=parameter)
-    return entries
+        found[parameter.name] = parameter
+    return found
 
 
-def _unrestricted(space: SpaceSchema) -> Iterator[ConditionalParameter]:
+def _unrestricted(space: SpaceSchema) -> Iterator[Parameter]:
     """Yield the parameters without restrictions and grids."""
     revolute = frozenset(letter for letter, module in MODULES.items() if module.is_revolute)
     prismatic = frozenset(letter for letter, module in MODULES.items() if module.is_prismatic)
     moving = revolute | prismatic
     for axis, limits in zip("xyz", (space.origin_x, space.origin_y, space.origin_z), strict=True):
-        yield ConditionalParameter(FloatParameter(f"origin_{axis}", *limits, "m"))
+        yield FloatParameter(f"origin_{axis}", *limits, "m")
     counts = tuple(str(n) for n in range(space.min_joints, space.max_joints + 1))
     for name, choices in (("mount", space.mount), ("n_joints", counts)):
         if len(choices) > 1:
-            yield ConditionalParameter(CategoricalParameter(name, choices))
+            yield CategoricalParameter(name, choices)
     yield from _per_module(space, "joint", _choice(space.joint_types))
     yield from _per_module(space, "link", _between(space.link, "m"))
     if len(space.link_directions) > 1:
@@ -82,7 +57,7 @@ def _unrestricted(space: SpaceSchema) -> Iterator[ConditionalParameter]:
     if len(space.tube_names) > 1 and space.link_section.per_link:
         yield from _per_module(space, "tube", _choice(space.tube_names))
     elif len(space.tube_names) > 1:
-        yield ConditionalParameter(CategoricalParameter("tube", space.tube_names))
+        yield CategoricalParameter("tube", space.tube_names)
     if len(space.actuators) > 1:
         yield from _per_module(space, "motor", _choice(tuple(record.name for record in space.actuators)), moving)
     if not isinstance(space.stroke, (int, float)):
@@ -91,7 +66,7 @@ def _unrestricted(space: SpaceSchema) -> Iterator[ConditionalParameter]:
         yield from _per_module(space, "limit", _between(space.limit, "rad"), revolute)
     for name, custom in space.custom:
         if custom.per is None:
-            yield ConditionalParameter(custom.parameter(name))
+            yield custom.parameter(name)
         else:
             yield from _per_module(
                 space, name, custom.parameter, None if moving.issuperset(space.joint_types) else moving
@@ -100,14 +75,14 @@ def _unrestricted(space: SpaceSchema) -> Iterator[ConditionalParameter]:
 
 def _per_module(
     space: SpaceSchema, kind: str, make: Callable[[str], Parameter], types: frozenset[str] | None = None
-) -> Iterator[ConditionalParameter]:
+) -> Iterator[Parameter]:
     """Yield `make("kind_j")` for each module j, unless no module may have it: active for these types, None for all."""
     used = None if types is None else types & set(space.joint_types)
     if used is not None and not used:
         return
     for j in range(1, space.max_joints + 1):
         is_always_active = j <= space.min_joints and (used is None or len(used) == len(space.joint_types))
-        yield ConditionalParameter(make(f"{kind}_{j}"), None if is_always_active else j, used)
+        yield replace(make(f"{kind}_{j}"), module=None if is_always_active else j, types=used)
 
 
 def _choice(choices: tuple[str, ...]) -> Callable[[str], Parameter]:
@@ -135,7 +110,7 @@ def _restrict(parameter: Parameter, to: Restriction) -> Parameter:
                 )
         if not values:
             raise ValueError(f"restrict: {parameter.name} has no choice left")
-        return CategoricalParameter(parameter.name, tuple(c for c in parameter.choices if c in values))
+        return replace(parameter, choices=tuple(c for c in parameter.choices if c in values))
     numbers = [float(value) for value in values if not isinstance(value, str)]
     if not 1 <= len(numbers) == len(values) <= 2:
         raise ValueError(f"restrict: {parameter.name} = {to!r} is neither a number nor a range [{parameter.unit}]")
@@ -158,7 +133,7 @@ def _on_grid(parameter: FloatParameter, step: float) -> FloatParameter:
 
 def check_parameters(space: SpaceSchema) -> None:
     """Raise ValueError for restrictions, grids and ties that do not fit the parameters."""
-    known = {entry.name: entry.parameter for entry in _unrestricted(space)}
+    known = {parameter.name: parameter for parameter in _unrestricted(space)}
     real = [parameter for parameter in known.values() if isinstance(parameter, FloatParameter)]
     kinds = [*GRID_KINDS, *(name for name, custom in space.custom if custom.per is not None)]
     _check_known("restrict", [name for name, _ in space.restrict], list(known))
@@ -183,12 +158,12 @@ def _check_known(key: str, names: Iterable[str], known: Sequence[str]) -> None:
 
 
 def _check_ties(space: SpaceSchema) -> None:
-    parameters, ties = conditional_parameters(space), dict(space.tie)
+    parameters, ties = named_parameters(space), dict(space.tie)
     for name, other in ties.items():
         if other in ties:
             raise ValueError(f"tie: {name} is tied to {other}, which is tied itself; tie both to a free parameter")
         tied, free = parameters[name], parameters[other]
-        if tied.parameter != replace(free.parameter, name=name):
+        if tied != replace(free, name=name, module=tied.module, types=tied.types):
             raise ValueError(f"tie: {name} and {other} have different ranges or choices")
         if free.types is not None or (free.module or 0) > (tied.module or 0):
             raise ValueError(f"tie: {other} may be inactive while {name} is active; reverse the tie")

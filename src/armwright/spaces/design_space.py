@@ -18,7 +18,7 @@ from armwright.exceptions import DesignError, SpaceError, did_you_mean
 from armwright.robot.arm import Arm
 from armwright.spaces.arm_builder import build_arm
 from armwright.spaces.custom_parameters import NUMBERED
-from armwright.spaces.design_parameters import ConditionalParameter, check_parameters, conditional_parameters
+from armwright.spaces.design_parameters import check_parameters, named_parameters
 from armwright.spaces.joint_modules import MODULES
 from armwright.spaces.parameters import CategoricalParameter, Design, FloatParameter, Parameter, ParameterValue
 from armwright.spaces.space_schema import SpaceSchema
@@ -44,7 +44,7 @@ class DesignSpace(SpaceSchema, frozen=True):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters in their fixed order: origin, joint types, link lengths, …; tied ones, too."""
-        return tuple(entry.parameter for entry in conditional_parameters(self).values())
+        return tuple(named_parameters(self).values())
 
     @property
     def max_reach(self) -> float:
@@ -76,14 +76,14 @@ class DesignSpace(SpaceSchema, frozen=True):
 
     def is_free(self, name: str, params: Mapping[str, ParameterValue]) -> bool:
         """Return whether a parameter is active and not tied, given the values of the parameters before it."""
-        return name not in dict(self.tie) and conditional_parameters(self)[name].is_active(params, self.max_joints)
+        return name not in dict(self.tie) and named_parameters(self)[name].is_active(params, self.max_joints)
 
     def condition(self, name: str) -> tuple[int, str] | None:
         """Return the module that a parameter requires and the types it may have; None if it is always active."""
-        entry = conditional_parameters(self)[name]
-        if entry.module is None:
+        parameter = named_parameters(self)[name]
+        if parameter.module is None:
             return None
-        return entry.module, "".join(self.joint_types if entry.types is None else sorted(entry.types))
+        return parameter.module, "".join(self.joint_types if parameter.types is None else sorted(parameter.types))
 
     def design(self, params: Mapping[str, Any]) -> Design:
         """Return the design with these values, in the order of the space.
@@ -91,7 +91,7 @@ class DesignSpace(SpaceSchema, frozen=True):
         Tied values may be missing. Values of inactive parameters are left out. Raises DesignError if a value is
         unknown, missing or outside its range.
         """
-        known = conditional_parameters(self)
+        known = named_parameters(self)
         for name in params:
             if name not in known:
                 raise DesignError(
@@ -100,11 +100,11 @@ class DesignSpace(SpaceSchema, frozen=True):
         given = self._with_ties(params)
         checked: dict[str, ParameterValue] = {}
         missing: list[str] = []
-        for name, entry in known.items():
-            if not entry.is_active(checked, self.max_joints):
+        for name, parameter in known.items():
+            if not parameter.is_active(checked, self.max_joints):
                 continue
             if name in given:
-                checked[name] = entry.parameter.check(given[name])
+                checked[name] = parameter.check(given[name])
             else:
                 missing.append(name)
         if missing:
@@ -121,7 +121,7 @@ class DesignSpace(SpaceSchema, frozen=True):
     def from_free_values(self, params: Mapping[str, ParameterValue]) -> Design:
         """Return the design with these free values."""
         given = self._with_ties(params)
-        return Design({name: given[name] for name in conditional_parameters(self) if name in given})
+        return Design({name: given[name] for name in named_parameters(self) if name in given})
 
     def _with_ties(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return the values with missing tied ones filled in."""
@@ -156,47 +156,40 @@ class DesignSpace(SpaceSchema, frozen=True):
 
     def designs(self, matrix: Array) -> list[Design]:
         """Return the designs of the (N, P) rows of a matrix."""
-        entries = conditional_parameters(self)
+        parameters = self.parameters
         designs: list[Design] = []
         for row in self.normalised(matrix).tolist():
             params: dict[str, ParameterValue] = {}
-            for (name, entry), number in zip(entries.items(), row, strict=True):
-                if entry.is_active(params, self.max_joints):
-                    params[name] = entry.parameter.decode(number)
+            for parameter, number in zip(parameters, row, strict=True):
+                if parameter.is_active(params, self.max_joints):
+                    params[parameter.name] = parameter.decode(number)
             designs.append(Design(params))
         return designs
 
     def normalised(self, matrix: Array) -> Array:
         """Return the (N, P) rows as `matrix` would: tied values equal, inactive parameters at their defaults."""
-        entries = conditional_parameters(self)
-        if not self.tie and all(entry.module is None for entry in entries.values()):
+        parameters = self.parameters
+        if not self.tie and all(parameter.module is None for parameter in parameters):
             return matrix
         rows = matrix.copy()
-        column = {name: i for i, name in enumerate(entries)}
+        column = {parameter.name: i for i, parameter in enumerate(parameters)}
         for name, other in self.tie:
             rows[:, column[name]] = rows[:, column[other]]
-        for name, entry in entries.items():
-            if entry.module is not None:
-                default = entry.parameter.encode(entry.parameter.default)
-                rows[~self._is_active(entry, rows, column), column[name]] = default
+        for i, parameter in enumerate(parameters):
+            if parameter.module is not None:
+                rows[~self.active(parameter.name, rows), i] = parameter.encode(parameter.default)
         return rows
 
     def active(self, name: str, matrix: Array) -> NDArray[np.bool_]:
         """Return the (N,) designs of a matrix for which a parameter is active."""
-        entries = conditional_parameters(self)
-        if entries[name].module is None:
-            return np.ones(len(matrix), dtype=bool)
-        return self._is_active(entries[name], matrix, {other: i for i, other in enumerate(entries)})
-
-    def _is_active(self, entry: ConditionalParameter, matrix: Array, column: Mapping[str, int]) -> NDArray[np.bool_]:
-        """Return the (N,) designs for which a parameter with a condition is active."""
-        active = np.ones(len(matrix), dtype=bool)
-        if "n_joints" in column:
-            active &= cast("int", entry.module) <= matrix[:, column["n_joints"]] + self.min_joints
-        if entry.types is not None:
-            joint = f"joint_{entry.module}"
-            letters = cast("CategoricalParameter", conditional_parameters(self)[joint].parameter).choices
-            active &= np.isin(letters, list(entry.types))[matrix[:, column[joint]].astype(np.intp)]
+        known, active = named_parameters(self), np.ones(len(matrix), dtype=bool)
+        parameter, column = known[name], list(known).index
+        if parameter.module is not None and "n_joints" in known:
+            active &= parameter.module <= matrix[:, column("n_joints")] + self.min_joints
+        if parameter.module is not None and parameter.types is not None:
+            joint = f"joint_{parameter.module}"
+            letters = cast("CategoricalParameter", known[joint]).choices
+            active &= np.isin(letters, list(parameter.types))[matrix[:, column(joint)].astype(np.intp)]
         return active
 
     def sample(self, n: int, seed: int) -> list[Design]:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+
 from armwright.robot.arm import AXES, Axis, JointKind, Vector
 from armwright.robot.motor_body import MotorBody
 
@@ -77,33 +79,26 @@ MOUNTS: Mapping[Mount, tuple[Direction, Direction, Direction]] = MappingProxyTyp
         "wall-y": ("+x", "+z", "-y"),
     }
 )
+# (mounts, 3) the world axis that each axis of the base lies along, and 1 if it points the same way, else -1
+WORLD_AXES = np.array([["xyz".index(world[1]) for world in row] for row in MOUNTS.values()])
+SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row in MOUNTS.values()])
 MOUNT_DESCRIPTIONS: Mapping[Mount, str] = {
     "floor": "stands on a floor, local z up",
     "ceiling": "hangs from a ceiling, local z down",
-    "wall+x": "on a wall, local z along world +x",
-    "wall-x": "on a wall, local z along world -x",
-    "wall+y": "on a wall, local z along world +y",
-    "wall-y": "on a wall, local z along world -y",
+    **{mount: f"on a wall, local z along world {up}" for mount, (_, _, up) in MOUNTS.items() if up[1] != "z"},
 }
-
-
-def mounted(axis: Axis, mount: Mount) -> tuple[Axis, float]:
-    """Return the world axis parallel to an axis of the base, and their relative sign (1 or -1)."""
-    sign, world = MOUNTS[mount][AXES.index(axis)]
-    return AXES[AXES.index(world)], 1.0 if sign == "+" else -1.0  # pyright: ignore[reportArgumentType]
 
 
 def mounted_vector(vector: Vector, mount: Mount) -> Vector:
     """Return a vector of the base frame in world axes."""
-    rotated = [0.0, 0.0, 0.0]
-    for axis, value in zip(AXES, vector, strict=True):
-        world, sign = mounted(axis, mount)
-        rotated[AXES.index(world)] = sign * value
-    return rotated[0], rotated[1], rotated[2]
+    row, rotated = tuple(MOUNTS).index(mount), np.zeros(3)
+    rotated[WORLD_AXES[row]] = SIGNS[row] * vector
+    x, y, z = rotated.tolist()
+    return x, y, z
 
 
 def mounted_body(body: MotorBody, mount: Mount) -> MotorBody:
     """Return a motor body of the base frame in world axes."""
     (x, y, z), (u, v, w) = mounted_vector(body.size, mount), mounted_vector(body.centre, mount)
-    axis, _ = mounted(body.axis, mount)
+    axis = AXES[int(WORLD_AXES[tuple(MOUNTS).index(mount), AXES.index(body.axis)])]
     return MotorBody(body.shape, axis, (abs(x), abs(y), abs(z)), (u + 0.0, v + 0.0, w + 0.0))  # no -0.0

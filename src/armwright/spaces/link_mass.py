@@ -15,15 +15,6 @@ class MassPerMetre(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     kind: Literal["per_metre"] = "per_metre"
     kg: float = Field(default=0.0121, ge=0.0, le=1e4)  # of a metre of link [kg/m]
 
-    def mass(self, length: Length) -> Length:
-        """Return the mass of links of these lengths [m] in [kg]."""
-        return self.kg * length
-
-    @property
-    def description(self) -> str:
-        """The model in a few words."""
-        return f"{self.kg:g} kg per metre of link"
-
 
 class MassPerLink(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Links of one mass, whatever their length."""
@@ -31,14 +22,10 @@ class MassPerLink(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     kind: Literal["per_link"]
     kg: float = Field(default=0.002, ge=0.0, le=1e4)  # of each link [kg]
 
-    def mass(self, length: Length) -> Length:
-        """Return the mass of links of these lengths [m] in [kg]."""
-        return self.kg + 0.0 * length
 
-    @property
-    def description(self) -> str:
-        """The model in a few words."""
-        return f"{self.kg:g} kg for each link, whatever its length"
+def link_mass(model: MassPerMetre | MassPerLink, length: Length) -> Length:
+    """Return the mass of links of these lengths [m] in [kg]."""
+    return model.kg * length if model.kind == "per_metre" else model.kg + 0.0 * length
 
 
 MassModel = Annotated[MassPerMetre | MassPerLink, Field(discriminator="kind")]

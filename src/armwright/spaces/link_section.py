@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Annotated
 
-from pydantic import BaseModel, Field, field_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
 from armwright.robot.tubes import Material, Tube, check_tube, resolve_material, section_square
 
@@ -29,30 +29,26 @@ class LinkTube:
         return section_square(self.radius, self.wall)
 
 
+def _check_tubes(tubes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    for outer, wall in tubes:
+        check_tube(outer, wall)
+    names = [Tube(*tube).name for tube in tubes]
+    if len(set(names)) != len(names):
+        raise ValueError(f"duplicates among {', '.join(names)} (outer diameter x wall in mm)")
+    return tubes
+
+
 class LinkSection(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """The round sections that links may have, and their material."""
 
-    tubes: tuple[tuple[float, float], ...] = Field(default=((0.03, 0.015),), min_length=1, max_length=MAX_TUBES)
+    tubes: Annotated[tuple[tuple[float, float], ...], AfterValidator(_check_tubes)] = Field(
+        default=((0.03, 0.015),), min_length=1, max_length=MAX_TUBES
+    )
     """Outer diameter and wall of each tube [m]; a solid bar if the wall is half the diameter."""
     per_link: bool = True
     """True if each link has a tube of its own, the parameters tube_j; else the parameter tube is that of all links."""
-    material: Material | None = None
+    material: Annotated[Material | None, BeforeValidator(resolve_material)] = None
     """A name, or a record. None: masses as in `mass`, stiffness unknown."""
-
-    @field_validator("material", mode="before")
-    @classmethod
-    def _look_up_material(cls, value: Any) -> Any:
-        return resolve_material(value)
-
-    @field_validator("tubes")
-    @classmethod
-    def _check_tubes(cls, tubes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-        for outer, wall in tubes:
-            check_tube(outer, wall)
-        names = [Tube(*tube).name for tube in tubes]
-        if len(set(names)) != len(names):
-            raise ValueError(f"duplicates among {', '.join(names)} (outer diameter x wall in mm)")
-        return tubes
 
     @property
     def options(self) -> tuple[LinkTube, ...]:

@@ -1,16 +1,9 @@
 """Optuna distributions of a design space."""
 
-import threading
-from collections.abc import Generator
-from contextlib import contextmanager
-
-import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import FloatParameter, Parameter
-
-_verbosity = threading.Lock()  # global to the process: two threads would restore each other's level
 
 
 def distributions(space: DesignSpace) -> dict[str, BaseDistribution]:
@@ -26,15 +19,3 @@ def _distribution(parameter: Parameter) -> BaseDistribution:
     if isinstance(parameter, FloatParameter):
         return FloatDistribution(parameter.low, parameter.high, log=parameter.log, step=parameter.step or None)
     return CategoricalDistribution(parameter.choices)
-
-
-@contextmanager
-def quietly() -> Generator[None, None, None]:
-    """Silence Optuna's messages about each study, and restore the user's verbosity afterwards."""
-    with _verbosity:
-        verbosity = optuna.logging.get_verbosity()
-        optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
-        try:
-            yield
-        finally:
-            optuna.logging.set_verbosity(verbosity)

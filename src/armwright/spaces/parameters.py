@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from itertools import count, takewhile
 from typing import Any
 
@@ -19,10 +19,27 @@ GRID_DIGITS = 12  # decimals of a value on a grid
 
 
 @dataclass(frozen=True, slots=True)
-class FloatParameter:
-    """A numeric parameter."""
+class _Named:
+    """A parameter and the condition under which it is active."""
 
     name: str
+    _: KW_ONLY
+    module: int | None = None  # counted from 1, that the arm must have; None if the parameter is always active
+    types: frozenset[str] | None = None  # the types that this module may have; None for any
+
+    def is_active(self, params: Mapping[str, ParameterValue], max_joints: int) -> bool:
+        """Return whether the parameter is active, given the values of the parameters before it."""
+        if self.module is None:
+            return True
+        if self.module > int(params.get("n_joints", max_joints)):
+            return False
+        return self.types is None or params.get(f"joint_{self.module}") in self.types
+
+
+@dataclass(frozen=True, slots=True)
+class FloatParameter(_Named):
+    """A numeric parameter."""
+
     low: float  # the lower bound, in `unit`
     high: float
     unit: str
@@ -85,10 +102,9 @@ class FloatParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class CategoricalParameter:
+class CategoricalParameter(_Named):
     """A parameter with a few named choices."""
 
-    name: str
     choices: tuple[str, ...]
 
     @property

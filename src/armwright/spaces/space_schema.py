@@ -5,22 +5,15 @@ from functools import lru_cache
 from typing import Annotated, Any, Self, cast
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    Field,
-    field_serializer,
-    field_validator,
-    model_validator,
-)  # fmt: skip
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_validator
 
 from armwright.robot.actuators import DIMENSIONS, ActuatorRecord, resolve_actuator, value_of
 from armwright.robot.arm import Actuator
 from armwright.spaces.column import ColumnKeys
-from armwright.spaces.custom_parameters import MAX_CUSTOM, CustomParameter, check_names, read_custom
+from armwright.spaces.custom_parameters import MAX_CUSTOM, Custom, check_names
 from armwright.spaces.field_types import Choices, Ordered, Pairs
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
-from armwright.spaces.link_mass import Length, MassModel, MassPerMetre
+from armwright.spaces.link_mass import Length, MassModel, MassPerMetre, link_mass
 from armwright.spaces.link_section import LinkSection
 from armwright.spaces.parameters import Design, Range
 
@@ -57,6 +50,12 @@ def _check_types(types: tuple[JointType, ...]) -> tuple[JointType, ...]:
     if not any(MODULES[letter].is_actuated for letter in types):
         raise ValueError(f"expected at least one type that moves, got {', '.join(types)}")
     return types
+
+
+def _look_up_actuators(value: Any) -> Any:
+    if not isinstance(value, (list, tuple)):
+        raise ValueError("expected a list of names, or of records with name, mass and stall_torque")
+    return [resolve_actuator(entry) for entry in cast("list[Any]", value)]
 
 
 class SpaceSchema(
@@ -105,7 +104,9 @@ class SpaceSchema(
     """Tubes and material of the links; several tubes add the parameters tube_j, or the parameter tube."""
     mass: MassModel | None = None
     """Mass of the links without a material; 0.0121 kg per metre if not stated. A material implies the mass."""
-    actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MAX_ACTUATORS)
+    actuators: Annotated[tuple[ActuatorRecord, ...], BeforeValidator(_look_up_actuators)] = Field(
+        default=(), max_length=MAX_ACTUATORS
+    )
     """Names from the catalogue, or records; several add the parameters motor_j. Empty: joints without mass."""
     safety_factor: float = Field(default=1.5, gt=0.0, le=100.0)
     """Factor of the torque that the actuators have to deliver."""
@@ -122,24 +123,8 @@ class SpaceSchema(
     """Step size of a real parameter (link_1: 0.01) or of all of a kind (link: 0.005)."""
     tie: Pairs[str] = ()
     """Parameters that always equal another one (link_3: link_2)."""
-    custom: tuple[tuple[str, CustomParameter], ...] = Field(default=(), max_length=MAX_CUSTOM, alias="parameters")
+    custom: Custom = Field(default=(), max_length=MAX_CUSTOM, alias="parameters")
     """Custom parameters by name, which do not change the arm: an evaluator reads them."""
-
-    @field_validator("custom", mode="before")
-    @classmethod
-    def _read_custom(cls, value: Any) -> Any:
-        return read_custom(value)
-
-    @field_serializer("custom")
-    def _custom_to_mapping(self, value: tuple[tuple[str, CustomParameter], ...]) -> dict[str, Any]:
-        return {name: entry.model_dump(mode="json", exclude_defaults=True) for name, entry in value}
-
-    @field_validator("actuators", mode="before")
-    @classmethod
-    def _look_up_actuators(cls, value: Any) -> Any:
-        if not isinstance(value, (list, tuple)):
-            raise ValueError("expected a list of names, or of records with name, mass and stall_torque")
-        return [resolve_actuator(entry) for entry in cast("list[Any]", value)]
 
     @model_validator(mode="after")
     def _check_values(self) -> Self:
@@ -213,7 +198,7 @@ class SpaceSchema(
     def link_mass(self, length: Length, tube: Any = 0) -> Length:
         """Return the mass of links or rails [kg], from their lengths [m] and the indices of their tubes."""
         if self.link_section.material is None:
-            return (self.mass or MassPerMetre()).mass(length)
+            return link_mass(self.mass or MassPerMetre(), length)
         return self.tube_values("mass_per_metre")[tube] * length
 
     @property
@@ -231,7 +216,9 @@ class SpaceSchema(
         """The mass of the links in a few words."""
         if self.link_section.material is not None:
             return self.link_section.description
-        return (self.mass or MassPerMetre()).description
+        model = self.mass or MassPerMetre()
+        each = "per metre of link" if model.kind == "per_metre" else "for each link, whatever its length"
+        return f"{model.kg:g} kg {each}"
 
     def tube_values(self, name: str) -> Any:
         """Return a (K,) value of `LinkTube` for each of the K tubes; NaN where it is None."""

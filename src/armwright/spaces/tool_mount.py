@@ -17,7 +17,8 @@ from armwright.tasks.tool import NO_TOOL, Tool
 @lru_cache(maxsize=64)
 def mounted_tools(tool: Tool) -> Mapping[Mount, MountedTool]:
     """Return a tool as the arms of a design space carry it, for each mount."""
-    return {mount: _mounted(tool, _mount_frame(mount), np.zeros(3)) for mount in MOUNTS}
+    base = [DIRECTIONS[axis] for axis in ("+x", "+y", "+z")]
+    return {m: _mounted(tool, np.column_stack([mounted_vector(v, m) for v in base]), np.zeros(3)) for m in MOUNTS}
 
 
 def with_tool(arm: Arm, tool: Tool) -> Arm:
@@ -35,30 +36,21 @@ def carrying_tool(arm: Arm, tool: Tool) -> Arm:
     return with_tool(arm, tool) if is_bare and own not in mounted_tools(tool).values() else arm
 
 
-def _mount_frame(mount: Mount) -> Array:
-    """Return the (3, 3) rotation of the base, its axes in the world as columns."""
-    return np.column_stack([mounted_vector(DIRECTIONS[direction], mount) for direction in ("+x", "+y", "+z")])
-
-
 def _mounted(tool: Tool, frame: Array, start: Array) -> MountedTool:
     """Return a tool whose own frame has these axes (3, 3) and this origin (3,) [m] in the frame of the last link."""
     tip_frame, body = frame @ rotation_from_rpy(*tool.rpy), tip_solids(tool, None).get("tool")
     axes, moments = frame, np.array(tool.inertia)
     if body is not None and not any(tool.inertia):
         axes, moments = tip_frame @ body.rotation, tool.mass * body.gyration
+    x, y, z = map(_vector, axes @ np.diag(moments) @ axes.T)
     return MountedTool(
         tip=_vector(start + frame @ tool.tip),
         axis=_vector(tip_frame[:, 2]),
         side=_vector(tip_frame[:, 0]),
         mass=tool.mass,
         com=_vector(start + frame @ tool.center),
-        inertia=_tensor(axes @ np.diag(moments) @ axes.T),
+        inertia=(x, y, z),
     )
-
-
-def _tensor(values: Array) -> tuple[Vector, Vector, Vector]:
-    x, y, z = map(_vector, values)
-    return (x, y, z)
 
 
 def _vector(values: Array) -> Vector:

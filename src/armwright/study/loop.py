@@ -14,10 +14,9 @@ from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
-from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, History
+from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM
 from armwright.runs.trial import FinishedTrial
 from armwright.search.samplers import BlackBox, SamplerFactory
-from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
 from armwright.study.overlapping_schedule import OverlappingSchedule
@@ -81,7 +80,7 @@ class Study:
         self._first_of: dict[Design, int] = {}  # the first trial of each design
         for trial in self._record.trials:
             self._first_of.setdefault(trial.design, trial.number)
-        self._backend: LocalBackend | DaskBackend = LocalBackend(problem)
+        self._backend: LocalBackend | DaskBackend
         self._schedule = Schedule()
         self._pending: dict[int, PendingTrial] = {}  # by number; a trial is recorded when all before it are
 
@@ -98,8 +97,6 @@ class Study:
             is_deliberate = isinstance(end, (KeyboardInterrupt, StoppedError))
             self._channel.report("stopped", self._n_finished, None if is_deliberate else str(end) or type(end).__name__)
             raise
-        finally:
-            self._backend.close()
         self._channel.finish(self._n_finished)
         return result
 
@@ -110,9 +107,7 @@ class Study:
         if self._folder is not None:
             discard_results(self._folder.path)  # those of fewer trials
             self._record.config = self._folder.note_versions(self._record.config, self._problem.evaluator)
-        self._backend = self._new_backend()
-        self._schedule = self._new_schedule()
-        with closing(self._schedule):
+        with closing(self._new_backend()) as self._backend, closing(self._new_schedule()) as self._schedule:
             for number in range(first, self._method.n_trials):
                 self._wait_for_start(number)
                 self._start_trial(number)
@@ -304,13 +299,9 @@ class Study:
         if summary is None:
             verification = verify_front(history) if verify and folder is not None else None
             proposer = None if self._proposer is None else self._proposer.summary()
-            summary = summarize(history, config, proposer, verification, self._surrogate_errors(history))
+            sampler = self._sampler
+            errors = sampler.surrogate.left_out_errors(history) if isinstance(sampler, SurrogateFactory) else None
+            summary = summarize(history, config, proposer, verification, errors)
             if folder is not None:
                 write_results(folder, history, config, summary, verification)
         return StudyResult(history, config, summary, None if folder is None else folder.path, resumed)
-
-    def _surrogate_errors(self, history: History) -> dict[str, Any] | None:
-        """Return the errors of the surrogate's predictions; None with another sampler."""
-        if not isinstance(self._sampler, SurrogateFactory):
-            return None
-        return left_out_errors(self._sampler.surrogate, history)

@@ -23,7 +23,6 @@ class OverlappingSchedule(Schedule):
 
     def __init__(self, requests: ProposalRequests, max_in_flight: int) -> None:
         self._requests = requests
-        self._method = requests.method
         self._max_in_flight = max_in_flight
         past = requests.past_slots()
         self._entered = len(past)
@@ -36,7 +35,8 @@ class OverlappingSchedule(Schedule):
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return the slot of the earliest answer, or None while the black box may go on without one."""
-        counted = number - self._method.n_init  # finished trials
+        method = self._requests.method
+        counted = number - method.n_init  # finished trials
         if counted < 0:
             return None
         with self._change:
@@ -44,10 +44,11 @@ class OverlappingSchedule(Schedule):
                 if self._failure is not None:
                     raise self._failure
                 self._start_requests(counted)
-                if self._arrived and self._entered < self._method.n_proposals:
+                if self._arrived and self._entered < method.n_proposals:
                     self._entered += 1
                     return self._arrived.popleft()
-                if self._black_box_may_run(counted - self._entered):
+                ahead = (method.n_step - 1) * (self._entered + self._max_in_flight)
+                if counted - self._entered < min(ahead, method.n_total - method.n_proposals):
                     return None
                 self._change.wait(POLL_SECONDS)
 
@@ -59,20 +60,15 @@ class OverlappingSchedule(Schedule):
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
 
-    def _black_box_may_run(self, n_drawn: int) -> bool:
-        """Return whether the black box may draw another trial after `n_drawn` counted ones."""
-        method = self._method
-        ahead = (method.n_step - 1) * (self._entered + self._max_in_flight)
-        return n_drawn < min(ahead, method.n_total - method.n_proposals)
-
     def _start_requests(self, counted: int) -> None:
         """Start the requests that are due after so many counted trials."""
+        method = self._requests.method
         while self.n_in_flight < self._max_in_flight:
             supplied = self._entered + len(self._arrived) + self.n_in_flight
-            due = (supplied - self._max_in_flight + 1) * self._method.n_step
-            if counted < due or supplied >= self._method.n_proposals:
+            due = (supplied - self._max_in_flight + 1) * method.n_step
+            if counted < due or supplied >= method.n_proposals:
                 return
-            blocks = count(self._method.n_init, self._method.n_step)
+            blocks = count(method.n_init, method.n_step)
             number = next(first for first in blocks if first not in self._asked)
             self._asked.add(number)
             self.n_in_flight += 1

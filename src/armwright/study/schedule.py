@@ -51,7 +51,11 @@ class ReplaySchedule(Schedule):
     def next(self, number: int) -> ProposalSlot | None:
         """Return what was recorded for this trial."""
         if number >= len(self._record):
-            return self._next_after_end(number)
+            if len(self._requests.past_slots()) >= self._requests.method.n_started(number):
+                return None
+            note = "" if self._end_is_reported else f"the record ends with trial {len(self._record) - 1}"
+            self._end_is_reported = True
+            return ProposalSlot(number, number, fault="missing", note=note)
         request = self._record[number].request
         if request is None:
             return None
@@ -61,10 +65,3 @@ class ReplaySchedule(Schedule):
         self._asked.add(asked)
         missing = ProposalSlot(asked, feedback, fault="missing", note=f"no design is left of call {asked}")
         return self._ready.pop(asked, missing)
-
-    def _next_after_end(self, number: int) -> ProposalSlot | None:
-        if len(self._requests.past_slots()) >= self._requests.method.n_started(number):
-            return None
-        note = "" if self._end_is_reported else f"the record ends with trial {len(self._record) - 1}"
-        self._end_is_reported = True
-        return ProposalSlot(number, number, fault="missing", note=note)

@@ -13,13 +13,14 @@ from armwright.tasks.task import Task
 from armwright.yaml_documents import parse_document, read_document
 
 _FOLDER = resources.files("armwright.tasks") / "builtin"
+_FIRST = ("target-", "autodesign-", "slideopt-")  # the paper's tasks, and those of related work
 _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
 
 
 def builtin_names() -> list[str]:
     """Return the names of the built-in tasks, the paper's first."""
-    names = [file.name.removesuffix(".yaml") for file in _FOLDER.iterdir() if file.name.endswith(".yaml")]
-    return sorted(names, key=_file_order)
+    names = sorted(file.name.removesuffix(".yaml") for file in _FOLDER.iterdir() if file.name.endswith(".yaml"))
+    return sorted(names, key=lambda name: [not name.startswith(prefix) for prefix in _FIRST])
 
 
 def builtin_tasks() -> dict[str, Task]:
@@ -89,8 +90,3 @@ def random_task(seed: int) -> Task:
         description="Uniform points in a random box.",
         provenance=f"armwright.random_task({seed})",
     )
-
-
-def _file_order(name: str) -> tuple[int, str]:
-    first = ("target-", "autodesign-", "slideopt-")
-    return next((i for i, prefix in enumerate(first) if name.startswith(prefix)), len(first)), name

@@ -6,17 +6,15 @@ from typing import Self
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.tasks.moments import MAX_MASS, Moments, describe_vector
-from armwright.tasks.targets import Position, Size
-
-Vector = tuple[float, float, float]
+from armwright.tasks.targets import Point, Position, Size
 
 
 @dataclass(frozen=True)
 class LoadShape:
     """How the mass of a payload is distributed, whatever that mass, in the tip frame."""
 
-    center: Vector = (0.0, 0.0, 0.0)  # centre of mass [m]
-    gyration: Vector = (0.0, 0.0, 0.0)  # moments of inertia about the centre, around x, y and z, per mass [m²]
+    center: Point = (0.0, 0.0, 0.0)  # centre of mass [m]
+    gyration: Point = (0.0, 0.0, 0.0)  # moments of inertia about the centre, around x, y and z, per mass [m²]
 
 
 POINT_LOAD = LoadShape()

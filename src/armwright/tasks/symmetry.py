@@ -20,12 +20,13 @@ def symmetry_planes(points: Array) -> Array:
     only the plane that bisects it is returned, and for a single point none, since infinitely many others exist.
     Duplicate points count once. At most 2,000 candidates are tried.
     """
-    offsets = _offsets(points)  # (T, 3)
+    offsets = np.unique(points, axis=0) - centre(points)  # (T, 3)
     normals = np.empty((0, 3))
     for candidate in _candidates(offsets):
         normal = None if _is_among(candidate, normals) else _refined(offsets, candidate)
         if normal is not None and not _is_among(normal, normals):
-            normals = np.vstack([normals, _with_positive_sign(normal)])
+            tidy = np.where(np.abs(normal) < 1e-12, 0.0, normal)  # its first component other than 0 becomes positive
+            normals = np.vstack([normals, tidy * np.sign(tidy[np.flatnonzero(tidy)[0]]) + 0.0])  # no -0.0
     return normals
 
 
@@ -39,10 +40,6 @@ def distance_to_planes(position: Array, points: Array, normals: Array) -> float:
     return float(np.abs(normals @ (position - centre(points))).min(initial=np.inf))
 
 
-def _offsets(points: Array) -> Array:
-    return np.unique(points, axis=0) - centre(points)
-
-
 def _candidates(offsets: Array) -> Array:
     """Return (C, 3) unit normals that include those of all symmetry planes.
 
@@ -53,7 +50,7 @@ def _candidates(offsets: Array) -> Array:
     basis = _basis(offsets)
     normals = [np.empty((0, 3))]
     if len(basis) == 2:
-        normals.append(_direction_of_least_variance(offsets))  # the plane of all points
+        normals.append(np.linalg.svd(offsets, full_matrices=False)[2][2:])  # the plane of all points
     for row in basis:
         moves = offsets[np.abs(distance - distance[row]) <= ROUGH] - offsets[row]
         length = np.linalg.norm(moves, axis=1)
@@ -75,23 +72,18 @@ def _basis(offsets: Array) -> list[int]:
     return basis
 
 
-def _direction_of_least_variance(offsets: Array) -> Array:
-    """Return the direction (1, 3) in which the offsets vary least."""
-    return np.linalg.svd(offsets, full_matrices=False)[2][2:]
-
-
 def _refined(offsets: Array, normal: Array) -> Array | None:
     """Return the normal fitted to all pairs that it mirrors; None if it does not mirror the set onto itself.
 
     The direction of a single pair is only as accurate as its digits, and less if its points are close.
     """
-    partners = _partners(offsets, _mirrored(offsets, normal), ROUGH)
+    partners = _partners(offsets, normal, ROUGH)
     if partners is None:
         return None
     pairs = offsets - offsets[partners]
     if np.linalg.norm(pairs, axis=1).max() > ROUGH:
         normal = np.linalg.svd(pairs, full_matrices=False)[2][0]
-    return normal if _partners(offsets, _mirrored(offsets, normal), TOLERANCE) is not None else None
+    return normal if _partners(offsets, normal, TOLERANCE) is not None else None
 
 
 def _is_among(normal: Array, normals: Array) -> bool:
@@ -99,17 +91,8 @@ def _is_among(normal: Array, normals: Array) -> bool:
     return bool(np.any(np.linalg.norm(across, axis=1) <= ROUGH))
 
 
-def _mirrored(offsets: Array, normal: Array) -> Array:
-    return offsets - 2.0 * np.outer(offsets @ normal, normal)
-
-
-def _partners(offsets: Array, mirrored: Array, tolerance: float) -> NDArray[np.intp] | None:
+def _partners(offsets: Array, normal: Array, tolerance: float) -> NDArray[np.intp] | None:
     """Return (T,) the index of the offset at each mirrored one; None if one has none within `tolerance` [m]."""
+    mirrored = offsets - 2.0 * np.outer(offsets @ normal, normal)
     distances, partners = cast("tuple[Array, NDArray[np.intp]]", KDTree(offsets).query(mirrored))
     return partners if distances.max() <= tolerance else None
-
-
-def _with_positive_sign(normal: Array) -> Array:
-    """Return the normal with its sign chosen so that its first component other than 0 is positive."""
-    tidy = np.where(np.abs(normal) < 1e-12, 0.0, normal)
-    return tidy * np.sign(tidy[np.flatnonzero(tidy)[0]]) + 0.0  # no -0.0

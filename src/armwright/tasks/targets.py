@@ -8,14 +8,7 @@ from typing import Annotated, Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    Field,
-    field_validator,
-    model_serializer,
-    model_validator,
-)  # fmt: skip
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_serializer, model_validator
 
 from armwright.arrays import Array
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
@@ -37,6 +30,16 @@ def _check_direction(vector: Point) -> Point:
     return vector
 
 
+def _check_length(value: Any) -> Any:
+    """Return the value of a position; ValueError for a list of more or fewer than three."""
+    if isinstance(value, (list, tuple)) and len(cast("list[Any]", value)) != 3:
+        numbers = cast("list[Any]", value)
+        hint = "; write decimals with a point: 0.4, not 0,4" if len(numbers) > 3 else ""
+        raise ValueError(f"expected three numbers x, y, z [m], got {len(numbers)}: {numbers!s:.80}{hint}")
+    return cast("Any", value)
+
+
+TargetPoint = Annotated[Point, BeforeValidator(_check_length)]
 Direction = Annotated[Position, AfterValidator(_check_direction)]  # of any length
 
 ObstacleName = Annotated[str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9 ._-]{0,39})?$")]
@@ -78,7 +81,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A point that the tip should reach, and the tool's direction there."""
 
     name: str = Field(default="", pattern=TARGET_NAME)  # name in the steps of a cycle and in tables; empty for none
-    position: Point  # position of the tip [m]
+    position: TargetPoint  # position of the tip [m]
     axis: Direction | None = None  # world direction of the tool's z axis, of any length; the tool may rotate about it
     # Instead of an axis, roll, pitch and yaw of the tool about the fixed x, then y, then z [rad]
     orientation: Point | None = None
@@ -89,11 +92,6 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     weight: float = Field(default=1.0, gt=0.0, le=MAX_WEIGHT)  # factor of its share of a sum of errors
     on: ObstacleName = ""  # obstacle that tool and payload may touch there; empty for the one beyond the tip
     into: ObstacleName = ""  # obstacle with a hole or a chuck, which tool and payload may enter there
-
-    @field_validator("position", mode="before")
-    @classmethod
-    def _check_length(cls, value: Any) -> Any:
-        return check_length(value)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -140,15 +138,6 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         parts += [f"weight {self.weight:g}"] * (self.weight != 1.0)
         parts += [f"{word} {name}" for word, name in (("on", self.on), ("into", self.into)) if name]
         return ", ".join(parts)
-
-
-def check_length(value: Any) -> Any:
-    """Return the value of a position; ValueError for a list of more or fewer than three."""
-    if isinstance(value, (list, tuple)) and len(cast("list[Any]", value)) != 3:
-        numbers = cast("list[Any]", value)
-        hint = "; write decimals with a point: 0.4, not 0,4" if len(numbers) > 3 else ""
-        raise ValueError(f"expected three numbers x, y, z [m], got {len(numbers)}: {numbers!s:.80}{hint}")
-    return cast("Any", value)
 
 
 def describe_targets(specs: Sequence[Point | Target]) -> list[str]:

@@ -1,5 +1,6 @@
 """The task: points that the tip of the arm should reach, and which way it should point there."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any, Self, cast
 
@@ -9,10 +10,9 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     Field,
+    PlainSerializer,
     ValidationError,
     ValidationInfo,
-    field_serializer,
-    field_validator,
     model_validator,
 )  # fmt: skip
 
@@ -23,7 +23,7 @@ from armwright.tasks.moments import Mass
 from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
 from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, Solid
 from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload
-from armwright.tasks.targets import MAX_COORDINATE, Point, Target, TargetArrays, check_length, stack_targets
+from armwright.tasks.targets import MAX_COORDINATE, Point, Target, TargetArrays, TargetPoint, stack_targets
 from armwright.tasks.tip_rules import Solids, TipRules, allowed_depths, placed, tip_solids
 from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.tasks.workspace import MAX_POINTS, MAX_POSES, MAX_REGIONS, Region
@@ -49,13 +49,30 @@ def _plain(target: Point | Target) -> Point | Target:
     return target.position if isinstance(target, Target) and target.is_plain else target
 
 
+def _expand_in_order(value: Any, info: ValidationInfo) -> Any:
+    if isinstance(value, str) and value != IN_ORDER:
+        raise ValueError(f"expected {IN_ORDER} or a record with steps, such as {{steps: [{{to: 1}}, {{to: 2}}]}}")
+    if value != IN_ORDER:
+        return value
+    numbers = range(1, len(info.data.get("targets", ())) + 1)
+    return {"closed": False, "steps": [{"to": number, "by": "line"} for number in numbers]}
+
+
+def _mapping_to_pairs(value: Any) -> Any:
+    if isinstance(value, dict):
+        return tuple(cast("dict[str, Any]", value).items())
+    if isinstance(value, tuple):  # of pairs, from a task
+        return cast("Any", value)
+    raise ValueError("expected objectives and their resolutions, such as {worst_error: 0.0005, price: 5}")
+
+
 class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Points that the tip should reach, and what else the arm has to do."""
 
     name: Annotated[str, AfterValidator(check_name)] = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     # Points [m], or records with a tool direction, a tolerance, a weight or a name; by default the workspace's corners.
-    targets: tuple[Annotated[Annotated[Point, BeforeValidator(check_length)] | Target, AfterValidator(_plain)], ...] = (
-        Field(min_length=1, max_length=MAX_TARGETS)
+    targets: tuple[Annotated[TargetPoint | Target, AfterValidator(_plain)], ...] = Field(
+        min_length=1, max_length=MAX_TARGETS
     )
     tool: Tool = NO_TOOL  # at the end of the last link
     # Mass that the tip carries, a point at all targets or at each [kg]; or a rigid body
@@ -67,7 +84,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     target_noise: float = Field(default=0.0, ge=0.0, le=MAX_NOISE)  # by which all targets may be off along an axis [m]
     obstacles: tuple[Obstacle, ...] = Field(default=(), max_length=MAX_OBSTACLES)  # for the objectives of clearance
     restarts: int = Field(default=0, ge=0, le=MAX_RESTARTS)  # further starts of the inverse kinematics at each target
-    cycle: Cycle | None = None  # `in_order` is a line to each target in turn
+    cycle: Annotated[Cycle | None, BeforeValidator(_expand_in_order)] = (
+        None  # `in_order`: a line to each target in turn
+    )
     # Boxes that the tip should cover
     workspace: Annotated[tuple[Region, ...], BeforeValidator(_listed)] = Field(default=(), max_length=MAX_REGIONS)
     # By default the paper's two, and orientation_error if a target has a tool direction
@@ -78,22 +97,13 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         default=None, min_length=1
     )
     # Differences of objectives that do not matter, by name; of designs that differ by no more, `design` reports one.
-    resolution: tuple[tuple[str, Annotated[float, Field(gt=0.0)]], ...] = ()
+    resolution: Annotated[
+        tuple[tuple[str, Annotated[float, Field(gt=0.0)]], ...],
+        BeforeValidator(_mapping_to_pairs),
+        PlainSerializer(dict, return_type=dict[str, float]),
+    ] = ()
     description: str = Field(default="", max_length=10_000)  # what the arm has to do; shown to proposers
     provenance: str = Field(default="", max_length=10_000)  # where the points come from
-
-    @field_validator("resolution", mode="before")
-    @classmethod
-    def _mapping_to_pairs(cls, value: Any) -> Any:
-        if isinstance(value, dict):
-            return tuple(cast("dict[str, Any]", value).items())
-        if isinstance(value, tuple):  # of pairs, from a task
-            return cast("Any", value)
-        raise ValueError("expected objectives and their resolutions, such as {worst_error: 0.0005, price: 5}")
-
-    @field_serializer("resolution")
-    def _pairs_to_mapping(self, value: tuple[tuple[str, float], ...]) -> dict[str, float]:
-        return dict(value)
 
     @model_validator(mode="before")
     @classmethod
@@ -107,16 +117,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         else:
             corners = tuple(dict.fromkeys(corner for region in regions for corner in region.corners))
         return {**cast("dict[str, Any]", content), "targets": corners}
-
-    @field_validator("cycle", mode="before")
-    @classmethod
-    def _expand_in_order(cls, value: Any, info: ValidationInfo) -> Any:
-        if isinstance(value, str) and value != IN_ORDER:
-            raise ValueError(f"expected {IN_ORDER} or a record with steps, such as {{steps: [{{to: 1}}, {{to: 2}}]}}")
-        if value != IN_ORDER:
-            return value
-        numbers = range(1, len(info.data.get("targets", ())) + 1)
-        return {"closed": False, "steps": [{"to": number, "by": "line"} for number in numbers]}
 
     @model_validator(mode="after")
     def _check_numbers(self) -> Self:
@@ -139,11 +139,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
                 f"workspace: expected at most {MAX_POSES} points x directions in all boxes together, got {n_poses}; "
                 "try fewer points"
             )
-        seen: set[str] = set()
-        for name in filter(None, self._names):
-            if name in seen:
-                raise ValueError(f'targets: two are named "{name}"; give each its own name')
-            seen.add(name)
+        repeated = [name for name, count in Counter(filter(None, self._names)).items() if count > 1]
+        if repeated:
+            raise ValueError(f'targets: two are named "{repeated[0]}"; give each its own name')
         allowed_depths(self._records, self.target_arrays, self.obstacles, {})  # raises for unknown names
         if self.cycle is not None:
             _check_obstacles(self.plan(self.target_positions), self.obstacles)

@@ -7,7 +7,7 @@ import pytest
 
 import armwright as aw
 from armwright.exceptions import SpaceError
-from armwright.search.surrogate.custom_inputs import CustomInputs
+from armwright.search.surrogate.cheap_features import custom_inputs
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.yaml_documents import check_document
@@ -41,7 +41,7 @@ def columns_of(space: aw.DesignSpace, n: int, **values: list[float | str]) -> di
     custom = [p for p in space.parameters if p.name in space.custom_names]
     names = [p.name for p in custom if isinstance(p, FloatParameter)]
     names += [f"{p.name} {choice}" for p in custom if isinstance(p, CategoricalParameter) for choice in p.choices]
-    return dict(zip(names, CustomInputs(space)(space.normalised(matrix)).T, strict=True))
+    return dict(zip(names, custom_inputs(space, space.normalised(matrix)).T, strict=True))
 
 
 def test_numbers_are_on_their_scales_and_choices_are_indicators() -> None:
@@ -67,6 +67,6 @@ def test_objective_of_a_custom_parameter_is_predicted_with_the_physics() -> None
     matrix, none = problem.space.matrix(designs), np.zeros(20, dtype=bool)
     surrogate = Surrogate(problem)
     screen = Screen(surrogate, Observations(matrix[:20], values[:20], none, matrix[:0]))
-    mean = screen.forecast(surrogate.describe(matrix[20:])).mean
+    mean = screen.forecast(surrogate.features.describe(matrix[20:])).mean
     for objective in range(2):
         assert np.corrcoef(np.log(values[20:, objective]), mean[:, objective])[0, 1] > 0.7

@@ -7,7 +7,7 @@ import pytest
 
 import armwright as aw
 from armwright.arrays import Array
-from armwright.search.surrogate.dynamic_quantities import QUANTITIES, dynamic_quantities
+from armwright.search.surrogate.dynamic_quantities import dynamic_quantities
 from armwright.spaces.design_space import default_space
 
 TARGETS = np.array([[0.3, 0.1, 0.2], [0.1, -0.3, 0.3], [-0.2, 0.2, 0.1]])
@@ -21,7 +21,7 @@ def arms_of(task: str, n: int) -> list[aw.Arm]:
 
 def quantities(arm: aw.Arm) -> tuple[aw.Evaluation, dict[str, float]]:
     evaluation = aw.evaluate(arm, TARGETS)
-    return evaluation, dict(zip(QUANTITIES, dynamic_quantities(evaluation)[0].tolist(), strict=True))
+    return evaluation, {name: float(values[0]) for name, values in dynamic_quantities(evaluation).items()}
 
 
 def turns(postures: Array) -> Array:

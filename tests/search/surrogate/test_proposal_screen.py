@@ -14,8 +14,7 @@ from armwright.proposers.rule_helpers import rule_of
 from armwright.proposers.rules import STRUCTURE, RulesProposer
 from armwright.runs.history import BBO, History
 from armwright.runs.trial import FinishedTrial, ScreenedOut, parse_trial, trial_line
-from armwright.search.surrogate.proposal_screen import LEAST_GAIN, LEAST_TRIALS, rejection
-from armwright.search.surrogate.surrogate import Observations, Surrogate
+from armwright.search.surrogate.surrogate import LEAST_GAIN, LEAST_TRIALS, Observations, Surrogate
 
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 SETTINGS: dict[str, Any] = {"sampler": "surrogate", "n_init": 16, "n_step": 2}
@@ -67,7 +66,7 @@ def test_design_that_gains_nothing_is_rejected_with_its_prediction() -> None:
     p = problem()
     known = observed(p, p.space.sample(24, 5))
     worst = known.matrix[int(np.argmax(known.values.sum(axis=1)))]
-    found = rejection(Surrogate(p), known, worst, 0)
+    found = Surrogate(p).rejection(known, worst, 0)
     assert found is not None
     gain, predicted = found
     assert 0.0 <= gain < LEAST_GAIN
@@ -77,7 +76,7 @@ def test_design_that_gains_nothing_is_rejected_with_its_prediction() -> None:
 def test_best_candidate_is_not_rejected() -> None:
     p = problem()
     known, surrogate = observed(p, p.space.sample(24, 5)), Surrogate(p)
-    assert rejection(surrogate, known, surrogate.choose(known, 0), 0) is None
+    assert surrogate.rejection(known, surrogate.choose(known, 0), 0) is None
 
 
 def test_nothing_is_rejected_by_few_trials_or_a_poor_model() -> None:
@@ -85,7 +84,7 @@ def test_nothing_is_rejected_by_few_trials_or_a_poor_model() -> None:
     known = observed(p, p.space.sample(24, 5))
     noisy = replace(known, values=np.random.default_rng(0).random((24, 2)))
     for poor in (known.before(LEAST_TRIALS - 1), noisy):
-        assert all(rejection(Surrogate(p), poor, row, 0) is None for row in known.matrix[:5])
+        assert all(Surrogate(p).rejection(poor, row, 0) is None for row in known.matrix[:5])
 
 
 def test_trial_round_trips_the_rejected_proposal() -> None:

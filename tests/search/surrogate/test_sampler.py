@@ -16,7 +16,6 @@ from armwright.exceptions import SettingsError
 from armwright.proof.results import read_summary
 from armwright.runs.history import BBO, RANDOM, History
 from armwright.search.samplers import SamplerFactory, sampler_for, sampler_name
-from armwright.search.surrogate.left_out_errors import left_out_errors
 from armwright.search.surrogate.surrogate import Observations, Screen, Surrogate
 from armwright.spaces.optuna_distributions import distributions
 
@@ -67,7 +66,7 @@ def test_summary_and_terminal_state_the_errors_of_predictions(tmp_path: Path) ->
     run = aw.optimize(problem(), proposer="none", n_init=10, n_total=2, out=tmp_path)
     summary = read_summary(tmp_path)
     assert summary is not None
-    assert summary["surrogate"] == left_out_errors(Surrogate(problem()), run.history)
+    assert summary["surrogate"] == Surrogate(problem()).left_out_errors(run.history)
     output = io.StringIO()
     show_result(Console(file=output, width=200), run, [])
     assert f", span {summary['surrogate']['errors']['span']:.2g}\n" in output.getvalue()
@@ -87,16 +86,16 @@ def test_errors_tell_what_is_predictable_from_what_is_not() -> None:
     designs = problem().space.sample(40, 3)
     length = np.array([sum(design.links) for design in designs])
     noise = 2.0 + np.sin(1e4 * length)
-    found = left_out_errors(Surrogate(problem()), history_of(problem(), np.column_stack([noise, length])))
+    found = Surrogate(problem()).left_out_errors(history_of(problem(), np.column_stack([noise, length])))
     assert found is not None
     assert found["errors"]["span"] < 0.1
     assert found["errors"]["height"] > 0.8
 
 
 def test_constant_objective_and_few_designs_have_no_error() -> None:
-    assert left_out_errors(Surrogate(problem()), history_of(problem(), np.ones((9, 2)))) is None
+    assert Surrogate(problem()).left_out_errors(history_of(problem(), np.ones((9, 2)))) is None
     values = np.column_stack([np.full(12, 3.0), np.random.default_rng(8).uniform(1.0, 2.0, 12)])
-    found = left_out_errors(Surrogate(problem()), history_of(problem(), values))
+    found = Surrogate(problem()).left_out_errors(history_of(problem(), values))
     assert found is not None
     assert found["errors"]["height"] is None
 
@@ -123,8 +122,8 @@ def longest_link(design: aw.Design) -> list[float]:
 def test_custom_features_are_inputs() -> None:
     designs = problem().space.sample(6, 0)
     matrix = problem().space.matrix(designs)
-    found = Surrogate(problem(), longest_link).describe(matrix).inputs["physics"]
-    assert found.shape[1] == Surrogate(problem()).describe(matrix).inputs["physics"].shape[1] + 1
+    found = Surrogate(problem(), longest_link).features.describe(matrix).inputs["physics"]
+    assert found.shape[1] == Surrogate(problem()).features.describe(matrix).inputs["physics"].shape[1] + 1
     assert np.corrcoef(found[:, -1], [max(design.links) for design in designs])[0, 1] == pytest.approx(1.0)
 
 
@@ -145,14 +144,14 @@ def test_features_with_another_sampler_are_refused(sampler: str | SamplerFactory
 @pytest.mark.parametrize("value", [[np.nan], [np.inf, 1.0], [[1.0]], "long", {"length": 1.0}, [1.0, [2.0]], [None]])
 def test_features_that_are_not_finite_numbers_are_refused(value: Any) -> None:
     with pytest.raises(SettingsError, match=r"features: expected (\d finite )?numbers.*, got"):
-        Surrogate(problem(), lambda design: value).describe(observed(problem(), 2).matrix)
+        Surrogate(problem(), lambda design: value).features.describe(observed(problem(), 2).matrix)
 
 
 def test_features_of_varying_length_are_refused() -> None:
     p = problem(aw.load_space("desk-sorting"))
     matrix = p.space.matrix(p.space.sample(20, 0))
     with pytest.raises(SettingsError, match=r"expected \d finite numbers for every design"):
-        Surrogate(p, lambda design: design.links).describe(matrix)
+        Surrogate(p, lambda design: design.links).features.describe(matrix)
 
 
 @pytest.mark.parametrize("pending", [0, 3])
@@ -169,7 +168,7 @@ def test_pending_design_gains_less() -> None:
     known, surrogate = observed(p, 12), Surrogate(problem())
     best = surrogate.choose(known, 0)[None]
     waiting = Observations(known.matrix, known.values, known.failed, best)
-    before, after = (Screen(surrogate, k).gain(surrogate.describe(best))[0] for k in (known, waiting))
+    before, after = (Screen(surrogate, k).gain(surrogate.features.describe(best))[0] for k in (known, waiting))
     assert 0.0 < after < before
 
 

@@ -12,6 +12,7 @@ from typing import Any, cast
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 
 from armwright.exceptions import DesignError, did_you_mean
+from armwright.text import one_line
 
 ON_GRID, NEAR_GRID = 1e-8, 1e-6  # steps: Optuna's tolerance, and the distance that is rounded to the grid
 LARGEST = 2**63  # magnitude from which integers are refused
@@ -192,5 +193,4 @@ def _number(value: float) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, int) and not -LARGEST < value < LARGEST:
         return "a number beyond 64 bits"
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return one_line(repr(value), 60)

@@ -33,11 +33,15 @@ def study_prompt(
     """
     complete = [trial for trial in trials if trial.state == TrialState.COMPLETE]
     objectives = _objectives(study)
-    best, others = (
-        [_record(trial, parameters, objectives) for trial in group]
-        for group in _sample(complete, best_trials(complete, study.directions), seed, ranked=len(objectives) == 1)
-    )
-    under_way = [_params(given_params(trial), parameters) for trial in trials if _is_proposal_under_way(trial)]
+    rng, on_front = np.random.default_rng(seed), best_trials(complete, study.directions)
+    numbers = {trial.number for trial in on_front}
+    groups = [
+        on_front if len(objectives) == 1 else draw_in_order(on_front, N_PARETO, rng),  # those of one are ranked
+        draw_in_order([trial for trial in complete if trial.number not in numbers], N_RANDOM, rng),
+    ]
+    best, others = ([_record(trial, parameters, objectives) for trial in group] for group in groups)
+    unfinished = [trial for trial in trials if not trial.state.is_finished()]
+    under_way = [_params(given_params(trial), parameters) for trial in unfinished if "proposal" in trial.user_attrs]
     values = {
         "description": description.strip(),
         "parameters": parameters,
@@ -71,16 +75,6 @@ def _objectives(study: optuna.Study) -> list[dict[str, str]]:
     return [{"name": name, "key": key, "direction": direction} for name, key, direction in named]
 
 
-def _sample(
-    complete: Sequence[FrozenTrial], best: Sequence[FrozenTrial], seed: int, *, ranked: bool
-) -> tuple[Sequence[FrozenTrial], Sequence[FrozenTrial]]:
-    """Draw some of the best trials, or take all if they are ranked, and draw some of the others."""
-    rng = np.random.default_rng(seed)
-    numbers = {trial.number for trial in best}
-    others = [trial for trial in complete if trial.number not in numbers]
-    return best if ranked else draw_in_order(best, N_PARETO, rng), draw_in_order(others, N_RANDOM, rng)
-
-
 def _record(
     trial: FrozenTrial, parameters: Sequence[Parameter], objectives: Sequence[Mapping[str, str]]
 ) -> Mapping[str, Any]:
@@ -97,7 +91,3 @@ def _record(
 
 def _params(params: Mapping[str, Any], parameters: Sequence[Parameter]) -> str:
     return ", ".join(f"{p.key} = {value_text(params[p.name], p.distribution)}" for p in parameters if p.name in params)
-
-
-def _is_proposal_under_way(trial: FrozenTrial) -> bool:
-    return "proposal" in trial.user_attrs and not trial.state.is_finished()

@@ -50,7 +50,8 @@ STALL_GROWTH = 3e-4  # of the hypervolume, relative, over that share
 
 # Attributes of a search, without the leading underscore, that make up its state.
 _COUNTERS = ("generation", "evaluations", "random_left", "side_evaluations", "side_age")
-_ARRAYS = ("matrix", "values", "front_matrix", "front_values", "side_matrix", "side_values", "reference_point")
+_ARRAYS = ("history", "matrix", "values", "front_matrix", "front_values", "side_matrix", "side_values")
+_STATE = (*_COUNTERS, *_ARRAYS, "reference_point")
 
 
 class FrontSearch:
@@ -86,7 +87,7 @@ class FrontSearch:
         self._evaluations = 0
         self._matrix = np.empty((0, len(self._encoding)))
         self._values = np.empty((0, len(self._reference_point)))
-        self._history: list[tuple[int, float]] = []
+        self._history = np.empty((0, 2))
         self._front_matrix, self._front_values = self._matrix, self._values
         self._side_matrix: Array = self._matrix
         self._side_values: Array = self._values
@@ -118,7 +119,7 @@ class FrontSearch:
     @property
     def history(self) -> Array:
         """(K, 2) evaluations and hypervolume, recorded whenever the evaluations had grown by 2 %."""
-        return np.array(self._history).reshape(-1, 2)
+        return self._history
 
     @property
     def stalled(self) -> bool:
@@ -157,8 +158,8 @@ class FrontSearch:
             self._select_side(matrix, values)
         else:
             self._select(matrix, values)
-        if not self._history or self._evaluations >= RECORD_SPACING * self._history[-1][0]:
-            self._history.append((self._evaluations, self.hypervolume))
+        if not len(self._history) or self._evaluations >= RECORD_SPACING * self._history[-1, 0]:
+            self._history = np.vstack([self._history, (self._evaluations, self.hypervolume)])
 
     def step(self, limit: int | None = None) -> None:
         """Run one generation, limited to its first designs if a limit is given."""
@@ -170,19 +171,16 @@ class FrontSearch:
         self._reference_point = np.asarray(reference_point, dtype=np.float64)
         self._update_front(self._matrix, self._values)
         earlier = [(n, volume) for n, volume in history if n < self._evaluations]
-        self._history = [*earlier, (self._evaluations, self.hypervolume)]
+        self._history = np.array([*earlier, (self._evaluations, self.hypervolume)])
 
     def state(self) -> dict[str, Any]:
         """Return the arrays and numbers that `restore` needs; later steps do not change them."""
-        return {"history": self.history, **{name: getattr(self, f"_{name}") for name in (*_COUNTERS, *_ARRAYS)}}
+        return {name: getattr(self, f"_{name}") for name in _STATE}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Resume from the `state` of a search with the same arguments, to the bit."""
-        for name in _COUNTERS:
-            setattr(self, f"_{name}", int(state[name]))
-        for name in _ARRAYS:
-            setattr(self, f"_{name}", np.array(state[name]))
-        self._history = [(int(evaluations), float(value)) for evaluations, value in state["history"]]
+        for name in _STATE:
+            setattr(self, f"_{name}", int(state[name]) if name in _COUNTERS else np.array(state[name]))
 
     @property
     def _capacity(self) -> int:

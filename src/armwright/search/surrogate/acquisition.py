@@ -28,9 +28,6 @@ class Forecast:
     mean: Array  # (N, M) of each objective
     deviation: Array  # (N, M) standard deviations
 
-    def __len__(self) -> int:
-        return len(self.mean)
-
     def shortfall(self, objective: int, bounds: Array) -> Array:
         """Return (N, K) the expectations of max(0, z - y) for K bounds z of an objective y."""
         is_finite = np.isfinite(bounds)
@@ -47,7 +44,7 @@ def expected_gain(forecast: Forecast, values: Array, reference_point: Array) -> 
     front = within[front_mask(within)]
     front = front[thinned(front, reference_point, LONGEST_FRONT[n_objectives])]
     lower, upper = free_boxes(front, reference_point)
-    gain = np.ones((len(forecast), len(lower)))
+    gain = np.ones((len(forecast.mean), len(lower)))
     for objective in range(n_objectives):
         bounds, index = np.unique(np.concatenate([lower[:, objective], upper[:, objective]]), return_inverse=True)
         shortfall = forecast.shortfall(objective, bounds)

@@ -15,12 +15,14 @@ from armwright.problem.objective import Objective
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
-from armwright.search.surrogate.custom_inputs import CustomInputs
 from armwright.search.surrogate.dynamic_quantities import dynamic_quantities
-from armwright.spaces.parameters import CategoricalParameter, Design
+from armwright.spaces.design_columns import DesignColumns
+from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.parameters import CategoricalParameter, Design, FloatParameter
 
 PHYSICS, DYNAMICS, PARAMETERS = "physics", "dynamics", "parameters"  # sets of inputs
 PROBES = 400  # random designs that scale the inputs
+BASE = slice(3)  # columns of a design matrix: the position of the base, which means the same in every structure
 HEAVY_TAIL = 8.0  # the largest value over the median, from which a quantity counts by its logarithm
 LOG_FLOOR = 3e-2  # of the median, added before a logarithm
 SAME = 0.9999  # correlation of two quantities from which one is left out
@@ -100,7 +102,6 @@ class CheapFeatures:
         self._problem = problem
         self._function = function
         self._encoding = DesignEncoding(problem.space.parameters)
-        self._custom = CustomInputs(problem.space)
 
     def describe(self, matrix: Array) -> Description:
         """Return the description of designs (N, P)."""
@@ -110,24 +111,25 @@ class CheapFeatures:
     def _columns(self, matrix: Array) -> tuple[dict[str, Array], Array]:
         """Return the unscaled inputs of designs in each set, and their violations (N, C)."""
         values, violations = self._values(matrix)
-        others = [self._custom(matrix), self._features(matrix)]
+        others = [custom_inputs(self._problem.space, matrix), self._features(matrix)]
         n = len(self._quantities)
         columns = {
-            PHYSICS: np.column_stack([values[:, :n], matrix[:, self._base], self._joint_counts(matrix), *others]),
+            PHYSICS: np.column_stack([values[:, :n], matrix[:, BASE], self._joint_counts(matrix), *others]),
             DYNAMICS: np.column_stack([values[:, n:], *others]),
             PARAMETERS: self._parameters(matrix),
         }
         return columns, violations
 
     def _values(self, matrix: Array) -> tuple[Array, Array]:
-        """Return all quantities of designs, the dynamic ones last, and their violations (N, C)."""
+        """Return all quantities of designs, the dynamic ones last, and their violations (N, C) in the worst case."""
         tables: list[Array] = []
         violations = np.empty((len(matrix), len(self._problem.constraints)))
         for rows in self._problem.chunks(len(matrix)):
             evaluation = self._problem.physics(matrix[rows])
             physics = [quantity(evaluation) for quantity in self._quantities]
-            tables.append(np.column_stack([*physics, dynamic_quantities(evaluation)]))
-            violations[rows] = self._worst_violations(matrix[rows], evaluation)
+            tables.append(np.column_stack([*physics, *dynamic_quantities(evaluation).values()]))
+            others = (self._problem.physics(matrix[rows], case) for case in range(1, len(self._problem.scenes)))
+            violations[rows] = np.max([self._problem.violations(one) for one in (evaluation, *others)], axis=0)
         return np.concatenate(tables), violations
 
     def _features(self, matrix: Array) -> Array:
@@ -135,14 +137,6 @@ class CheapFeatures:
         if self._function is None:
             return np.empty((len(matrix), 0))
         return _checked_features(self._function, self._problem.space.designs(matrix))
-
-    def _worst_violations(self, matrix: Array, evaluation: Evaluation) -> Array:
-        """Return the (N, C) violations of designs in the worst case of the task."""
-        problem = self._problem
-        cases = [problem.violations(evaluation)]
-        for case in range(1, len(problem.scenes)):
-            cases.append(problem.violations(problem.physics(matrix, case)))
-        return np.max(cases, axis=0)
 
     def _parameters(self, matrix: Array) -> Array:
         """Return (N, R) the parameters of designs: real ones on the unit cube, choices as indicators."""
@@ -154,22 +148,9 @@ class CheapFeatures:
 
     def _joint_counts(self, matrix: Array) -> Array:
         """Return (N, L) how many joints of each type designs have."""
-        parameters = self._problem.space.parameters
-        columns = [i for i, p in enumerate(parameters) if p.name.startswith("joint_")]
-        present = np.arange(len(columns)) < self._encoding.n_joints(matrix)[:, None]
-        counts = np.zeros((len(matrix), len(self._problem.space.joint_types)))
-        for position, column in enumerate(columns):
-            parameter = parameters[column]
-            assert isinstance(parameter, CategoricalParameter)
-            letters = np.array(parameter.choices)[matrix[:, column].astype(np.intp)]
-            for i, letter in enumerate(self._problem.space.joint_types):
-                counts[:, i] += present[:, position] & (letters == letter)
-        return counts
-
-    @cached_property
-    def _base(self) -> list[int]:
-        """Return the columns of a design matrix that mean the same in every structure: the base position."""
-        return [i for i, p in enumerate(self._problem.space.parameters) if p.name.startswith("origin_")]
+        types, columns = self._problem.space.joint_types, DesignColumns(self._problem.space, matrix)
+        kinds = np.where(columns.present, columns.choices("joint", types.index, types[0]), len(types))  # (N, M)
+        return (kinds[..., None] == np.arange(len(types))).sum(axis=1).astype(np.float64)
 
     @cached_property
     def _probes(self) -> Array:
@@ -187,6 +168,25 @@ class CheapFeatures:
         asked = [q for q in QUANTITIES.values() if q.name != "joints" and (clearances or "clearance" not in q.needs)]
         evaluation = problem.physics(self._probes[:8])
         return tuple(quantity for quantity in asked if _is_defined(quantity, evaluation))
+
+
+def custom_inputs(space: DesignSpace, matrix: Array) -> Array:
+    """Return (N, K) inputs for the custom parameters of designs, which mean the same in every structure.
+
+    They are numbers on [-1, 1] on the scales of their parameters, then an indicator for each choice. Inactive
+    parameters are 0, the centre of a range.
+    """
+    active = {p: space.active(p.name, matrix) for p in space.parameters if p.name in space.custom_names}
+    column = {p: i for i, p in enumerate(space.parameters)}
+    numbers = [p for p in active if isinstance(p, FloatParameter)]
+    units = DesignEncoding(numbers).units(matrix[:, [column[p] for p in numbers]])
+    columns = [np.where(active[p], 2.0 * units[:, i] - 1.0, 0.0) for i, p in enumerate(numbers)]
+    indicators: list[Array] = [
+        (matrix[:, [column[p]]] == np.arange(len(p.choices))) & active[p][:, None]
+        for p in active
+        if isinstance(p, CategoricalParameter)
+    ]
+    return np.column_stack([np.empty((len(matrix), 0)), *columns, *indicators])
 
 
 def _checked_features(function: FeatureFunction, designs: Sequence[Design]) -> Array:

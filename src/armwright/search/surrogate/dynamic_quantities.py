@@ -9,19 +9,9 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.problem.evaluation import Evaluation
 
-QUANTITIES = (
-    "inertia",  # largest eigenvalue of the joint-space inertia matrix in the kept posture, summed over targets [kg m²]
-    "worst_inertia",  # its maximum
-    "joint_travel",  # Euclidean norm of the turns of the motors from the target before, summed [rad]
-    "longest_turn",  # of a motor from the target before [rad]
-    "kinetic_energy_at_1_s_a_move",  # at the targets if the turns from the target before took one second, summed [J]
-    "sag_at_1_Nm_per_rad",  # of the tip by gravity if every motor yields 1 rad under 1 N m, first order, summed [m]
-    "tip_sweep",  # of the tip by the turns from the target before, were its Jacobian the target's, summed [m]
-)
 
-
-def dynamic_quantities(evaluation: Evaluation) -> Array:
-    """Return (N, Q) the QUANTITIES of arms."""
+def dynamic_quantities(evaluation: Evaluation) -> dict[str, Array]:
+    """Return (N,) each of the quantities of arms, by name."""
     inertia = np.linalg.eigvalsh(evaluation.motor_inertia)[..., -1].astype(np.float64)
     turns = np.diff(evaluation.q, axis=1, prepend=0.0) / evaluation.arms.travel[:, None]  # (N, T, D) [rad]
     energy = 0.5 * np.einsum("nti,ntij,ntj->nt", turns, evaluation.motor_inertia, turns)
@@ -29,13 +19,19 @@ def dynamic_quantities(evaluation: Evaluation) -> Array:
         np.linalg.norm((evaluation.motor_jacobian @ motion[..., None])[..., 0], axis=-1)
         for motion in (evaluation.motor_torques, turns)
     )
-    columns = [
-        inertia.sum(axis=1),
-        inertia.max(axis=1),
-        np.linalg.norm(turns, axis=-1).sum(axis=1),
-        np.abs(turns).max(axis=(1, 2)),
-        energy.sum(axis=1),
-        sag.sum(axis=1),
-        sweep.sum(axis=1),
-    ]
-    return np.column_stack(columns)
+    return {
+        # largest eigenvalue of the joint-space inertia matrix in the kept posture, summed over targets [kg m²]
+        "inertia": inertia.sum(axis=1),
+        # its maximum
+        "worst_inertia": inertia.max(axis=1),
+        # Euclidean norm of the turns of the motors from the target before, summed [rad]
+        "joint_travel": np.linalg.norm(turns, axis=-1).sum(axis=1),
+        # of a motor from the target before [rad]
+        "longest_turn": np.abs(turns).max(axis=(1, 2)),
+        # at the targets if the turns from the target before took one second, summed [J]
+        "kinetic_energy_at_1_s_a_move": energy.sum(axis=1),
+        # of the tip by gravity if every motor yields 1 rad under 1 N m, first order, summed [m]
+        "sag_at_1_Nm_per_rad": sag.sum(axis=1),
+        # of the tip by the turns from the target before, were its Jacobian the target's, summed [m]
+        "tip_sweep": sweep.sum(axis=1),
+    }

@@ -41,11 +41,6 @@ class Hyperparameters:
     noise: float  # variance of what the inputs do not explain
     lengths: Array  # (F,) in units of the inputs
 
-    @property
-    def logs(self) -> Array:
-        """(2 + F,) logarithms of all."""
-        return np.log(np.concatenate([[self.amplitude, self.noise], self.lengths]))
-
 
 @dataclass(frozen=True)
 class GaussianProcess:
@@ -64,22 +59,10 @@ class GaussianProcess:
             return cross @ self._weights, np.sqrt(variance)
 
     @cached_property
-    def log_marginal_likelihood(self) -> float:
-        """Logarithm of the probability density of the observations."""
-        fit = self.observations @ self._weights
-        return -0.5 * float(fit - 2.0 * np.log(np.diag(self._root)).sum() + len(self.inputs) * np.log(2.0 * np.pi))
-
-    @cached_property
     def left_out(self) -> tuple[Array, Array]:
         """(N,) means and standard deviations of each observation, predicted from all others."""
         precision = (self._root**2).sum(axis=0)
         return self.observations - self._weights / precision, np.sqrt(1.0 / precision)
-
-    @property
-    def log_posterior(self) -> float:
-        """Logarithm of marginal likelihood times prior of the hyperparameters; the prior is relative to its mode."""
-        off = _from_prior(self.hyperparameters.logs, *_priors(self.inputs.shape[1]))
-        return self.log_marginal_likelihood - 0.5 * float(off @ off)
 
     @cached_property
     def _root(self) -> Array:
@@ -91,12 +74,13 @@ class GaussianProcess:
         return self._root.T @ (self._root @ self.observations)
 
 
-def fit(inputs: Array, observations: Array) -> Hyperparameters:
+def fit(inputs: Array, observations: Array) -> tuple[Hyperparameters, float]:
     """Return the hyperparameters of the largest marginal likelihood times prior, found from two starts.
 
+    The second value is the logarithm of that product, of which the prior is relative to its mode.
     Inputs (N, F) and observations (N,) are scaled as those of a GaussianProcess.
     """
-    mean, spread = _priors(inputs.shape[1])
+    mean, spread = priors(inputs.shape[1])
     bounds = np.column_stack([mean - PRIOR_WIDTH * spread, mean + PRIOR_WIDTH * spread])
     bounds[1, 0] = np.log(NOISE_FLOOR)
     noisy = mean + np.concatenate([[-0.5, 2.0], np.full(inputs.shape[1], 0.5)])
@@ -113,7 +97,8 @@ def fit(inputs: Array, observations: Array) -> Hyperparameters:
             )
             for start in (mean, noisy)
         ]
-    return _hyperparameters(min(found, key=lambda result: result.fun).x)
+    best = min(found, key=lambda result: result.fun)
+    return _hyperparameters(best.x), -float(best.fun)
 
 
 def loss(logs: Array, inputs: Array, observations: Array, mean: Array, spread: Array) -> tuple[float, Array]:
@@ -135,7 +120,7 @@ def loss(logs: Array, inputs: Array, observations: Array, mean: Array, spread: A
     by_length = 2.0 * (slope.sum(axis=1) @ inputs**2 - (inputs * (slope @ inputs)).sum(axis=0)) / found.lengths**2
     gradient = np.concatenate([[(outer * covariance).sum(), found.noise * np.trace(outer)], by_length])
     likelihood = -0.5 * observations @ weights + np.log(np.diag(inverse_root)).sum() - 0.5 * n * np.log(2.0 * np.pi)
-    off = _from_prior(logs, mean, spread)
+    off = (logs - mean) / spread
     return float(0.5 * off @ off - likelihood), off / spread - gradient
 
 
@@ -143,12 +128,7 @@ def _hyperparameters(logs: Array) -> Hyperparameters:
     return Hyperparameters(float(np.exp(logs[0])), float(np.exp(logs[1])), np.exp(logs[2:]))
 
 
-def _from_prior(logs: Array, mean: Array, spread: Array) -> Array:
-    """Return how many standard deviations of their priors hyperparameters are off."""
-    return (logs - mean) / spread
-
-
-def _priors(n: int) -> tuple[Array, Array]:
+def priors(n: int) -> tuple[Array, Array]:
     """Return the means and standard deviations of the logarithms of the hyperparameters for n inputs."""
     length, spread = LENGTH
     means = np.concatenate([[AMPLITUDE[0], NOISE[0]], np.full(n, length + 0.5 * np.log(n))])

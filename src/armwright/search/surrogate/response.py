@@ -1,9 +1,11 @@
-"""Models of one objective: which inputs, which transform, and what they predict."""
+"""Models of one objective, and of the success of evaluations: which inputs, which transform, and what they predict."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from armwright.arrays import Array
 from armwright.search.surrogate.gaussian_process import GaussianProcess, Hyperparameters, fit
@@ -11,6 +13,7 @@ from armwright.search.surrogate.gaussian_process import GaussianProcess, Hyperpa
 SHIFT = 0.03  # of the median, added before a logarithm, so that a value near 0 does not stand out
 SMALLEST = 1e-100  # median of values whose logarithms are taken
 LARGEST_LOG = 700.0  # of a prediction, so that it is finite
+LEAST = 1e-3  # probability of success, so that all designs are comparable
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,22 @@ class ResponseModel:
     log_posterior: float  # of its hyperparameters and the values
 
 
+@dataclass(frozen=True)
+class SuccessModel:
+    """The probability that the evaluation of a design succeeds.
+
+    Least-squares classification: Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, section 6.5.
+    """
+
+    inputs: str  # name of its set of inputs
+    process: GaussianProcess  # of success (1) and failure (-1)
+
+    def probability(self, inputs: Mapping[str, Array]) -> Array:
+        """Return (N,) the probabilities of designs with these inputs, (N, F) of each set."""
+        mean, deviation = self.process.predict(inputs[self.inputs])
+        return np.maximum(ndtr(mean / np.hypot(deviation, np.sqrt(self.process.hyperparameters.noise))), LEAST)
+
+
 def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:
     """Return the model under which the values (N,) of an objective are most probable.
 
@@ -70,8 +89,17 @@ def choose_model(inputs: Mapping[str, Array], values: Array) -> ResponseModel:
     return max(models, key=lambda model: model.log_posterior)
 
 
+def choose_success_model(inputs: Mapping[str, Array], failed: NDArray[np.bool_]) -> ResponseModel:
+    """Return the model, by its set of inputs (N, F), under which `failed` (N,) is most probable."""
+    labels, as_it_is = success_labels(failed), Transform(is_log=False, shift=0.0, mean=0.0, deviation=1.0)
+    return max((_fitted(name, inputs, labels, as_it_is) for name in inputs), key=lambda model: model.log_posterior)
+
+
+def success_labels(failed: NDArray[np.bool_]) -> Array:
+    """Return (N,) 1 for evaluations that succeeded, -1 for others."""
+    return np.where(failed, -1.0, 1.0)
+
+
 def _fitted(name: str, inputs: Mapping[str, Array], values: Array, transform: Transform) -> ResponseModel:
-    observations = transform(values)
-    process = GaussianProcess(inputs[name], observations, fit(inputs[name], observations))
-    log_posterior = process.log_posterior + transform.log_slopes(values)
-    return ResponseModel(name, transform, process.hyperparameters, log_posterior)
+    hyperparameters, log_posterior = fit(inputs[name], transform(values))
+    return ResponseModel(name, transform, hyperparameters, log_posterior + transform.log_slopes(values))

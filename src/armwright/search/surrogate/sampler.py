@@ -15,7 +15,6 @@ from armwright.exceptions import SettingsError
 from armwright.problem.problem import Problem
 from armwright.search.callable_names import name_of
 from armwright.search.surrogate.cheap_features import FeatureFunction
-from armwright.search.surrogate.proposal_screen import rejection
 from armwright.search.surrogate.surrogate import STARTUP, Observations, Surrogate
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import Design
@@ -99,7 +98,7 @@ class SurrogateSampler(BaseSampler):
         """Return the gain and the prediction of a design that is not worth an evaluation; None if it is."""
         space = self._surrogate.problem.space
         row = space.normalised(space.matrix([design]))[0]
-        return rejection(self._surrogate, self._observations(study, None), row, self._seed)
+        return self._surrogate.rejection(self._observations(study, None), row, self._seed)
 
     def _observations(self, study: Study, trial: FrozenTrial | None) -> Observations:
         signs = np.array([1.0 if d is StudyDirection.MINIMIZE else -1.0 for d in study.directions])

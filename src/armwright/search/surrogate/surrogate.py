@@ -12,12 +12,18 @@ from armwright.arrays import Array
 from armwright.pareto import feasible_mask, total_violation
 from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import stated_bounds, with_bounds
+from armwright.runs.history import History
 from armwright.search.surrogate.acquisition import Forecast, expected_gain
 from armwright.search.surrogate.candidates import Candidates
 from armwright.search.surrogate.cheap_features import CheapFeatures, Description, FeatureFunction
-from armwright.search.surrogate.gaussian_process import GaussianProcess, Hyperparameters
-from armwright.search.surrogate.response import ResponseModel, choose_model
-from armwright.search.surrogate.success import SuccessModel, choose_success_model, success_labels
+from armwright.search.surrogate.gaussian_process import GaussianProcess
+from armwright.search.surrogate.response import (
+    ResponseModel,
+    SuccessModel,
+    choose_model,
+    choose_success_model,
+    success_labels,
+)
 from armwright.seeding import derived_seed
 
 REFRESH = 20  # trials after which new designs are screened
@@ -25,6 +31,10 @@ MUTANTS = 600  # variations of the present front
 STARTUP = 5  # successful evaluations before objectives are modelled
 RANDOM = 64  # random designs that are considered until then
 GROWTH = 10  # models are chosen anew when the trials have grown by one tenth
+FEWEST = 10  # designs whose errors mean something
+LEAST_TRIALS = 15  # evaluations that succeeded; fewer teach too little to reject a proposal
+LEAST_QUALITY = 0.5  # share of the variance of each objective that is predicted if each value is left out
+LEAST_GAIN = 0.1  # of the best candidate's; such a proposal is worth less than a tenth of the sampler's own design
 
 
 @dataclass(frozen=True)
@@ -55,7 +65,7 @@ class Surrogate:
 
     def __post_init__(self) -> None:
         """Prepare inputs and sources of candidates."""
-        self._features = CheapFeatures(self.problem, self.function)
+        self.features = CheapFeatures(self.problem, self.function)
         self._candidates = Candidates(self.problem)
 
     def choose(self, observations: Observations, seed: int) -> Array:
@@ -74,7 +84,7 @@ class Surrogate:
         space, rng = self.problem.space, np.random.default_rng(seed)
         matrix = space.normalised(space.matrix(space.sample(RANDOM, seed)))
         matrix = np.vstack([matrix, self._mutants(observations, ~observations.failed, rng)])
-        known, success = self._features.describe(matrix), self.success(observations)
+        known, success = self.features.describe(matrix), self.success(observations)
         violation = total_violation(known.violations)
         probability = np.ones(len(matrix)) if success is None else success.probability(known.inputs)
         return matrix[int(np.lexsort((-probability, violation))[0])]
@@ -85,12 +95,45 @@ class Surrogate:
         matrix, known = self._screened(observations)
         mutants = self._mutants(observations, screen.feasible, rng)
         if len(mutants):
-            matrix, known = np.vstack([matrix, mutants]), known + self._features.describe(mutants)
+            matrix, known = np.vstack([matrix, mutants]), known + self.features.describe(mutants)
         return matrix, known
 
-    def describe(self, matrix: Array) -> Description:
-        """Return the description of designs (N, P)."""
-        return self._features.describe(matrix)
+    def rejection(self, observations: Observations, row: Array, seed: int) -> tuple[float, tuple[float, ...]] | None:
+        """Return why a design (P,) is not worth an evaluation; None if it is, or if too little is known to tell.
+
+        Returns:
+            Its expected gain of hypervolume, as a share of the best candidate's, and its predicted objectives.
+        """
+        if np.count_nonzero(~observations.failed) < LEAST_TRIALS:
+            return None
+        screen = Screen(self, observations)
+        if screen.quality.min() < LEAST_QUALITY:
+            return None
+        best = float(screen.gain(self.considered(observations, screen, seed)[1]).max())
+        known = self.describe_known(row[None])
+        gain = float(screen.gain(known)[0])
+        if gain >= LEAST_GAIN * best:
+            return None
+        return round(gain / best, 6), tuple(screen.predicted(known)[0].tolist())
+
+    def left_out_errors(self, history: History) -> dict[str, Any] | None:
+        """Return the leave-one-out errors for summary.json; None if fewer than ten designs were evaluated.
+
+        An error is the root mean square over the standard deviation of the transformed objective; None if the objective
+        is constant. Repeated designs count once, because predictions from their copies would be perfect.
+        """
+        trials = [trial for trial in history if trial.duplicate_of is None and trial.failure is None]
+        if len(trials) < FEWEST:
+            return None
+        space = self.problem.space
+        matrix = space.normalised(space.matrix([trial.design for trial in trials]))
+        values = np.array([trial.values for trial in trials])
+        quality = Screen(self, Observations(matrix, values, np.zeros(len(trials), dtype=bool), matrix[:0])).quality
+        errors = {
+            objective.name: round(float(np.sqrt(1.0 - share)), 4) if np.ptp(column) > 0.0 else None
+            for objective, share, column in zip(self.problem.objectives, quality, values.T, strict=True)
+        }
+        return {"designs": len(trials), "errors": errors}
 
     def describe_known(self, matrix: Array) -> Description:
         """Return the description of evaluated or pending designs (N, P), each of which is computed once and alone."""
@@ -98,7 +141,7 @@ class Surrogate:
         for row in matrix:
             key = row.tobytes()
             if key not in self._known:
-                self._known[key] = self._features.describe(row[None])
+                self._known[key] = self.features.describe(row[None])
             found.append(self._known[key])
         inputs = {name: np.vstack([one.inputs[name] for one in found]) for name in found[0].inputs}
         return Description(inputs, np.vstack([one.violations for one in found]))
@@ -123,12 +166,13 @@ class Surrogate:
         used = self._used(observations)
         used = used if used.failed.any() else observations
 
-        def chosen() -> tuple[str, Hyperparameters]:
+        def chosen() -> ResponseModel:
             return choose_success_model(self.describe_known(used.matrix).inputs, used.failed)
 
-        inputs, hyperparameters = self._remembered("success", (used.matrix.tobytes(), used.failed.tobytes()), chosen)
-        known = self.describe_known(observations.matrix).inputs[inputs]
-        return SuccessModel(inputs, GaussianProcess(known, success_labels(observations.failed), hyperparameters))
+        model = self._remembered("success", (used.matrix.tobytes(), used.failed.tobytes()), chosen)
+        known = self.describe_known(observations.matrix).inputs[model.inputs]
+        labels = success_labels(observations.failed)
+        return SuccessModel(model.inputs, GaussianProcess(known, labels, model.hyperparameters))
 
     def _used(self, observations: Observations) -> Observations:
         """Return the designs that models are chosen with: all up to the last tenth."""
@@ -156,7 +200,7 @@ class Surrogate:
 
         def screened() -> tuple[Array, Description]:
             matrix = self._candidates.screened(derived_seed(first, n // REFRESH))
-            return matrix, self._features.describe(matrix)
+            return matrix, self.features.describe(matrix)
 
         return self._remembered("screened", (first, n // REFRESH), screened)
 

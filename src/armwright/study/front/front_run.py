@@ -4,7 +4,7 @@ search.npz    state of the search, written every few seconds; a killed search lo
 trials.jsonl  designs of the final front; the others are counted only
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import nullcontext
 from hashlib import sha256
 from pathlib import Path
@@ -19,7 +19,6 @@ from armwright.problem.checks.requirements import refuse_unread_parameters
 from armwright.problem.problem import Problem
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import SEARCH, RunFolder, read_run
-from armwright.runs.trial import FinishedTrial
 from armwright.study.front.direct_search import DirectSearch, FrontRun
 from armwright.study.front.search_budget import SearchBudget, SearchProgress
 from armwright.study.front.time_plan import TimePlan
@@ -72,19 +71,15 @@ def find_front(
         if folder is not None:
             config = folder.adopt(config)
             if not (folder.path / SEARCH).exists():
-                matrix = np.vstack([matrix, _matrix(problem, folder.open_trials(config))])
+                stored = problem.space.matrix([trial.design for trial in folder.open_trials(config)])
+                matrix = np.vstack([matrix, stored])
         return DirectSearch(problem, config, folder, matrix, plan, watch).run(stop_at_stall)
-
-
-def _matrix(problem: Problem, trials: Iterable[FinishedTrial]) -> Array:
-    """Return the (N, P) designs of trials."""
-    return problem.space.matrix([trial.design for trial in trials]).reshape(-1, len(problem.space.parameters))
 
 
 def _initial_matrix(problem: Problem, initial_designs: str | Path | None) -> tuple[Array, dict[str, Any] | None]:
     """Return the (N, P) designs of a run folder, and a record of their origin."""
     if initial_designs is None:
-        return _matrix(problem, ()), None
+        return problem.space.matrix([]), None
     _, run = read_run(initial_designs)
     space = run.problem.space.model_copy(update={"name": problem.space.name})
     if space != problem.space or run.problem.task.targets != problem.task.targets:
@@ -92,5 +87,5 @@ def _initial_matrix(problem: Problem, initial_designs: str | Path | None) -> tup
             f"{initial_designs} holds a run of another task or design space ({run.problem.task.name}, "
             f"{run.problem.space.name})"
         )
-    matrix = _matrix(problem, run)
+    matrix = problem.space.matrix([trial.design for trial in run])
     return matrix, {"run": str(initial_designs), "designs": len(matrix), "sha256": sha256(matrix.tobytes()).hexdigest()}

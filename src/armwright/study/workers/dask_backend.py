@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import cast
 
 from armwright.exceptions import EvaluatorError
 from armwright.problem.problem import Problem
@@ -27,7 +27,6 @@ class DaskBackend:
     ) -> None:
         self._problem = pickle_problem(problem)
         self._timeout = timeout
-        self._designs: dict[int, Design] = {}  # in flight
         self._cluster = Cluster(workers, notify)
 
     @property
@@ -37,8 +36,9 @@ class DaskBackend:
 
     def submit(self, number: int, design: Design) -> None:
         """Send a design to a worker."""
-        self._designs[number] = design
-        self._cluster.submit(number, f"trial {number}", evaluate_on_worker, self._problem, design, self._timeout)
+        self._cluster.submit(
+            (number, design), f"trial {number}", evaluate_on_worker, self._problem, design, self._timeout
+        )
 
     def next_result(self, timeout: float) -> tuple[int, Evaluated] | None:
         """Return a trial that finished, or None if none does within `timeout` [s].
@@ -50,8 +50,7 @@ class DaskBackend:
         finished = self._cluster.wait(timeout)
         if finished is None:
             return None
-        number: Any = finished.key
-        design = self._designs.pop(number)
+        number, design = cast("tuple[int, Design]", finished.key)
         if finished.is_lost:
             way_out = "" if self._timeout is not None else ", with --evaluation-timeout S if the evaluator crashes"
             raise EvaluatorError(
