@@ -74,9 +74,9 @@ def make(problem: Problem) -> None:
         run = Nsga2(problem, seed, population=100, evaluations=theirs)
         take(f"pymoo's NSGA-II, seed {seed}, {theirs:,} evaluations", (run.rows, run.values))
 
-    # Rounded first, so that the values are those of the numbers in the file.
+    # Rounded first, so that values and hypervolume are those of the numbers in the file.
     everything = np.round(np.vstack(rows), DECIMALS)
-    worth = problem.evaluate(everything).penalised
+    worth = np.vectorize(lambda value: float(written(value)))(problem.evaluate(everything).penalised)
     on_front = front(worth, np.asarray(reference))
     volume = hypervolume(worth[on_front], reference)
     print(f"  {problem.task.name}: together {volume:.4f} in {time.perf_counter() - started:.0f} s", flush=True)
@@ -84,6 +84,11 @@ def make(problem: Problem) -> None:
         kept = on_front[reduced(worth[on_front], reference)]
         kept = kept[np.argsort(worth[kept, 0])]
         write(problem, everything[kept], worth[kept], reference, words, volume)
+
+
+def written(value: float) -> str:
+    """Return a value as the file states it."""
+    return f"{value:.9g}"
 
 
 def reduced(values: Array, reference: tuple[float, ...]) -> Array:
@@ -125,7 +130,7 @@ def write(
     writer.writerow([p.name for p in problem.space.parameters] + [o.name for o in problem.objectives])
     for design, row in zip(problem.space.designs(rows), values.tolist(), strict=True):
         params = [design.params.get(parameter.name, "") for parameter in problem.space.parameters]
-        writer.writerow([*params, *(f"{value:.9g}" for value in row)])
+        writer.writerow([*params, *map(written, row)])
     PLACE.mkdir(exist_ok=True)
     (PLACE / f"{problem.task.name}.csv").write_text(text.getvalue(), encoding="utf-8")
 

@@ -21,9 +21,9 @@ WHOLE = {
     "target-1": 10.384170197633225,
     "target-2": 21.263034174852393,
     "welding-seam": 56.19225118012125,
-    "desk-sorting": 12187.75386291132,
-    "casting-inspection": 1594.0407364744744,
-    "screwing": 111479.13049477198,
+    "desk-sorting": 12186.391446125599,
+    "casting-inspection": 2016.0358475076594,
+    "screwing": 111568.78075558163,
 }
 
 
