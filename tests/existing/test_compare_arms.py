@@ -80,7 +80,7 @@ def test_exported_design_compared_as_existing_arm_keeps_its_values(run: Path, hi
     for member, arm in zip(members, comparison.arms, strict=True):
         assert arm.values == pytest.approx(member.values, rel=1e-3, abs=1e-4)
         assert arm.value("mass") == pytest.approx(member.arm.mass)
-        assert arm.value("reach") == pytest.approx(design_sheet(run, member.number).reach, rel=1e-3)
+        assert arm.value("reach") == pytest.approx(design_sheet(run, member.number).over_reach[-1].distance, rel=1e-3)
         assert arm.joints == 3
         assert (arm.value("position_error"), arm.value("torque")) == arm.values
     assert len({arm.name for arm in comparison.arms}) == 4  # all files are called arm.urdf

@@ -49,7 +49,7 @@ def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Serv
         task = folder / "secret-cell.yaml"
         task.write_text(TASK, encoding="utf-8")
         with served_editor(task, port) as editor:
-            mine = Editor(EditedFiles(task)).app().routes
+            mine = Editor(EditedFiles(task)).routes()
             assert [one.path for one in mine if isinstance(one, Mount)] == ["/run"]
             live = [Route(f"/run{one.path}", one.endpoint, methods=one.methods) for one in LivePage(run).routes()]
             yield Server(editor.address, kind, (*(one for one in mine if isinstance(one, Route)), *live), SHELLS)
