@@ -197,3 +197,9 @@ def test_cheapest_and_stiffest_designs_are_roles_where_they_are_known() -> None:
         for name in ("price", "deflection"):
             least, picked = roles[f"least {name}"][0], pick(history, by=name)[0].number
             assert np.ptp(QUANTITIES[name](history.evaluation([least, picked]))) == 0.0  # two may be equal
+
+
+def test_a_design_that_holds_follows_one_that_fails_in_the_simulation(history: History) -> None:
+    knee, _, third = candidates(history)["knee"][:3]
+    chosen = recommend(history, survival(history, {knee, third}), cast("Simulator", Verdicts({knee})))
+    assert [one.design for one in chosen if one.role == "knee"] == [third]
