@@ -116,7 +116,7 @@ def tutorial(folder: Path, page: Page, file: Path) -> None:
         block = next(b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if b.startswith(key))
         (folder / name).write_text(block, encoding="utf-8")
     command = ["design", "feeder.yaml", "--space", "space.yaml", "--evaluations", 8000, "--seed", 1]
-    open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=1&target=3")
+    open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=0&target=3")
     page.screenshot(path=file)
 
 
