@@ -114,12 +114,11 @@ def cheapest_first(history: History, numbers: Sequence[int]) -> list[int]:
 
 
 def _preferred(history: History, numbers: Sequence[int], survival: Mapping[int, Survival]) -> list[int]:
-    """Return the designs for a role, with those that hold before the others, near ones if the first does not hold."""
+    """Return the designs for a role, with those that hold before the others if one of them is near the first one."""
+    bound = NEAR * history.values[numbers[0]]
     holding = [number for number in numbers if number in survival and survival[number].holds]
-    if numbers[0] not in holding:
-        bound = NEAR * history.values[numbers[0]]
-        holding = [number for number in holding if np.all(history.values[number] <= bound)]
-    return [*holding, *(number for number in numbers if number not in holding)]
+    near = [number for number in holding if np.all(history.values[number] <= bound)]
+    return sorted(numbers, key=lambda number: (number not in near, number not in holding)) if near else list(numbers)
 
 
 def recommend(
