@@ -80,7 +80,7 @@ def test_designs_to_build_come_first_and_state_what_the_kernels_compute(
     evaluation, stated = history.evaluation([number]), asked(tab, number)
     price, sag = (float(QUANTITIES[name](evaluation)[0]) for name in ("price", "deflection"))
     assert stated["Price"] == f"{price:,.2f} USD"
-    assert stated["Deflection"] == f"{1e3 * sag:.3g} mm"
+    assert stated["Deflection"] == f"{1e3 * sag:#.3g} mm"
     assert stated["Mass"] == f"{history.member(number).arm.mass:.3g} kg"
     pictures = tab.page.locator(".card img").evaluate_all("all => all.map((one) => one.src)")
     assert all(picture.startswith("data:image/png") for picture in pictures)

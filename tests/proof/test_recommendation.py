@@ -188,7 +188,7 @@ def test_cheapest_and_stiffest_designs_are_roles_where_they_are_known() -> None:
     examples = Path(__file__).parents[2] / "examples"
     task = aw.load_task(examples / "6-price-task.yaml")
     space = aw.load_space(examples / "6-price-space.yaml")
-    for objectives, ends in ((("mass", "cycle_time"), ["mass", "cycle_time"]), (("position_error", "torque"), [])):
+    for objectives, ends in ((("mass", "cycle_time"), ["mass", "cycle time"]), (("position_error", "torque"), [])):
         changes = {"objectives": objectives, "reference_point": None}
         problem = aw.Problem(task.model_copy(update=changes), space)
         history = aw.find_front(problem, evaluations=300).history

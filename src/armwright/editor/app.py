@@ -22,6 +22,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, Router
@@ -31,7 +32,7 @@ from armwright.editor.choices import choices
 from armwright.editor.design_run import DesignRun, next_folder
 from armwright.editor.edited_files import MAX_BYTES, EditedFiles, Texts
 from armwright.editor.yaml_edits import Edit, edit_text
-from armwright.exceptions import TaskError, UsageError
+from armwright.exceptions import TaskError
 from armwright.page.assembly import SHARED, PageSource, assemble
 from armwright.page.live_app import LivePage, show_shell
 from armwright.page.request_guard import post_route, to_response
@@ -150,7 +151,7 @@ class Editor:
 
     def design(self, body: DesignBody) -> dict[str, Any]:
         if self._job is not None and self._job.is_running:
-            raise UsageError("a search is running; stop it first")
+            raise HTTPException(409, "a search is running; stop it first")
         name = parse_document(body.task, Task, TaskError, self._files.task).name
         self._files.save(body, body.overwrite)
         self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))

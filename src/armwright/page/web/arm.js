@@ -116,10 +116,7 @@ function legend() {
   const parts = [...["x", "y", "z"].map((axis) => [joint[axis], labels[axis]]),
     [NOW, "current target"], [HIT, "reached"], [content.head.colours.missed, "missed"]];
   if (content.obstacles.length) parts.push([content.head.colours.obstacle, "obstacle"]);
-  const ofTask = [
-    ...(content.head.bodies.length ? ["tool and payload at targets"] : []), ...(content.head.lines.length ? ["lines of the cycle"] : []),
-    "compared design",
-  ];
+  const ofTask = [...(content.head.bodies.length ? ["tool, payload"] : []), ...(content.head.lines.length ? ["lines"] : []), "compared design"];
   parts.push([content.head.colours.target, ofTask.join(", ")]);
   if (content.head.workspace.length) parts.push([colour("soft"), "workspace (edges)"]);
   $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => element("span", { class: "key" }, dot(paint_), text)));
