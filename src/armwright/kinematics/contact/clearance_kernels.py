@@ -27,8 +27,7 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
     Posed, Solids = solid.Posed, solid.Solids
     along_segment, may_be_nearer, nearer_link = solid.along_segment, solid.may_be_nearer, solid.nearer_link
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
-    tiny = real(1e-30)
-    parallel = real(1e-12)  # square of the sine of an angle that is 0 in float32
+    tiny, parallel = real(1e-30), real(1e-12)  # the latter is the square of the sine of an angle that is 0 in float32
 
     @kernel
     def link_axes(arms: Posed):

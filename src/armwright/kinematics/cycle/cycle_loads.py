@@ -112,7 +112,7 @@ def cycle_bearing_loads(
 
     terms: with wrenches.  durations: (N, M) of the motions [s].
     """
-    loaded = load_kernels("cycle.dynamics_kernels", device)
+    loaded = load_kernels("cycle.bearing_kernels", device)
     largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
     for group, own in zip(paths.groups, terms, strict=True):
         moments = _at(group.counts, paths.instants.times(_density(group)))

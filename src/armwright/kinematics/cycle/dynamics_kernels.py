@@ -149,43 +149,4 @@ def dynamics_kernels() -> SimpleNamespace:
                     wrenches[arm, sample, term, j] = Wrench(f[0], f[1], f[2], n[0], n[1], n[2])
                 after = here
 
-    @wp.func
-    def total_wrench(terms: wp.array4d(dtype=Wrench), arm: int, sample: int, j: int, s: real, ss: real):
-        """Return the wrench of a joint at s' and s''."""
-        return terms[arm, sample, 0, j] + s * s * terms[arm, sample, 1, j] + ss * terms[arm, sample, 2, j]
-
-    @kernel
-    def bearing_loads(
-        before: wp.array2d(dtype=int), share: wp.array2d(dtype=real), rate: wp.array(dtype=real),
-        change: wp.array(dtype=real), durations: wp.array2d(dtype=real), motion: wp.array2d(dtype=int),
-        axis: wp.array2d(dtype=Vector3), offset: wp.array2d(dtype=real), wrenches: wp.array4d(dtype=Wrench),
-        largest: wp.array4d(dtype=real),
-    ):  # fmt: skip
-        """Find the largest loads across the axes of joints that turn, as of `bearings.py`.
-
-        before, share: (M, F) sample before each instant of each motion, and share of the way to the next.  rate,
-        change: (F,) s_τ and s_ττ.  durations: (N, M) [s].  offset: (N, D) of the bearings [m].  wrenches: (N, S, 3, D)
-        as above.  largest: (N, M, D, 3) tilting moment [N m], axial and radial force [N].
-        """
-        arm, path = wp.tid()
-        for j in range(motion.shape[1]):
-            tilting, axial, radial = real(0.0), real(0.0), real(0.0)
-            if motion[arm, j] < wp.static(PRISMATIC):
-                a = axis[arm, j]
-                for f in range(rate.shape[0]):
-                    sample, after = before[path, f], share[path, f]
-                    s, ss = rate[f] / durations[arm, path], change[f] / (durations[arm, path] * durations[arm, path])
-                    total = (one - after) * total_wrench(wrenches, arm, sample, j, s, ss)
-                    total += after * total_wrench(wrenches, arm, sample + 1, j, s, ss)
-                    force, moment = Vector3(total[0], total[1], total[2]), Vector3(total[3], total[4], total[5])
-                    along = wp.dot(force, a)
-                    force -= along * a
-                    moment -= wp.dot(moment, a) * a
-                    lever = offset[arm, j] * wp.cross(a, force)
-                    axial, radial = wp.max(axial, wp.abs(along)), wp.max(radial, wp.length(force))
-                    tilting = wp.max(tilting, wp.max(wp.length(moment - lever), wp.length(moment + lever)))
-            largest[arm, path, j, 0] = tilting
-            largest[arm, path, j, 1] = axial
-            largest[arm, path, j, 2] = radial
-
-    return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms, bearing_loads=bearing_loads)
+    return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms)
