@@ -27,6 +27,7 @@ from armwright.proof.cycle_export import MODEL
 from armwright.proof.recommendation import recommend
 from armwright.proof.simulated_run import SimulatedMember, Simulator
 from armwright.proof.simulation import PASS
+from armwright.proof.verification import front_survival
 
 BUILT_IN = ("desk-sorting", "box-palletising", "lathe-tending", "screwing", "casting-inspection", "dispensing")
 EXAMPLES = ("2-assembly", "3-long-shelf", "4-wall-painting", "5-obstacle-reach", "6-price", "7-compare-arms")
@@ -107,7 +108,7 @@ def measure(name: str, evaluations: int) -> Result:
         verified=len(members) - len(failures),
         agreed=agreed,
         jumps=sum(jumps(member) for member in members),
-        recommended=tuple(one.status for one in recommend(history, simulator)),
+        recommended=tuple(one.status for one in recommend(history, front_survival(history, None), simulator)),
         deviations=np.concatenate([deviations(member) for member in members]) if members else np.empty(0),
         reasons=Counter(failures),
         motors=min(
