@@ -11,6 +11,7 @@ from armwright.arrays import Array
 from armwright.kinematics.cycle.cycle_choice import choose_postures
 from armwright.kinematics.cycle.entry_postures import entry_postures
 from armwright.problem.best_chain import SAME
+from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
 from armwright.tasks.motions import CyclePlan
 
@@ -53,7 +54,8 @@ def branches_of(problem: Problem, matrix: Array, entry: Array | None) -> list[Br
             differs = np.abs(other - taken).max(axis=1) > SAME
             steps = [str(step) for step, is_other in sorted(zip(one.steps, differs, strict=True)) if is_other]
             way = f"the best other way, with another branch in step{'s' * (len(steps) > 1)} {', '.join(steps)},"
-            one = replace(one, other=other.tolist(), why=f"{way} {_judged(problem, matrix[[row]], taken, other)}")
+            there = problem.physics(matrix[[row]], entry=other[None, None])
+            one = replace(one, other=other.tolist(), why=f"{way} {_judged(problem, there, evaluation, row)}")
         found.append(one)
     return found
 
@@ -68,16 +70,18 @@ def _without(candidates: Array, taken: Array) -> Array:
     return ways
 
 
-def _judged(problem: Problem, design: Array, taken: Array, other: Array) -> str:
-    """Return what a way violates, else its objectives that differ from those of the way taken; both (B, D)."""
-    own, evaluation = (problem.physics(design, entry=entry[None, None]) for entry in (taken, other))
-    pairs = zip(problem.constraints, problem.violations(evaluation)[0].tolist(), strict=True)
+def _judged(problem: Problem, other: Evaluation, taken: Evaluation, row: int) -> str:
+    """Return what a design violates on another way, else its objectives that differ from those on the way taken.
+
+    other: of the design alone.  taken: of all designs, of which it is row `row`.
+    """
+    pairs = zip(problem.constraints, problem.violations(other)[0].tolist(), strict=True)
     violated = sorted((pair for pair in pairs if pair[1] > 0.0), key=lambda pair: -pair[1])
     if violated:
         texts = [f"{c.description} ({c.measured(v):.4g} {c.quantity.unit})" for c, v in violated[:MOST]]
         return f"violates {', '.join(texts)}{f' and {len(violated) - MOST} more' if len(violated) > MOST else ''}"
     objectives = problem.objectives if problem.evaluator is None else ()
-    values = [(one, *(f"{one.minimised(each)[0]:.4g}" for each in (evaluation, own))) for one in objectives]
+    values = [(one, f"{one.minimised(other)[0]:.4g}", f"{one.minimised(taken)[row]:.4g}") for one in objectives]
     texts = [f"{one.label.lower()} {new} instead of {old} {one.unit}" for one, new, old in values if new != old]
     return f"has {', '.join(texts)}" if texts else "is equally good"
 
