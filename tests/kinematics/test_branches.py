@@ -22,7 +22,7 @@ from armwright.rotations import rotation_about
 from armwright.spaces.design_space import load_space
 from armwright.spaces.parameters import FloatParameter
 from armwright.tasks.catalogue import load_task
-from armwright.tasks.motions import CyclePlan, LineSamples
+from armwright.tasks.motions import CyclePlan, single_samples
 from armwright.tasks.task import Task
 
 STARTS = 300
@@ -113,7 +113,7 @@ def test_self_motions_keep_the_tool_where_it_is() -> None:
     assert plan is not None
     poses = plan.poses[[block.entry for block in plan.blocks]]
     entry = entry_postures(arms, plan)
-    samples = LineSamples(poses, np.arange(len(poses) + 1), ())
+    samples = single_samples(poses)
     start, moved = follow_lines(arms, samples, entry), follow_lines(arms, samples, entry, aside_by=0.03)
     reached = (start.position_error < 1e-6) & (start.angle_error < 1e-6)
     assert reached.sum() > 20

@@ -261,9 +261,9 @@ def test_depths_are_allowed_on_the_lines_of_a_target_and_near_it() -> None:
     assert [found.rules(motion, share).carries.all() for motion in found.motions] == [True] * 4 + [False] * 3
     samples = found.sampled_rules(found.sample())
     assert samples.allowed.shape == (len(found.sample().poses), 2)
-    assert (samples.allowed.max(axis=1) == REACHED).sum() == 1 + sum(
-        last - first + 1 for first, last in found.sample().of_motion if last > first
-    ) - 2
+    ways_in = [found.sample().of_motion[index] for index, source in enumerate(found.source) if source == index]
+    assert (samples.allowed.max(axis=1) == REACHED).sum() == 1 + sum(map(len, ways_in))
+    assert found.source == (6, 1, 2, 3, 3, 5, 6)  # out of the bin and the tray as into them
 
 
 def test_unknown_surface_is_named_with_those_that_exist() -> None:

@@ -79,12 +79,20 @@ class Block:
 
 @dataclass(frozen=True)
 class LineSamples:
-    """S samples of the tool's pose, block after block; consecutive lines share a sample."""
+    """S samples of the tool's pose, block after block; consecutive lines share a sample, as do the ways in and out."""
 
     poses: Poses  # S poses
     first: NDArray[np.intp]  # (B + 1,) index of each block's first sample, and S
-    # Indices of the first and the last sample of each motion; equal for joint motions
-    of_motion: tuple[tuple[int, int], ...]
+    end: NDArray[np.intp]  # (B,) index of the sample at which each block ends
+    before: NDArray[np.intp]  # (S,) index of the sample from which each one is followed; of a block's first, itself
+    passes: NDArray[np.intp]  # (S,) how often the step to each sample is driven; 0 of a block's first
+    of_motion: tuple[NDArray[np.intp], ...]  # indices of the samples of each motion in its order; none of joint motions
+
+
+def single_samples(poses: Poses) -> LineSamples:
+    """Return poses as samples, each a block of its own."""
+    at = np.arange(len(poses) + 1)
+    return LineSamples(poses, at, at[:-1], at[:-1], np.zeros(len(poses), dtype=np.intp), ())
 
 
 @dataclass(frozen=True)
@@ -133,6 +141,20 @@ class CyclePlan:
         """Indices of the joint motions, each after the block of the same index."""
         return tuple(index for index in self._order if self.motions[index].by == "joint")
 
+    @cached_property
+    def source(self) -> tuple[int, ...]:
+        """The motion whose path each one takes: a line that leads back along a line before it takes that one's."""
+        source, open_lines = list(range(len(self.motions))), list[int]()
+        for block in self.blocks:
+            open_lines.clear()
+            for index in block.lines:
+                line, before = self.motions[index], self.motions[open_lines[-1]] if open_lines else None
+                if before is not None and (line.start, line.end) == (before.end, before.start):
+                    source[index] = open_lines.pop()
+                else:
+                    open_lines.append(index)
+        return tuple(source)
+
     @property
     def _order(self) -> list[int]:
         """Indices of the motions, from the first of the blocks on."""
@@ -177,11 +199,10 @@ class CyclePlan:
         apart = np.full((n, self.tip_rules.allowed.shape[1]), APART)
         found = TipRules(np.zeros(n, dtype=np.bool_), apart, self.tip_rules.solids)
         for index, motion in enumerate(self.motions):
-            if motion.by == "line":
-                at = np.arange(samples.of_motion[index][0], samples.of_motion[index][1] + 1)
-            else:
+            at = samples.of_motion[index]
+            if motion.by == "joint":
                 block = self.joint_motions.index(index)
-                at = np.array([first[block + 1] - 1, first[(block + 1) % len(self.blocks)]])
+                at = np.array([samples.end[block], first[(block + 1) % len(self.blocks)]])
             rules = self.rules(motion, np.linspace(0.0, 1.0, len(at)))
             found.carries[at] |= rules.carries
             found.allowed[at] = np.maximum(found.allowed[at], rules.allowed)
@@ -199,19 +220,28 @@ class CyclePlan:
 
     def _sample(self, refinement: float) -> LineSamples:
         parts: list[Poses] = []
-        first, spans = [0], [(0, 0)] * len(self.motions)
-        at = 0
+        first, end, before, passes = [0], list[int](), list[int](), list[int]()
+        of_motion = [np.zeros(0, dtype=np.intp)] * len(self.motions)
         for block in self.blocks:
+            at = len(before)
             parts.append(self.poses[[block.entry]])
+            before, passes = [*before, at], [*passes, 0]
             for index in block.lines:
-                motion = self.motions[index]
-                steps = math.ceil(refinement * line_steps(self.poses, motion.start, motion.end))
-                parts.append(self.line(motion, np.arange(1, steps + 1) / steps))
-                spans[index] = (at, at + steps)
-                at += steps
-            at += 1
-            first.append(at)
-        return LineSamples(stack_poses(parts), np.array(first), tuple(spans))
+                motion, source = self.motions[index], self.source[index]
+                if source != index:
+                    of_motion[index] = of_motion[source][::-1]
+                    for sample in of_motion[source][1:]:
+                        passes[sample] += 1
+                else:
+                    steps = math.ceil(refinement * line_steps(self.poses, motion.start, motion.end))
+                    parts.append(self.line(motion, np.arange(1, steps + 1) / steps))
+                    of_motion[index] = np.array([at, *range(len(before), len(before) + steps)])
+                    before, passes = [*before, *of_motion[index][:-1].tolist()], passes + [1] * steps
+                at = int(of_motion[index][-1])
+            end.append(at)
+            first.append(len(before))
+        arrays = (np.array(each, dtype=np.intp) for each in (first, end, before, passes))
+        return LineSamples(stack_poses(parts), *arrays, tuple(of_motion))
 
 
 def plan_cycle(

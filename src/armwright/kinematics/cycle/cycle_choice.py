@@ -83,8 +83,7 @@ def choose_postures(
     choice = _avoid_collisions(arms, plan, samples, lines, block_costs, edge_costs, obstacles, device)
     index, block = np.arange(len(arms), dtype=np.intp), np.arange(len(plan.blocks))
     chosen, arm = lines.choose(samples, choice, index), index[:, None]
-    steps = np.abs(np.diff(chosen, axis=1))
-    steps[:, samples.first[1:-1] - 1] = 0.0  # from one block to the next
+    steps = np.abs(chosen - chosen[:, samples.before])
     joint_motion = np.arange(len(plan.joint_motions))
     taken = (arm, joint_motion, choice[:, joint_motion], choice[:, (joint_motion + 1) % len(plan.blocks)])
     turn = change[taken]
@@ -140,13 +139,11 @@ def _block_costs(arms: ArmArrays, lines: BlockPaths, samples: LineSamples, speed
     """Return the (N, B, K) cost of each block: least time along its lines, what it is off by, and what may jump."""
     poses, first = samples.poses, samples.first[:-1]
     off = np.maximum(lines.position_error / poses.tolerance, lines.angle_error / poses.angle_tolerance)
-    change = np.zeros(lines.q.shape)
-    change[:, :, 1:] = np.abs(np.diff(lines.q, axis=2))
-    change[:, :, first] = 0.0
+    change = np.abs(lines.q - lines.q[:, :, samples.before])
     on_limit = arms.limit_distance(lines.q) <= ON_LIMIT
     on_limit[:, :, first] = False
     blocked = BLOCKED * on_limit + SUSPECT * (change.max(axis=-1) > LARGE_STEP)
-    step = (change / speed[:, None, None]).max(axis=-1)
+    step = samples.passes * (change / speed[:, None, None]).max(axis=-1)
     worst = np.maximum.reduceat(off, first, axis=2).swapaxes(1, 2)
     cost = np.add.reduceat(step, first, axis=2).swapaxes(1, 2) + cost_of(worst - 1.0)
     return cost + np.maximum.reduceat(blocked, first, axis=2).swapaxes(1, 2)
@@ -182,7 +179,7 @@ def _avoid_collisions(
             break
         part = arms[index]
         chosen = lines.choose(samples, choice, index)  # (n, S, D)
-        start = chosen[:, samples.first[1:] - 1][:, :n_edges]
+        start = chosen[:, samples.end[:n_edges]]
         change = chosen[:, [samples.first[(b + 1) % n_blocks] for b in range(n_edges)]] - start
         between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)
         q = np.concatenate([chosen, between.reshape(len(index), -1, arms.dof)], axis=1)

@@ -42,6 +42,7 @@ class CycleGroup:
     index: IndexArray  # (n,) which of the N arms they are
     arms: ArmArrays  # the arms
     paths: tuple[MotionPath, ...]  # their path along each of the M motions
+    source: IndexArray  # (n, M) the motion whose path each one takes, itself or an earlier one; see `_sources`
     is_sharp: bool  # whether joints move several times as fast in a short part of a line as on average
 
     @property
@@ -130,7 +131,7 @@ def find_paths(
         for rows, kind in ((np.flatnonzero(done & ~sharp), False), (np.flatnonzero(done & sharp), True)):
             if len(rows):
                 found = tuple(MotionPath(path.motion, path.q[rows]) for path in paths)
-                groups.append(CycleGroup(index[rows], part[rows], found, kind))
+                groups.append(CycleGroup(index[rows], part[rows], found, _sources(plan, found), kind))
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
     found = _measure(arms, plan, chosen.candidate, groups, jumps, obstacles, device)
@@ -148,7 +149,7 @@ def rough_paths(
     """
     entry = np.clip(near, arms.lower[:, None], arms.upper[:, None])
     paths = _follow(arms, plan, entry, ROUGH, device)
-    group = CycleGroup(np.arange(len(arms)), arms, paths, is_sharp=False)
+    group = CycleGroup(np.arange(len(arms)), arms, paths, _sources(plan, paths), is_sharp=False)
     jumps = np.zeros((len(arms), len(paths)), dtype=bool)
     return replace(_measure(arms, plan, entry, [group], jumps, obstacles, device, between=1), instants=FEW)
 
@@ -185,14 +186,31 @@ def _follow(
     paths: list[MotionPath] = []
     for index, motion in enumerate(plan.motions):
         if motion.by == "line":
-            first, last = samples.of_motion[index]
-            paths.append(MotionPath(motion, q[:, first : last + 1]))
+            paths.append(MotionPath(motion, q[:, samples.of_motion[index]]))
         else:
             block = plan.joint_motions.index(index)
-            start = q[:, samples.first[block + 1] - 1, None]
+            start = q[:, samples.end[block], None]
             end = q[:, samples.first[(block + 1) % len(plan.blocks)], None]
             paths.append(MotionPath(motion, (1.0 - share) * start + share * end))
     return tuple(paths)
+
+
+def _sources(plan: CyclePlan, paths: Sequence[MotionPath]) -> IndexArray:
+    """Return (N, M) the motion whose path each one takes.
+
+    A line that leads back takes the path of the one before, backwards. One that was driven before from the same posture
+    takes that path again.
+    """
+    source = np.tile(np.array(plan.source), (len(paths[0].q), 1))
+    driven: dict[tuple[int, int], list[int]] = {}
+    for index, motion in enumerate(plan.motions):
+        if motion.by == "line" and plan.source[index] == index:
+            before = driven.setdefault((motion.start, motion.end), [])
+            for other in reversed(before):
+                same = (paths[index].q[:, 0] == paths[other].q[:, 0]).all(axis=1)
+                source[same, index] = source[same, other]
+            before.append(index)
+    return np.take_along_axis(source, np.array(plan.source)[None], axis=1)
 
 
 def _measure(

@@ -17,7 +17,7 @@ from armwright.kinematics.cycle.cycle_choice import DEPTH, cost_of
 from armwright.kinematics.cycle.line_following import follow_lines
 from armwright.kinematics.devices import Device, load_kernels
 from armwright.kinematics.ik.ik import solve_postures
-from armwright.tasks.motions import CyclePlan, LineSamples, Poses
+from armwright.tasks.motions import CyclePlan, Poses, single_samples
 from armwright.tasks.obstacles import Obstacle
 
 STARTS, START_UPDATES = 32, 30  # of the inverse kinematics at each block's first pose
@@ -131,7 +131,7 @@ def _colliding_branches(arms: ArmArrays, poses: Poses, q: Array, clearance: Arra
 
 def _aside(arms: ArmArrays, poses: Poses, start: Array, device: Device) -> tuple[Array, Array]:
     """Return self-motions of postures (N, B, S, D) at B poses, and what they are off by, as `_solve` does."""
-    lines = follow_lines(arms, LineSamples(poses, np.arange(len(poses) + 1), ()), start, device, ASIDE)
+    lines = follow_lines(arms, single_samples(poses), start, device, ASIDE)
     off = np.maximum(lines.position_error / poses.tolerance, lines.angle_error / poses.angle_tolerance)
     return lines.q.swapaxes(1, 2), np.where(np.isnan(start[..., 0]), np.inf, off.swapaxes(1, 2))
 

@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.devices import Device, Loaded, load_kernels
-from armwright.tasks.motions import LineSamples, Poses
+from armwright.tasks.motions import LineSamples, Poses, single_samples
 
 IndexArray = NDArray[np.intp]
 
@@ -30,8 +30,7 @@ class BlockPaths:
 
     def ends(self, samples: LineSamples) -> tuple[Array, Array]:
         """Return the (N, B, K, D) first and last postures of each block."""
-        first, last = samples.first[:-1], samples.first[1:] - 1
-        return self.q[:, :, first].swapaxes(1, 2), self.q[:, :, last].swapaxes(1, 2)
+        return self.q[:, :, samples.first[:-1]].swapaxes(1, 2), self.q[:, :, samples.end].swapaxes(1, 2)
 
 
 def follow_lines(
@@ -58,7 +57,7 @@ def tool_errors(arms: ArmArrays, poses: Poses, q: Array, device: Device = "cpu")
     """Return (N, S, 2) distance of the tip [m] and angle of the tool [rad] from poses; q: (N, S, D)."""
     loaded = load_kernels("cycle.path_kernels", device)
     errors = np.empty((*q.shape[:2], 2))
-    samples = LineSamples(poses, np.array([0, len(poses)]), ())
+    samples = single_samples(poses)
 
     def solve(chunk: slice) -> None:
         path, found = _path(arms[chunk], samples, loaded), errors[chunk]
@@ -75,5 +74,10 @@ def _path(arms: ArmArrays, samples: LineSamples, loaded: Loaded) -> Any:
         ("dof", "base", "motion", "axis", "lower", "upper", "offset", "tool_axis", "tool_side"),
     )
     values = {name: getattr(arms, name) for name in names}
-    values |= {"first": samples.first, "n_angular": poses.n_angular, "position": poses.position}
+    values |= {
+        "first": samples.first,
+        "before": samples.before,
+        "n_angular": poses.n_angular,
+        "position": poses.position,
+    }
     return loaded.struct("Path", values | {axis: poses.rotation[:, :, i] for i, axis in enumerate("xyz")})

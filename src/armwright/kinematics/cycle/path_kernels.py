@@ -74,8 +74,11 @@ def path_kernels() -> SimpleNamespace:
             updates = int(0)  # noqa: RUF046, UP018
         for sample in range(path.first[block], path.first[block + 1]):
             kind = path.n_angular[sample]
+            before = path.before[sample]
             for j in range(path.dof):
                 free[j] = one
+                if before < sample - 1:  # the way led back to it
+                    q[j] = q_path[arm, candidate, before, j]
             distance, angle = real(0.0), real(0.0)
             for update in range(wp.static(UPDATES) + 1):
                 x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)

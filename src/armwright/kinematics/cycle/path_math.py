@@ -36,6 +36,7 @@ def path_math() -> SimpleNamespace:
         tool_axis: wp.array(dtype=Vector3)  # (N,)
         tool_side: wp.array(dtype=Vector3)  # (N,)
         first: wp.array(dtype=int)  # (B + 1,)
+        before: wp.array(dtype=int)  # (S,) the sample from whose posture each one is followed
         n_angular: wp.array(dtype=int)  # (S,)
         position: wp.array(dtype=Vector3)  # (S,)
         x: wp.array(dtype=Vector3)  # (S,) of the tool
