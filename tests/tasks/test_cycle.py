@@ -213,7 +213,7 @@ def test_axis_along_a_line_takes_the_shortest_arc() -> None:
 def test_consecutive_lines_share_a_sample_and_finer_samples_keep_the_coarse_ones() -> None:
     found = plan(steps(*({"to": n, "by": "line"} for n in (1, 2, 3)), closed=False))
     coarse, fine = found.sample(), found.sample(4)
-    assert coarse.of_motion[0][1] == coarse.of_motion[1][0]
+    assert coarse.of_motion[0][-1] == coarse.of_motion[1][0]
     step = np.linalg.norm(np.diff(coarse.poses.position, axis=0), axis=1)
     assert step.max() <= 0.02 + 1e-12
     z = coarse.poses.rotation[:, :, 2]
