@@ -158,8 +158,13 @@ def test_motions_of_a_cycle_with_approach() -> None:
     above = np.array([POINTS[0], POINTS[1]]) + np.array([0.0, 0.0, 0.08])
     assert found.poses.position[[over_bin, over_tray]] == pytest.approx(above)
     samples = found.sample()
-    assert samples.first.tolist() == [0, 9, 18]
-    assert samples.of_motion == ((13, 17), (0, 0), (0, 4), (4, 8), (0, 0), (9, 13))
+    assert (samples.first.tolist(), samples.end.tolist()) == ([0, 5, 10], [0, 5])  # the ways out are the ways in
+    into_tray, into_bin = [0, 1, 2, 3, 4], [5, 6, 7, 8, 9]
+    assert [each.tolist() for each in samples.of_motion] == [
+        into_bin[::-1], [], into_tray, into_tray[::-1], [], into_bin
+    ]  # fmt: skip
+    assert samples.before.tolist() == [0, 0, 1, 2, 3, 5, 5, 6, 7, 8]
+    assert samples.passes.tolist() == [0, 2, 2, 2, 2] * 2
     # The tool goes in within the tolerance of the path, and has to be within the target's own at its end.
     assert samples.poses.tolerance[:5].tolist() == [0.002, 0.002, 0.002, 0.002, 0.001]
 
