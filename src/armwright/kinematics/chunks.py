@@ -1,9 +1,10 @@
 """Chunks of arms: by threads on the CPU, one after another on a GPU."""
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, partial
 
 from armwright.exceptions import FailureError
 from armwright.kinematics.devices import Device, cores
@@ -13,13 +14,14 @@ SAMPLES: dict[Device, int] = {"cpu": 2**12, "cuda": 2**20}
 
 
 def in_chunks(solve: Callable[[slice], None], n: int, size: int, device: Device) -> None:
-    """Solve n arms in chunks of `size`."""
+    """Solve n arms in chunks of `size`; one chunk after another in a thread that itself solves a chunk."""
     if device == "cuda":
         _one_after_another(solve, n, size)
         return
     chunks = [slice(first, min(first + size, n)) for first in range(0, n, size)]
-    if len(chunks) == 1:
-        solve(chunks[0])
+    if len(chunks) == 1 or hasattr(_thread, "solves"):
+        for chunk in chunks:
+            solve(chunk)
     else:
         for running in [_pool().submit(solve, chunk) for chunk in chunks]:
             running.result()
@@ -45,9 +47,12 @@ def _one_after_another(solve: Callable[[slice], None], n: int, size: int) -> Non
             first += size
 
 
+_thread = threading.local()
+
+
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(cores(), thread_name_prefix="armwright-kernels")
+    return ThreadPoolExecutor(cores(), "armwright-kernels", initializer=partial(setattr, _thread, "solves", True))
 
 
 if hasattr(os, "register_at_fork"):  # a forked child has the pool's object, but not its threads

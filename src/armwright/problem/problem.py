@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,9 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
+from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.cycle.line_following import IndexArray
-from armwright.kinematics.devices import Device, resolve_device
+from armwright.kinematics.devices import Device, cores, resolve_device
 from armwright.problem.arm_quantities import orientation_error
 from armwright.problem.best_chain import best_chain
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
@@ -28,10 +28,11 @@ from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.base_support import supported_space
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
-from armwright.spaces.tolerance import perturbed
+from armwright.spaces.tolerance import length_columns, perturbed
 from armwright.tasks.task import Task
 
 POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
+SMALLEST_CHUNK = 8  # arms with a cycle; smaller chunks cost a thread more time than they save
 NO_MEASUREMENTS: Mapping[str, Array] = {}
 
 
@@ -190,12 +191,19 @@ class Problem:
             table = [nothing if isinstance(one, Failure) else one for one in measurements]
             columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
             measured = dict(zip(names, columns, strict=True))
-        parts = [  # with only the postures of one chunk in memory at a time
-            self._worst_case(matrix[rows], {name: column[rows] for name, column in measured.items()})
-            for rows in self.chunks(len(matrix))
-        ]
+        parts: dict[int, Outcomes] = {}
+
+        def solve(rows: slice) -> None:
+            parts[rows.start] = self._worst_case(matrix[rows], {name: each[rows] for name, each in measured.items()})
+
+        if self.task.cycle is None:  # whose kernels divide the designs among threads
+            for rows in self.chunks(len(matrix)):
+                solve(rows)
+        else:
+            of_thread = max(SMALLEST_CHUNK // self._n_arms, -(-len(matrix) // cores()))
+            in_chunks(solve, len(matrix), max(1, min(self._chunk, of_thread)), self.device)
         nobody = Outcomes(np.empty((0, len(self.objectives))), np.empty((0, len(self.constraints))))
-        found = joined(parts) if parts else nobody
+        found = joined([parts[first] for first in sorted(parts)]) if parts else nobody
         found.values[list(failures)] = np.inf
         return replace(found, failures=failures)
 
@@ -247,8 +255,7 @@ class Problem:
 
     def chunks(self, n: int) -> Iterator[slice]:
         """Yield the rows of n designs that are evaluated at once, so that their postures fit into memory."""
-        size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
-        yield from (slice(first, first + size) for first in range(0, n, size))
+        yield from (slice(first, first + self._chunk) for first in range(0, n, self._chunk))
 
     def _worst_case(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:
         """Return the worst outcomes of designs in each case of the task, exact and off by the tolerance."""
@@ -258,12 +265,16 @@ class Problem:
             return self.outcomes(evaluation, {name: column[rows] for name, column in measured.items()})
 
         exact = worst_case([best_chain(arms, scene, self.constraints, judge, self.device)[1] for scene in self.scenes])
-        moved = (
-            self.outcomes(evaluation, measured)
-            for rows in (perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())
-            for evaluation in self.cases(self.arms(rows), exact.entry)
+        copies = list(perturbed(self.space, matrix, self.tolerance)) if self.tolerance > 0.0 else []
+        if not copies:
+            return exact
+        entry = None if exact.entry is None else np.tile(exact.entry, (len(copies), 1, 1, 1))
+        moved = worst_case(map(self.outcomes, self.cases(self.arms(np.vstack(copies)), entry)))
+        values, violations = (
+            np.maximum(own, others.reshape(len(copies), *own.shape).max(axis=0))
+            for own, others in ((exact.values, moved.values), (exact.violations, moved.violations))
         )
-        return replace(worst_case(chain([exact], moved)), entry=exact.entry)
+        return replace(exact, values=values, violations=violations)
 
     def _on_best_chain(self, arms: ArmArrays, scene: Scene) -> Evaluation:
         """Return the physics of N arms on their best chain of postures."""
@@ -279,11 +290,17 @@ class Problem:
         return evaluate_arrays(arms, scene, self.device, candidates=best.entry[:, 0, :, None])
 
     @cached_property
-    def _postures(self) -> int:
-        """Return the largest number of postures of one arm."""
+    def _chunk(self) -> int:
+        """Return how many designs fit into a chunk by the largest number of postures of one arm."""
         task, plan = self.task, self.scenes[0].plan
         along = 0 if plan is None else 4 * (len(plan.sample().poses) + 33 * len(plan.motions))
-        return len(task.target_positions) + along + sum(region.points for region in task.workspace)
+        postures = len(task.target_positions) + along + sum(region.points for region in task.workspace)
+        return max(1, POSTURES_AT_ONCE[self.device] // (postures * self._n_arms))
+
+    @cached_property
+    def _n_arms(self) -> int:
+        """Return how many arms a design stands for: itself, and those that are off by the tolerance."""
+        return 1 + (2 * len(length_columns(self.space)) if self.tolerance > 0.0 else 0)
 
 
 def _finite(columns: Sequence[Array], names: Sequence[str], n: int) -> Array:
