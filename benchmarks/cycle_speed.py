@@ -114,7 +114,7 @@ class Measured:
 
 def spearman(a: Any, b: Any) -> float:
     """Return the rank correlation; 1 if one is constant."""
-    from scipy.stats import rankdata
+    from scipy.stats import rankdata  # pyright: ignore[reportUnknownVariableType]
 
     ranks = np.array([rankdata(a), rankdata(b)])
     return float(np.corrcoef(ranks)[0, 1]) if np.ptp(a) > 0.0 and np.ptp(b) > 0.0 else 1.0

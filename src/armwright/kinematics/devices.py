@@ -92,8 +92,9 @@ class Loaded:
 
     def array(self, values: NDArray[Any], dtype: Any) -> Any:
         """Return values on the device, which are copied only if they have to be."""
-        values = np.ascontiguousarray(values, dtype=self.warp.dtype_to_numpy(getattr(dtype, "_wp_scalar_type_", dtype)))
-        shape = values.shape[: values.ndim - len(getattr(dtype, "_shape_", ()))]  # of numbers, vectors or matrices
+        scalar, inner, _ = _layout(self.warp, dtype)
+        values = np.ascontiguousarray(values, dtype=scalar)
+        shape = values.shape[: values.ndim - inner]
         return self.warp.array(values, dtype=dtype, shape=shape, device=self.device, copy=False)
 
     def empty(self, shape: tuple[int, ...], dtype: Any) -> Any:
@@ -103,10 +104,17 @@ class Loaded:
     def struct(self, name: str, values: Mapping[str, Any]) -> Any:
         """Return a struct of the kernels on the device; values: by the names of its fields."""
         kind = getattr(self.kernels, name)
-        made = kind()
+        if self.device == "cuda":
+            made = kind()
+            for field, value in values.items():
+                setattr(made, field, self._given(value, kind.vars[field].type))
+            return made
+        packed, arrays = kind.ctype(), list[Any]()
         for field, value in values.items():
-            setattr(made, field, self._given(value, kind.vars[field].type))
-        return made
+            array, given = self._described(value, kind.vars[field].type)
+            arrays.append(array)
+            setattr(packed, field, given)
+        return _Packed(packed, arrays)
 
     def launch(self, name: str, dim: tuple[int, ...], *inputs: Any, outputs: Sequence[NDArray[Any]] = ()) -> None:
         """Run a kernel with `dim` threads and these inputs, of which numpy arrays are put on the device.
@@ -115,15 +123,48 @@ class Loaded:
         """
         kernel = getattr(self.kernels, name)
         arguments = zip((*inputs, *outputs), kernel.adj.args, strict=True)
+        if self.device == "cpu":
+            described = [self._described(value, argument.type) for value, argument in arguments]
+            self.warp.launch(kernel, dim, inputs=[given for _, given in described], device="cpu")
+            return
         given = [self._given(value, argument.type) for value, argument in arguments]
         self.warp.launch(kernel, dim, inputs=given, device=self.device)
-        if self.device == "cuda":
-            for values, found in zip(outputs, given[len(inputs) :], strict=True):
-                values[...] = found.numpy()
+        for values, found in zip(outputs, given[len(inputs) :], strict=True):
+            values[...] = found.numpy()
+
+    def _described(self, value: Any, kind: Any) -> tuple[Any, Any]:
+        """Return a value, kept as long as a kernel may read it, and what a kernel or a struct on the CPU takes for it.
+
+        Warp takes a descriptor of an array as it is; making its own array would take three times as long.
+        """
+        if isinstance(value, np.ndarray):
+            scalar, inner, descriptor = _layout(self.warp, kind.dtype)
+            values = np.ascontiguousarray(cast("NDArray[Any]", value), dtype=scalar)
+            outer, address = values.ndim - inner, values.__array_interface__["data"][0]
+            return values, descriptor(address, 0, outer, values.shape[:outer], values.strides[:outer])
+        return value, value.__ctype__() if isinstance(value, self.warp.array) else value
 
     def _given(self, value: Any, kind: Any) -> Any:
         """Return a value as a kernel or a struct takes it."""
         return self.array(cast("NDArray[Any]", value), kind.dtype) if isinstance(value, np.ndarray) else value
+
+
+class _Packed:
+    """A struct as kernels on the CPU take it, with the arrays that it points to."""
+
+    def __init__(self, ctype: Any, arrays: Sequence[Any]) -> None:
+        self._ctype, self._arrays = ctype, arrays
+
+    def __ctype__(self) -> Any:
+        return self._ctype
+
+
+@cache
+def _layout(warp: Any, dtype: Any) -> tuple[Any, int, Any]:
+    """Return the numbers that an array of this type consists of, in how many dimensions, and Warp's descriptor."""
+    descriptor: Any = type(warp.array(dtype=dtype).__ctype__())
+    scalar = warp.dtype_to_numpy(getattr(dtype, "_wp_scalar_type_", dtype))
+    return scalar, len(getattr(dtype, "_shape_", ())), descriptor
 
 
 def load_kernels(name: str, device: Device, *variant: Hashable) -> Loaded:

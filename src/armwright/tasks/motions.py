@@ -240,8 +240,8 @@ class CyclePlan:
                 at = int(of_motion[index][-1])
             end.append(at)
             first.append(len(before))
-        arrays = (np.array(each, dtype=np.intp) for each in (first, end, before, passes))
-        return LineSamples(stack_poses(parts), *arrays, tuple(of_motion))
+        starts, ends, order, driven = (np.array(each, dtype=np.intp) for each in (first, end, before, passes))
+        return LineSamples(stack_poses(parts), starts, ends, order, driven, tuple(of_motion))
 
 
 def plan_cycle(
