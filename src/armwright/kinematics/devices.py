@@ -162,7 +162,7 @@ class _Packed:
 @cache
 def _layout(warp: Any, dtype: Any) -> tuple[Any, int, Any]:
     """Return the numbers that an array of this type consists of, in how many dimensions, and Warp's descriptor."""
-    descriptor: Any = type(warp.array(dtype=dtype).__ctype__())
+    descriptor = cast("Any", type(warp.array(dtype=dtype).__ctype__()))
     scalar = warp.dtype_to_numpy(getattr(dtype, "_wp_scalar_type_", dtype))
     return scalar, len(getattr(dtype, "_shape_", ())), descriptor
 
