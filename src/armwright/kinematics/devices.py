@@ -4,6 +4,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
@@ -177,6 +178,12 @@ def load_kernels(name: str, device: Device, *variant: Hashable) -> Loaded:
         return _loaded(name, device, *variant)
 
 
+def load_all_kernels(variants: Iterable[tuple[str, *tuple[Hashable, ...]]], device: Device) -> None:
+    """Load variants of kernels, each as `load_kernels` takes it, so that nothing is left to compile later."""
+    with _loading:
+        _load_modules([_made(*variant) for variant in variants], device)
+
+
 def _has_cuda() -> bool:
     with _loading:
         return bool(_warp().is_cuda_available())
@@ -194,20 +201,28 @@ def _warp() -> Any:
 
 @cache
 def _loaded(name: str, device: Device, *variant: Hashable) -> Loaded:
-    with report_cache_errors():
-        made = getattr(import_module(f"{__package__}.{name}"), name.rpartition(".")[2])(*variant)
-        parts = cast("Iterable[Any]", vars(made).values())
-        _load_modules([part.module for part in parts if hasattr(part, "adj")], device)  # those of kernels
-    return Loaded(_warp(), made, device)
+    kernels = _made(name, *variant)
+    _load_modules([kernels], device)
+    return Loaded(_warp(), kernels, device)
 
 
-def _load_modules(modules: Sequence[Any], device: Device) -> None:
-    """Load modules of kernels on a device; compile those that are not in the cache."""
+@cache
+def _made(name: str, *variant: Hashable) -> Any:
+    """Return a variant of kernels, not loaded yet."""
+    _warp()
+    return getattr(import_module(f"{__package__}.{name}"), name.rpartition(".")[2])(*variant)
+
+
+def _load_modules(variants: Sequence[Any], device: Device) -> None:
+    """Load modules of kernels on a device; compile those that are not in the cache, side by side."""
     # Warp launches with this size on the CPU. Modules of another size would have to be compiled again.
     block_dim = 1 if device == "cpu" else None
-    warp = _warp()
-    for module in modules:
-        folder = os.path.join(str(warp.config.kernel_cache_dir), module.get_module_identifier(block_dim))
-        is_cached = os.path.exists(folder)
-        with nullcontext() if is_cached else compilation.timed():
-            module.load(device, block_dim)
+    parts = [part for variant in variants for part in cast("Iterable[Any]", vars(variant).values())]
+    modules = list({id(part.module): part.module for part in parts if hasattr(part, "adj")}.values())  # of kernels
+    cache_folder = str(_warp().config.kernel_cache_dir)
+    with report_cache_errors():
+        folders = (os.path.join(cache_folder, module.get_module_identifier(block_dim)) for module in modules)
+        is_cached = all(map(os.path.exists, folders))
+        with nullcontext() if is_cached else compilation.timed(), ThreadPoolExecutor(cores()) as pool:
+            for loading in [pool.submit(module.load, device, block_dim) for module in modules]:
+                loading.result()

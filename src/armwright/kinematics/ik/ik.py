@@ -21,6 +21,7 @@ from armwright.kinematics.arms.arm_arrays import (
     FLOATS,
     ArmArrays,
     Floats,
+    Motions,
     Precision,
     TargetKind,
     check_precision,
@@ -38,6 +39,8 @@ BUFFERED_ARMS = 256  # chunks up to this size reuse buffers: allocating them tak
 MAX_BUFFERS = 8  # per thread
 SMALLEST_CHUNK = 32  # groups of targets; smaller chunks cost a thread more time than they save
 MAX_CHUNK: dict[Device, int] = {"cpu": 2**22, "cuda": 2**30}  # [bytes]: the cache of a core; memory of any GPU
+
+Variant = tuple[Motions, TargetKind]  # of the kernels
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,7 @@ def solve_postures(
     restarts: int = 0,
     precision: Precision = "float32",
     device: Device = "cpu",
+    motions: Motions | None = None,
 ) -> Postures:
     """Solve the inverse kinematics, and compute the gravity torque of the best posture.
 
@@ -88,6 +92,7 @@ def solve_postures(
         restarts: The number of further, random starts, of which the best posture is kept.
         precision: The precision of the results. Arms in float32 can be solved in float64, not the reverse.
         device: The device to solve on.
+        motions: The variant of the kernels, which gives the same bits; None for the one that these arms need.
     """
     if updates < 0:
         raise SettingsError(f"updates = {updates} is outside 0 <= updates")
@@ -97,16 +102,17 @@ def solve_postures(
     columns = _target_columns(points, np.zeros(len(points)) if payload is None else payload, target_arrays)
     if initial_q is None and not arms.ranges_include_zero:
         initial_q = 0.0
-    best = _solve_all(arms, columns, updates, initial_q, kind, device)
+    variant = (motions or arms.motions, kind)
+    best = _solve_all(arms, columns, updates, initial_q, variant, device)
     metres_per_radian = 0.0 if target_arrays is None else target_arrays.metres_per_radian
     for start in arms.random_postures(restarts):
-        other = _solve_all(arms, columns, updates, start[:, None], kind, device)
+        other = _solve_all(arms, columns, updates, start[:, None], variant, device)
         best = best.nearer(other, points, metres_per_radian)
     return best
 
 
 def _solve_all(
-    arms: ArmArrays, columns: Array, updates: int, initial_q: ArrayLike | None, kind: TargetKind, device: Device
+    arms: ArmArrays, columns: Array, updates: int, initial_q: ArrayLike | None, variant: Variant, device: Device
 ) -> Postures:
     """Solve all arms at the targets (T, C), in chunks."""
     if (opposed := arms.opposed).any():  # the kernels rotate about x, y and z, by the opposite angle
@@ -114,7 +120,7 @@ def _solve_all(
         lower, upper = np.where(opposed, -arms.upper, arms.lower), np.where(opposed, -arms.lower, arms.upper)
         mirrored = replace(arms, axis=np.where(opposed[..., None], -arms.axis, arms.axis), lower=lower, upper=upper)
         start = None if initial_q is None else sign * np.asarray(initial_q)
-        found = _solve_all(mirrored, columns, updates, start, kind, device)
+        found = _solve_all(mirrored, columns, updates, start, variant, device)
         return replace(found, q=sign * found.q, torque=sign * found.torque)
     n, t, dof = len(arms), len(columns), arms.dof
     initial = None
@@ -127,7 +133,7 @@ def _solve_all(
         chunk_arms = arms[chunk]
         for part, lanes in parts:
             part_initial = None if initial is None else initial[chunk, part]
-            results = _solve(chunk_arms, columns[part], updates, part_initial, kind, lanes, device)
+            results = _solve(chunk_arms, columns[part], updates, part_initial, variant, lanes, device)
             for values, solved in zip(whole, results, strict=True):
                 values[chunk, part] = solved
 
@@ -164,13 +170,13 @@ def _parts(n: int, t: int, lanes: int) -> list[tuple[slice, int]]:
 
 
 def _solve(
-    arms: ArmArrays, columns: Array, updates: int, initial_q: Array | None, kind: TargetKind, lanes: int, device: Device
+    arms: ArmArrays, columns: Array, updates: int, initial_q: Array | None, variant: Variant, lanes: int, device: Device
 ) -> list[NDArray[Any]]:
     """Return joint angles, tip positions, torques and angle errors of a chunk of arms, (N, T, ...)."""
     grouped = _in_lanes(columns[None], lanes)[0]
     if initial_q is not None:
         initial_q = _in_lanes(np.clip(initial_q, arms.lower[:, None], arms.upper[:, None]), lanes)
-    loaded = load_kernels("ik.ik_kernels", device, arms.precision, lanes, arms.motions, kind)
+    loaded = load_kernels("ik.ik_kernels", device, arms.precision, lanes, *variant)
     if device == "cpu" and len(arms) <= _buffered_arms(arms, len(grouped), lanes):
         results = _thread_buffers(arms, grouped, updates, loaded).solve(arms, grouped, initial_q)
     else:
