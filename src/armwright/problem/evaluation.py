@@ -176,9 +176,8 @@ class Evaluation(Scene):
     def largest_on_motions(self, along: Array, at_targets: Array | float = 0.0) -> Array:
         """Return (N, T, ...) the larger of a target's value and those of the motions (N, M, ...) of steps to it."""
         worst = np.array(np.broadcast_to(at_targets, (*self.position_error.shape, *along.shape[2:])))
-        for index, motion in enumerate(self.paths.plan.motions):
-            target = self.paths.plan.targets[motion.step]
-            worst[:, target] = np.maximum(worst[:, target], along[:, index])
+        visited, motions, first = self.paths.plan.visits
+        worst[:, visited] = np.maximum(worst[:, visited], np.maximum.reduceat(along[:, motions], first, axis=1))
         return worst
 
     @cached_property
@@ -281,7 +280,12 @@ class Evaluation(Scene):
 
     @cached_property
     def _clearances(self) -> tuple[Array, Array]:
-        own, clear = clearances(self.arms, self.q, self.obstacles, self.device, self.tip_rules)
+        own, clear = np.full((2, *self.q.shape[:2]), np.inf)
+        elsewhere = np.setdiff1d(np.arange(self.q.shape[1]), [] if self.plan is None else self.plan.targets)
+        if len(elsewhere):  # of the others, their motions tell
+            rules = None if self.tip_rules is None else self.tip_rules[elsewhere]
+            at_targets = clearances(self.arms, self.q[:, elsewhere], self.obstacles, self.device, rules)
+            own[:, elsewhere], clear[:, elsewhere] = at_targets
         if self.cycle_paths is not None:
             own = -self.largest_on_motions(-self.cycle_paths.self_clearance, -own)
             clear = -self.largest_on_motions(-self.cycle_paths.obstacle_clearance, -clear)

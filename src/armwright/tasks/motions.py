@@ -155,6 +155,13 @@ class CyclePlan:
                     open_lines.append(index)
         return tuple(source)
 
+    @cached_property
+    def visits(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        """The V targets that steps lead to; the motions of these steps, target by target; and where each one begins."""
+        target = np.array([self.targets[motion.step] for motion in self.motions])
+        visited, first = np.unique(np.sort(target), return_index=True)
+        return visited, np.argsort(target, kind="stable"), first
+
     @property
     def _order(self) -> list[int]:
         """Indices of the motions, from the first of the blocks on."""
