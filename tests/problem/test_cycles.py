@@ -7,7 +7,7 @@ import pytest
 
 from armwright.exceptions import SettingsError
 from armwright.problem.objectives import OBJECTIVES, QUANTITIES
-from armwright.problem.outcomes import worst_case
+from armwright.problem.outcomes import Outcomes, worst_case
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.tolerance import TOLERANCE, perturbed
@@ -143,6 +143,19 @@ def test_a_batch_equals_single_designs_to_the_bit() -> None:
     whole = problem.evaluate(designs)
     for row, design in enumerate(designs):
         assert problem.evaluate([design])[0] == whole[row]
+
+
+@pytest.mark.parametrize("tolerance", [0.0, TOLERANCE])
+def test_outcomes_do_not_depend_on_the_number_of_threads(tolerance: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = Problem(task(), DRIVEN, tolerance=tolerance)
+    matrix = problem.space.matrix(problem.space.sample(4 * N, seed=1))
+    found: list[Outcomes] = []
+    for threads in (1, 2, 3):
+        monkeypatch.setattr("armwright.problem.problem.cores", lambda n=threads: n)
+        found.append(problem.evaluate(matrix))
+    for other in found[1:]:
+        for name in ("values", "violations", "entry", "q"):
+            assert np.array_equal(getattr(other, name), getattr(found[0], name), equal_nan=True), name
 
 
 def test_feasible_designs_exist_and_stay_within_what_is_implied() -> None:
