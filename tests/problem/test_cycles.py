@@ -148,7 +148,7 @@ def test_a_batch_equals_single_designs_to_the_bit() -> None:
 @pytest.mark.parametrize("tolerance", [0.0, TOLERANCE])
 def test_outcomes_do_not_depend_on_the_number_of_threads(tolerance: float, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Problem(task(), DRIVEN, tolerance=tolerance)
-    matrix = problem.space.matrix(problem.space.sample(4 * N, seed=1))
+    matrix = problem.space.matrix(problem.space.sample(N if tolerance else 4 * N, seed=1))
     found: list[Outcomes] = []
     for threads in (1, 2, 3):
         monkeypatch.setattr("armwright.problem.problem.cores", lambda n=threads: n)
