@@ -1,7 +1,7 @@
 """Clearance of posed arms from themselves and from obstacles: numpy in, numpy out."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -12,12 +12,29 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.arms.motor_bodies import bodies_in, without_bodies
 from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.devices import Device, cores, load_kernels
+from armwright.kinematics.devices import Device, Loaded, cores, load_kernels
 from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
 from armwright.tasks.tip_rules import Solids, TipRules
 
 MAX_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
 SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than they save
+
+
+@dataclass(frozen=True)
+class SpanClearances:
+    """Least clearances of N arms in G spans of postures."""
+
+    least: Array  # (2, 2, N, G) from the arm itself and from obstacles, each without and with the payload [m]
+    at: NDArray[np.int32]  # (2, 2, N, G) index of the posture where it is
+
+    def carrying(self, carries: NDArray[np.bool_]) -> tuple[Array, Array, NDArray[np.int32]]:
+        """Return (N, G) self-clearance, obstacle clearance, and the posture of the smaller one.
+
+        carries: (G,) whether the payload is carried.
+        """
+        own, free = np.where(carries, self.least[:, 1], self.least[:, 0])
+        own_at, free_at = np.where(carries, self.at[:, 1], self.at[:, 0])
+        return own, free, np.where(free < own, free_at, own_at)
 
 
 def clearances(
@@ -35,18 +52,39 @@ def clearances(
         neither counts.
     most: largest clearance of interest, which greater ones count as; 0 is fast for those who ask for overlaps alone.
     """
+    each = span_clearances(arms, q, np.arange(q.shape[1] + 1), obstacles, device, rules, most)
+    own, free, _ = each.carrying(np.zeros(q.shape[1], dtype=np.bool_) if rules is None else rules.carries)
+    return own, free
+
+
+def span_clearances(
+    arms: ArmArrays, q: Array, first: NDArray[np.intp], obstacles: Sequence[Obstacle] = (), device: Device = "cpu",
+    rules: TipRules | None = None, most: float = np.inf, left_out: NDArray[np.bool_] | None = None,
+) -> SpanClearances:  # fmt: skip
+    """Return the least `clearances` in spans of postures, which are steps along a path.
+
+    first: (G + 1,) index of the first of the T postures of each span, and T.
+    rules: what may be touched at each of the T postures.
+    left_out: (N, G) True for spans that are not measured, whose clearances are `most`.
+    """
     n, t, _ = q.shape
-    distances = np.empty((2, n, t))
-    solids = _solids(tuple(obstacles), arms.precision, device) if obstacles else None
+    solids = _solids(tuple(obstacles), arms.precision, device)
+    mask = np.zeros((n, len(first) - 1), dtype=np.bool_) if left_out is None else left_out
+    least, at = np.empty((*mask.shape, 4), dtype=arms.precision), np.empty((*mask.shape, 4), dtype=np.int32)
 
     def measure(chunk: slice) -> None:
-        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, device, rules, most)
+        part, links = arms[chunk], load_kernels("contact.clearance_kernels", device, arms.precision)
+        posed, motors, at_tip = _bodies(part, q[chunk], first, mask[chunk], rules, links)
+        columns = np.empty((0, 3)) if part.columns is None else part.columns
+        given = (posed, motors, at_tip, solids, columns, links.kernels.real(most))
+        links.launch("measure", mask[chunk].shape, *given, outputs=[least[chunk], at[chunk]])
 
     size = MAX_CHUNK[device] // t
     if device == "cpu":
         size = min(size, max(-(-n // cores()), SMALLEST_CHUNK // t))
     in_chunks(measure, n, max(1, size), device)
-    return distances[0], distances[1]
+    found, posture = (np.moveaxis(each, 2, 0).reshape(2, 2, *mask.shape) for each in (least, at))
+    return SpanClearances(found.astype(np.float64), posture)
 
 
 def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
@@ -59,46 +97,37 @@ def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
     return clearances(motors, straight, device=device)[0][:, 0]
 
 
-def _distances(
-    arms: ArmArrays, q: Array, solids: Any, device: Device, rules: TipRules | None, most: float
-) -> NDArray[np.floating[Any]]:
-    """Return the (2, N, T) clearances of a chunk of arms [m]."""
-    dim, links = q.shape[:2], load_kernels("contact.clearance_kernels", device, arms.precision)
-    own, free = (links.array(np.full(dim, most), links.kernels.real) for _ in range(2))
+def _bodies(
+    arms: ArmArrays, q: Array, first: NDArray[np.intp], left_out: NDArray[np.bool_], rules: TipRules | None,
+    links: Loaded,
+) -> tuple[Any, Any, Any]:  # fmt: skip
+    """Return the links of a chunk of arms, their bodies, and tool and payload, as the kernel takes them."""
     offset = arms.offset.copy()
     offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
+    stroke = np.where(arms.prismatic, np.maximum(np.abs(arms.lower), np.abs(arms.upper)), 0.0)
     values = {name: getattr(arms, name) for name in ("base", "motion", "axis", "radius")} | {"offset": offset, "q": q}
     values |= {name: links.empty(q.shape, links.kernels.Vector3) for name in ("starts", "ends")}
-    posed = links.struct("Posed", values)
-    links.launch("link_axes", dim, posed)
-    links.launch("self_clearance", dim, posed, own)
-    if solids is not None:
-        links.launch("obstacle_clearance", dim, posed, solids, free)
-    if arms.columns is not None:
-        links.launch("column_clearance", dim, posed, arms.columns, own)
+    values |= {"reach": np.linalg.norm(offset, axis=2) + stroke, "first": first, "left_out": left_out}
     at_tip: Solids = {} if rules is None else rules.solids
-    if arms.motor_bodies is not None or at_tip:
-        motors = load_kernels("contact.motor_kernels", device, arms.precision)
-        bodies = arms.motor_bodies or bodies_in(without_bodies(*q.shape[::2]), arms.precision)
-        tip, tool, size = _stacked(tuple(at_tip.values())), arms.tool, (*dim, arms.dof + len(at_tip))
-        body = {
-            "shape": np.hstack([bodies.shape, np.tile(tip["shape"], (len(arms), 1))]),
-            "half": np.hstack([bodies.half, np.tile(tip["half"], (len(arms), 1, 1))]),
-            "middle": motors.empty(size, links.kernels.Vector3),
-            "into": motors.empty(size, motors.kernels.Matrix3),
-            "count": np.full(dim[1], size[2]) - (0 if rules is None else ("payload" in at_tip) & ~rules.carries),
-            "allowed": np.empty((0, 0)) if rules is None else rules.allowed,
-        }
-        placed = motors.struct("Motors", body)
-        frame = np.stack([tool.side, np.cross(tool.axis, tool.side), tool.axis], axis=1)
-        at = motors.struct("Solids", tip)
-        motors.launch("motor_frames", dim, posed, bodies.axis, bodies.centre, tool.tip, frame, at, placed)
-        motors.launch("self_clearance", dim, posed, placed, own)
-        if solids is not None:
-            motors.launch("obstacle_clearance", dim, posed, placed, solids, free)
-        if arms.columns is not None:
-            motors.launch("column_clearance", dim, posed, placed, arms.columns, own)
-    return np.stack([own.numpy(), free.numpy()])
+    bodies = arms.motor_bodies
+    if bodies is None:
+        bodies = bodies_in(without_bodies(len(arms), arms.dof if at_tip else 0), arms.precision)
+    tip, tool = _stacked(tuple(at_tip.values())), arms.tool
+    shape = np.hstack([bodies.shape, np.tile(tip["shape"], (len(arms), 1))])
+    size = (*q.shape[:2], shape.shape[1])
+    body = {
+        "shape": shape,
+        "half": np.hstack([bodies.half, np.tile(tip["half"], (len(arms), 1, 1))]),
+        "axis": bodies.axis,
+        "centre": bodies.centre,
+        "tip": tool.tip,
+        "tip_into": np.stack([tool.side, np.cross(tool.axis, tool.side), tool.axis], axis=1),
+        "middle": links.empty(size, links.kernels.Vector3),
+        "into": links.empty(size, links.kernels.Matrix3),
+        "n_lasting": size[2] - ("payload" in at_tip),
+        "allowed": np.empty((0, 0)) if rules is None else rules.allowed,
+    }
+    return links.struct("Posed", values), links.struct("Motors", body), links.struct("Solids", tip)
 
 
 @cache

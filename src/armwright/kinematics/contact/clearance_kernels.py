@@ -1,7 +1,6 @@
-"""Warp kernels of clearance: distances of the links of posed arms from each other, from obstacles and from the column.
+"""Warp kernel of clearance along spans of postures: of an arm from itself, from obstacles and from its column.
 
-A link is a capsule: all points within its radius of its axis, a segment. A thread takes one arm at one target, and
-branches: a bound excludes distant obstacles. docs/method.md §13 defines the distances.
+A thread takes one arm along one span, poses it, and then compares pair by pair, over the postures that count.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -11,161 +10,107 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from armwright.kinematics.arms.arm_arrays import FIXED, Precision
+from armwright.kinematics.arms.arm_arrays import Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
-from armwright.kinematics.contact.convex_math import SEGMENT, convex_math
-from armwright.kinematics.contact.solid_math import CYLINDER, MESH, solid_math
+from armwright.kinematics.contact.body_math import body_math
+from armwright.kinematics.contact.link_math import link_math
+from armwright.kinematics.contact.solid_math import solid_math
+from armwright.kinematics.contact.span_math import span_math
+from armwright.kinematics.contact.surroundings_math import surroundings_math
 
 
 @cache
 def clearance_kernels(precision: Precision) -> SimpleNamespace:
-    """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
-    base = frame_math(precision)
-    real, Vector3, advance = base.real, base.Vector3, base.advance
-    solid, separation = solid_math(precision), convex_math(precision).separation
-    Posed, Solids = solid.Posed, solid.Solids
-    along_segment, may_be_nearer, nearer_link = solid.along_segment, solid.may_be_nearer, solid.nearer_link
-    zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
-    tiny, parallel = real(1e-30), real(1e-12)  # the latter is the square of the sine of an angle that is 0 in float32
+    """Return the kernel in this precision, for N arms with D links and K bodies in T postures, and O obstacles."""
+    base, solid, around = frame_math(precision), solid_math(precision), surroundings_math(precision)
+    real, Vector3, Matrix3, advance = base.real, base.Vector3, base.Matrix3, base.advance
+    Posed, Motors, Solids = solid.Posed, solid.Motors, solid.Solids
+    largest_steps, links_apart = span_math(precision).largest_steps, link_math(precision).links_apart
+    body_from_links, body_from_bodies = body_math(precision).body_from_links, body_math(precision).body_from_bodies
+    links_from_obstacles, links_from_column = around.links_from_obstacles, around.links_from_column
+    body_from_obstacles, body_from_column = around.body_from_obstacles, around.body_from_column
+    zero, one = real(0.0), real(1.0)
 
-    @kernel
-    def link_axes(arms: Posed):
-        """Compute start and end of the axis of each link by forward kinematics."""
-        arm, target = wp.tid()
+    @wp.func
+    def pose(arms: Posed, motors: Motors, at_tip: Solids, arm: int, t: int):
+        """Compute start and end of the axis of each link, and middle and frame of each body, by forward kinematics."""
+        dof = arms.motion.shape[1]
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
         p = arms.base[arm]
-        for j in range(arms.motion.shape[1]):
+        for j in range(dof):
+            if motors.shape.shape[1] > 0 and motors.shape[arm, j] >= 0:
+                c = motors.centre[arm, j]
+                motors.middle[arm, t, j] = p + c[0] * x + c[1] * y + c[2] * z
+                if motors.axis[arm, j] == 0:
+                    motors.into[arm, t, j] = wp.matrix_from_rows(y, z, x)
+                elif motors.axis[arm, j] == 1:
+                    motors.into[arm, t, j] = wp.matrix_from_rows(z, x, y)
+                else:
+                    motors.into[arm, t, j] = wp.matrix_from_rows(x, y, z)
             _axis, place, p, x, y, z = advance(
-                arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z
+                arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], arms.q[arm, t, j], p, x, y, z
             )
-            arms.starts[arm, target, j] = place
-            arms.ends[arm, target, j] = p
+            arms.starts[arm, t, j] = place
+            arms.ends[arm, t, j] = p
+        if at_tip.shape.shape[0] > 0:
+            tip = motors.tip[arm]
+            p += tip[0] * x + tip[1] * y + tip[2] * z
+            into = motors.tip_into[arm] * wp.matrix_from_rows(x, y, z)
+            for k in range(at_tip.shape.shape[0]):
+                motors.middle[arm, t, dof + k] = p + wp.transpose(into) * at_tip.centre[k]
+                motors.into[arm, t, dof + k] = at_tip.into[k] * into
 
-    @wp.func
-    def to_segment(p: Vector3, a: Vector3, u: Vector3):
-        """Return the squared distance of a point from the segment from a to a + u."""
-        t = wp.clamp(wp.dot(p - a, u) / wp.max(wp.dot(u, u), tiny), zero, one)
-        return wp.length_sq(p - a - t * u)
+    @kernel
+    def measure(
+        arms: Posed, motors: Motors, at_tip: Solids, solids: Solids, columns: wp.array(dtype=Vector3), most: real,
+        least: wp.array3d(dtype=real), at: wp.array3d(dtype=int),
+    ):  # fmt: skip
+        """Measure the least clearance in each span, at most `most`, and the posture where it is.
 
-    @wp.func
-    def between_segments(a: Vector3, u: Vector3, b: Vector3, v: Vector3):
-        """Return the distance between the segments from a to a + u and from b to b + v.
-
-        The nearest points are an end of a segment or the feet of the common perpendicular. The cross product
-        determines the feet well even if the segments are nearly parallel.
+        least [m], at: (N, G, 4) from the arm itself without and with the payload, then from obstacles likewise.
+        columns: (N,) radius, radius, half the length [m], 0 without one; (0,) if none has one.
         """
-        square = wp.min(
-            wp.min(to_segment(a, b, v), to_segment(a + u, b, v)),
-            wp.min(to_segment(b, a, u), to_segment(b + v, a, u)),
-        )
-        n = wp.cross(u, v)
-        nn = wp.dot(n, n)
-        if nn > parallel * wp.dot(u, u) * wp.dot(v, v):
-            w = b - a
-            s = wp.clamp(wp.dot(wp.cross(w, v), n) / nn, zero, one)
-            t = wp.clamp(wp.dot(wp.cross(w, u), n) / nn, zero, one)
-            square = wp.min(square, wp.length_sq(w + t * v - s * u))
-        return wp.sqrt(square)
-
-    @kernel
-    def self_clearance(arms: Posed, clearance: wp.array2d(dtype=real)):
-        """Lower (N, T) clearances to the distance between links that are neither neighbours nor rigidly connected."""
-        arm, target = wp.tid()
-        nearest = clearance[arm, target]
-        for i in range(arms.radius.shape[1]):
-            r = arms.radius[arm, i]
-            a = arms.starts[arm, target, i]
-            u = arms.ends[arm, target, i] - a
-            length = wp.length(u)
-            links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-            n_joints = int(0)  # noqa: RUF046, UP018
-            between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
-            for j in range(i + 1, arms.radius.shape[1]):
-                b = arms.starts[arm, target, j]
-                between += wp.length(b - arms.ends[arm, target, j - 1])  # displacement of a prismatic joint
-                if arms.motion[arm, j] < wp.static(FIXED):
-                    n_joints += 1
-                v = arms.ends[arm, target, j] - b
-                other_length = wp.length(v)
-                radii = r + arms.radius[arm, j]
-                if r > zero and arms.radius[arm, j] > zero:
-                    # Parts of the arm that are this near along it cannot be farther apart, so they are excluded.
-                    excluded = half * wp.max(two * radii - between, zero)
-                    if links_between > 0 and n_joints > 0 and excluded <= wp.min(length, other_length):
-                        u_counted = u * (one - excluded / wp.max(length, tiny))
-                        v_excluded = v * (excluded / wp.max(other_length, tiny))
-                        nearest = wp.min(
-                            nearest, between_segments(a, u_counted, b + v_excluded, v - v_excluded) - radii
-                        )
-                    links_between += 1
-                between += other_length
-        clearance[arm, target] = nearest
-
-    @wp.func
-    def from_axis(p: Vector3, v: Vector3, solids: Solids, o: int, enough: real):
-        """Return the distance of the segment from p to p + v from an obstacle, in the obstacle's frame."""
-        h, shape, size = half * v, solids.shape[o], solids.half[o]
-        if shape == wp.static(MESH):
-            unturned = wp.identity(n=3, dtype=real)
-            return separation(-(p + h), wp.static(SEGMENT), h, unturned, shape, size, solids, o, enough)
-        return along_segment(shape, p, v, size)
-
-    @kernel
-    def obstacle_clearance(arms: Posed, solids: Solids, clearance: wp.array2d(dtype=real)):
-        """Lower (N, T) clearances to the distance of a link from an obstacle."""
-        arm, target = wp.tid()
-        nearest = clearance[arm, target]
-        for j in range(arms.radius.shape[1]):
-            r = arms.radius[arm, j]
-            if r > zero:
-                a = arms.starts[arm, target, j]
-                along = arms.ends[arm, target, j] - a
-                foot = real(0.0)  # share of the first link that is its foot, where the arm is mounted
-                if j == 0:
-                    foot = two * r / wp.max(wp.length(along), tiny)
-                if foot < one:
-                    for o in range(solids.shape.shape[0]):
-                        base = solids.into[o] * (a - solids.centre[o])
-                        v = solids.into[o] * along
-                        p = base + foot * v
-                        v = (one - foot) * v
-                        if may_be_nearer(nearest + r, solids.shape[o], solids.half[o], p, v):
-                            distance = from_axis(p, v, solids, o, nearest + r) - r
-                            mounted = j == 0 and from_axis(base, Vector3(), solids, o, two * r) <= r
-                            # The first link is always close to what the arm is mounted on: only overlaps count.
-                            if not mounted or distance < zero:
-                                nearest = wp.min(nearest, distance)
-        clearance[arm, target] = nearest
-
-    @kernel
-    def column_clearance(arms: Posed, column: wp.array(dtype=Vector3), clearance: wp.array2d(dtype=real)):
-        """Lower (N, T) clearances to the distance of a column from links that move, except the first one.
-
-        column: (N,) radius, radius, half the length [m], 0 without one.
-        """
-        arm, target = wp.tid()
-        size = column[arm]
-        if size[2] > zero:
-            middle = arms.base[arm] - Vector3(zero, zero, size[2])
-            nearest = clearance[arm, target]
-            n_links = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-            n_joints = int(0)  # noqa: RUF046, UP018
-            for j in range(arms.motion.shape[1]):
-                if arms.motion[arm, j] < wp.static(FIXED):
-                    n_joints += 1
-                r = arms.radius[arm, j]
-                if r > zero:
-                    if n_links > 0 and n_joints > 0:
-                        a = arms.starts[arm, target, j]
-                        nearest = nearer_link(
-                            nearest, wp.static(CYLINDER), size, a - middle, arms.ends[arm, target, j] - a, r
-                        )
-                    n_links += 1
-            clearance[arm, target] = nearest
+        arm, span = wp.tid()
+        first, end, n_bodies = arms.first[span], arms.first[span + 1], motors.shape.shape[1]
+        own, free, own_at, free_at = real(most), real(most), int(first), int(first)
+        if not arms.left_out[arm, span]:
+            steps = largest_steps(arms, arm, first, end)
+            for t in range(first, end):
+                pose(arms, motors, at_tip, arm, t)
+            own, own_at = links_apart(arms, arm, first, end, steps, own, own_at)
+            free, free_at = links_from_obstacles(arms, solids, arm, first, end, steps, free, free_at)
+            column = Vector3()
+            if columns.shape[0] > 0:
+                column = columns[arm]
+            if column[2] > zero:
+                own, own_at = links_from_column(arms, column, arm, first, end, steps, own, own_at)
+            for i in range(n_bodies):
+                if i == motors.n_lasting:
+                    least[arm, span, 0] = own
+                    least[arm, span, 2] = free
+                    at[arm, span, 0] = own_at
+                    at[arm, span, 2] = free_at
+                    for j in range(motors.n_lasting):
+                        if motors.shape[arm, j] >= 0:
+                            own, own_at = body_from_bodies(
+                                arms, motors, arm, j, i, n_bodies, first, end, steps, own, own_at
+                            )
+                if motors.shape[arm, i] >= 0:
+                    own, own_at = body_from_links(arms, motors, arm, i, first, end, steps, own, own_at)
+                    own, own_at = body_from_bodies(
+                        arms, motors, arm, i, i + 1, motors.n_lasting, first, end, steps, own, own_at
+                    )
+                    free, free_at = body_from_obstacles(arms, motors, solids, arm, i, first, end, steps, free, free_at)
+                    if column[2] > zero:
+                        own, own_at = body_from_column(arms, motors, column, arm, i, first, end, steps, own, own_at)
+        for k in range(2):
+            if k == 1 or arms.left_out[arm, span] or motors.n_lasting == n_bodies:
+                least[arm, span, k] = own
+                least[arm, span, 2 + k] = free
+                at[arm, span, k] = own_at
+                at[arm, span, 2 + k] = free_at
 
     return SimpleNamespace(
-        real=real, Vector3=Vector3, Posed=Posed, Solids=Solids,
-        link_axes=link_axes, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance,
-        column_clearance=column_clearance,
-    )  # fmt: skip
+        real=real, Vector3=Vector3, Matrix3=Matrix3, Posed=Posed, Motors=Motors, Solids=Solids, measure=measure
+    )

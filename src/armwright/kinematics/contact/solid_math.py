@@ -29,7 +29,7 @@ def solid_math(precision: Precision) -> SimpleNamespace:
 
     @wp.struct
     class Posed:
-        """The links of N arms of up to D joints at T targets."""
+        """The links of N arms of up to D joints in T postures, which G spans divide."""
 
         base: wp.array(dtype=Vector3)  # (N,) [m]
         motion: wp.array2d(dtype=int)  # (N, D)
@@ -39,16 +39,23 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         radius: wp.array2d(dtype=real)  # (N, D) [m], 0 for links to ignore
         starts: wp.array3d(dtype=Vector3)  # (N, T, D) of their axes [m]
         ends: wp.array3d(dtype=Vector3)  # (N, T, D) [m]
+        reach: wp.array2d(dtype=real)  # (N, D) of a link and the stroke of its joint [m]
+        first: wp.array(dtype=int)  # (G + 1,) index of the first posture of each span, and T
+        left_out: wp.array2d(dtype=wp.bool)  # (N, G) spans that are not measured
 
     @wp.struct
     class Motors:
-        """K bodies: those of their D actuators, and behind these tool and payload if they count."""
+        """K bodies: those of their D actuators, and behind these tool and payload if they count, the payload last."""
 
         shape: wp.array2d(dtype=int)  # (N, K)
         half: wp.array2d(dtype=Vector3)  # (N, K) [m]
+        axis: wp.array2d(dtype=int)  # (N, D) and the two below, as of `MotorBodies`
+        centre: wp.array2d(dtype=Vector3)  # (N, D) [m]
+        tip: wp.array(dtype=Vector3)  # (N,) of the tip frame in that of the last link [m]
+        tip_into: wp.array(dtype=Matrix3)  # (N,) rotation from there into the tip frame
         middle: wp.array3d(dtype=Vector3)  # (N, T, K) [m]
         into: wp.array3d(dtype=Matrix3)  # (N, T, K) rotation into the body's frame
-        count: wp.array(dtype=int)  # (T,) how many are there: without the payload, which is the last, if not carried
+        n_lasting: int  # number of bodies without the payload
         allowed: wp.array2d(dtype=real)  # (T, O) depth of tool and payload that does not count [m], as of `TipRules`
 
     @wp.struct
@@ -118,26 +125,26 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         return signed_distance(shape, p + half * (low + high) * v, size)
 
     @wp.func
-    def may_be_nearer(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3):
-        """Return whether a point of the segment from p to p + v may have a smaller signed distance, by lower bounds.
+    def segment_bound(shape: int, size: Vector3, p: Vector3, v: Vector3):
+        """Return a lower bound of the signed distance of the segment from p to p + v.
 
         Distance changes by no more than the path length, and rises with each coordinate, except from the ground.
         """
-        if signed_distance(shape, p + half * v, size) - half * wp.length(v) >= nearest:
-            return False
+        bound = signed_distance(shape, p + half * v, size) - half * wp.length(v)
         if shape == wp.static(GROUND):
-            return True
+            return bound
         low, high = wp.min(p, p + v), wp.max(p, p + v)
-        return signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size) < nearest
+        return wp.max(bound, signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size))
 
     @wp.func
-    def nearer_link(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real):
-        """Return the smaller of a distance and that of a solid from a link with the axis from p to p + v."""
-        if may_be_nearer(nearest + radius, shape, size, p, v):
-            return wp.min(nearest, along_segment(shape, p, v, size) - radius)
-        return nearest
+    def from_link(shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real, enough: real):
+        """Return the signed distance from a link with the axis from p to p + v, or a lower bound that is enough."""
+        bound = segment_bound(shape, size, p, v) - radius
+        if bound >= enough:
+            return bound
+        return along_segment(shape, p, v, size) - radius
 
     return SimpleNamespace(
-        Posed=Posed, Motors=Motors, Solids=Solids, signed_distance=signed_distance, along_segment=along_segment,
-        may_be_nearer=may_be_nearer, nearer_link=nearer_link,
+        real=real, Posed=Posed, Motors=Motors, Solids=Solids, signed_distance=signed_distance,
+        along_segment=along_segment, segment_bound=segment_bound, from_link=from_link,
     )  # fmt: skip
