@@ -38,7 +38,7 @@ def reached(arms: ArmArrays, plan: CyclePlan, start: Array) -> tuple[Array, Arra
     n, b, s, dof = start.shape
     each = plan.poses[np.repeat([block.entry for block in plan.blocks], s)]
     samples = plan.sample()
-    rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], s)]
+    rules = plan.sample_rules[np.repeat(samples.first[:-1], s)]
     found = solve_postures(arms, each.position, initial_q=start.reshape(n, -1, dof), target_arrays=each.arrays)
     is_near = (found.distance(each.position) < each.tolerance) & (found.angle < each.angle_tolerance)
     q = found.q.astype(np.float64)

@@ -17,7 +17,7 @@ from armwright.arrays import Array
 from armwright.rotations import rotation_about
 from armwright.tasks.cycle import By, Cycle
 from armwright.tasks.targets import ORIENTATION, TargetArrays
-from armwright.tasks.tip_rules import APART, TipRules
+from armwright.tasks.tip_rules import APART, TipRules, joined_rules
 
 LINE_STEP = 0.02  # [m] largest distance of two samples of a line
 ANGLE_STEP = 0.1  # [rad] likewise of the tool's angle
@@ -200,8 +200,10 @@ class CyclePlan:
         carries = np.full(len(share), motion.carries and self.tip_rules.carries.any())
         return TipRules(carries, allowed, self.tip_rules.solids)
 
-    def sampled_rules(self, samples: LineSamples) -> TipRules:
-        """Return what holds at samples of lines; at those that motions share, what holds for any of them."""
+    @cached_property
+    def sample_rules(self) -> TipRules:
+        """What holds at the samples of lines; at those that motions share, what holds for any of them."""
+        samples = self.sample()
         n, first = len(samples.poses), samples.first
         apart = np.full((n, self.tip_rules.allowed.shape[1]), APART)
         found = TipRules(np.zeros(n, dtype=np.bool_), apart, self.tip_rules.solids)
@@ -214,6 +216,34 @@ class CyclePlan:
             found.carries[at] |= rules.carries
             found.allowed[at] = np.maximum(found.allowed[at], rules.allowed)
         return found
+
+    def path_rules(self, counts: tuple[int, ...]) -> TipRules:
+        """Return what holds along all motions, one after another, at so many equally spaced samples of each."""
+        if counts not in self._path_rules:
+            pairs = zip(self.motions, counts, strict=True)
+            self._path_rules[counts] = joined_rules([self.rules(one, np.linspace(0.0, 1.0, n)) for one, n in pairs])
+        return self._path_rules[counts]
+
+    @cached_property
+    def _path_rules(self) -> dict[tuple[int, ...], TipRules]:
+        return {}
+
+    def line_poses(self, counts: tuple[int, ...]) -> Poses:
+        """Return the poses of lines that are their own source, one after another, at so many samples of each."""
+        if counts not in self._line_poses:
+            pairs = zip(self.own_lines, counts, strict=True)
+            poses = [self.line(self.motions[index], np.linspace(0.0, 1.0, n)) for index, n in pairs]
+            self._line_poses[counts] = stack_poses(poses)
+        return self._line_poses[counts]
+
+    @cached_property
+    def _line_poses(self) -> dict[tuple[int, ...], Poses]:
+        return {}
+
+    @cached_property
+    def own_lines(self) -> tuple[int, ...]:
+        """Indices of the lines that are their own source."""
+        return tuple(i for i, one in enumerate(self.motions) if one.by == "line" and self.source[i] == i)
 
     def sample(self, refinement: float = 1) -> LineSamples:
         """Return samples of all lines, `refinement` times as many as a path needs at least."""

@@ -27,6 +27,10 @@ class SpanClearances:
     least: Array  # (2, 2, N, G) from the arm itself and from obstacles, each without and with the payload [m]
     at: NDArray[np.int32]  # (2, 2, N, G) index of the posture where it is
 
+    def of(self, source: NDArray[np.intp]) -> "SpanClearances":
+        """Return the clearances of spans that are the same as others; source: (N, G) which ones."""
+        return SpanClearances(*(np.take_along_axis(each, source[None, None], axis=3) for each in (self.least, self.at)))
+
     def carrying(self, carries: NDArray[np.bool_]) -> tuple[Array, Array, NDArray[np.int32]]:
         """Return (N, G) self-clearance, obstacle clearance, and the posture of the smaller one.
 

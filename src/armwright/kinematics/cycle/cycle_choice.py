@@ -171,7 +171,7 @@ def _avoid_collisions(
     share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
     n_blocks, n_edges, candidates = blocks.shape[1], edges.shape[1], blocks.shape[2]
     joint_motions = [plan.rules(plan.motions[i], share) for i in plan.joint_motions[:n_edges]]
-    rules = joined_rules([plan.sampled_rules(samples), *joint_motions])
+    rules = joined_rules([plan.sample_rules, *joint_motions])
     best, least = choice.copy(), np.full(len(arms), np.inf)
     free_blocks, free_edges = blocks.copy(), edges.copy()
     for _ in range(ROUNDS if candidates > 1 else 0):

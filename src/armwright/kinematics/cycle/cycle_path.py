@@ -9,23 +9,21 @@ then followed with as many samples as it takes for neighbours to be near.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.contact.clearance import span_clearances
 from armwright.kinematics.cycle.cycle_choice import CLOSED, JOINT_STEPS, MAX_SLIDE, MAX_STEP, ON_LIMIT, choose_postures
 from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
 from armwright.kinematics.cycle.instants import EQUAL, FEW, Instants
 from armwright.kinematics.cycle.line_following import IndexArray, follow_lines, tool_errors
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device
-from armwright.tasks.motions import NEAR_END, CyclePlan, stack_poses
+from armwright.tasks.motions import NEAR_END, CyclePlan
 from armwright.tasks.obstacles import Obstacle
-from armwright.tasks.tip_rules import joined_rules
 
 MAX_REFINEMENT = 64  # of the samples
 SHARP = 4.0  # times the mean step of a line that makes its largest one a peak
@@ -219,34 +217,45 @@ def _measure(
 ) -> CyclePaths:  # fmt: skip
     """Return the paths with what they are off by and how near they come; between: as in `_line_errors`."""
     n, m = jumps.shape
-    values = np.zeros((5, n, m))
-    worst, ends, step = np.zeros((n, m, 3)), np.empty((n, m, 2, arms.dof)), np.empty((n, m))
+    is_line, is_back = (np.array(each) for each in (
+        [motion.by == "line" for motion in plan.motions], [i != source for i, source in enumerate(plan.source)]
+    ))  # fmt: skip
+    carries = np.array([motion.carries for motion in plan.motions])
+    values, worst = np.zeros((5, n, m)), np.zeros((3, n, m))
+    ends, step = np.empty((n, m, 2, arms.dof)), np.empty((n, m))
     for group in groups:
+        index, counts = group.index, np.array(group.counts)
         if plan.is_loop:
             gap = np.abs(group.paths[-1].q[:, -1] - group.paths[0].q[:, 0]).max(axis=1)
-            jumps[group.index, -1] |= gap > CLOSED
-        errors = _line_errors(group, plan, device, between)
+            jumps[index, -1] |= gap > CLOSED
+        first = np.concatenate([[0], np.cumsum(counts)])
         q = np.concatenate([path.q for path in group.paths], axis=1)
-        rules = joined_rules([plan.rules(path.motion, path.share) for path in group.paths])
-        clearance = np.stack(clearances(group.arms, q, obstacles, device, rules))  # (2, n, R)
+        found = span_clearances(
+            group.arms,
+            q,
+            first,
+            obstacles,
+            device,
+            plan.path_rules(group.counts),
+            left_out=group.source != np.arange(m),
+        ).of(group.source)
+        *values[2:4, index], at = found.carrying(carries)
+        worst[2, index] = (at - first[group.source]) / (counts[group.source] - 1)
+        for i, errors in _line_errors(group, plan, device, between).items():
+            values[:2, index, i] = errors.max(axis=1).T
+            worst[:2, index, i] = errors.argmax(axis=1).T / (errors.shape[1] - 1)
         margin = group.arms.limit_distance(q)
-        at = 0
-        for i, path in enumerate(group.paths):
-            end = at + path.q.shape[1]
-            own = clearance[:, :, at:end]
-            if errors[i] is not None:
-                values[:2, group.index, i] = errors[i].max(axis=1).T
-                worst[group.index, i, :2] = errors[i].argmax(axis=1) / (errors[i].shape[1] - 1)
-            values[2:4, group.index, i] = own.min(axis=2)
-            worst[group.index, i, 2] = own.min(axis=0).argmin(axis=1) / (path.q.shape[1] - 1)
-            values[4, group.index, i] = margin[:, at:end].min(axis=1)
-            if path.motion.by == "line":  # where a joint meets its limit, the speeds of the others jump
-                jumps[group.index, i] |= (margin[:, at + 1 : end - 1] <= ON_LIMIT).any(axis=1)
-            ends[group.index, i], step[group.index, i] = path.q[:, [0, -1]], 1.0 / (path.q.shape[1] - 1)
-            at = end
+        values[4, index] = np.minimum.reduceat(margin, first[:-1], axis=1)
+        margin[:, np.concatenate([first[:-1], first[1:] - 1])] = np.inf
+        # Where a joint meets its limit within a line, the speeds of the others jump.
+        jumps[index] |= is_line & (np.minimum.reduceat(margin, first[:-1], axis=1) <= ON_LIMIT)
+        ends[index], step[index] = np.stack([q[:, first[:-1]], q[:, first[1:] - 1]], axis=2), 1.0 / (counts - 1)
+    values[:2], worst[:2] = values[:2, :, plan.source], worst[:2, :, plan.source]
+    worst = np.where(is_back, 1.0 - worst, worst)
     if between > 1:
-        _look_between(arms, plan, ends, step, values[2:4], worst[:, :, 2], obstacles, device)
+        _look_between(arms, plan, ends, step, values[2:4], worst[2], obstacles, device)
     path_error, path_angle, own, clear, margin = values
+    worst = np.moveaxis(worst, 0, 2)
     return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
 
 
@@ -262,7 +271,7 @@ def _look_between(
     ends: (N, M, 2, D) first and last posture of joint motions.  step: (N, M) from one sample to the next, as a share.
     """
     least = clearance.min(axis=0)
-    is_joint = [motion.by == "joint" for motion in plan.motions]
+    is_joint, span = [motion.by == "joint" for motion in plan.motions], np.array([0, len(BETWEEN)])
     near = is_joint & (least < NEAR) & (least.min(axis=1, keepdims=True) > 0.0)
     for carries in (False, True):
         place = np.nonzero(near & [motion.carries == carries for motion in plan.motions])  # P of N, of M
@@ -274,19 +283,19 @@ def _look_between(
             size = size / 4.0
             share = np.clip(worst[place][:, None] + size * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (P, S)
             q = start + share[..., None] * (end - start)
-            found = np.stack(clearances(part, q, obstacles, device, rules))  # (2, P, S)
-            best = np.take_along_axis(share, found.min(axis=0).argmin(axis=1)[:, None], axis=1)[:, 0]
-            worst[place] = np.where(found.min(axis=(0, 2)) < clearance[:, *place].min(axis=0), best, worst[place])
-            clearance[:, *place] = np.minimum(clearance[:, *place], found.min(axis=2))
+            own, free, at = span_clearances(part, q, span, obstacles, device, rules).carrying(np.array([carries]))
+            best = np.take_along_axis(share, at, axis=1)[:, 0]
+            found = np.stack([own[:, 0], free[:, 0]])
+            worst[place] = np.where(found.min(axis=0) < clearance[:, *place].min(axis=0), best, worst[place])
+            clearance[:, *place] = np.minimum(clearance[:, *place], found)
 
 
-def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> list[Any]:
-    """Return (n, between R + 1, 2) distance [m] and angle [rad] off each line of R + 1 samples; None for others."""
-    lines = [path for path in group.paths if path.motion.by == "line"]
+def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> dict[int, Array]:
+    """Return (n, between R + 1, 2) distance [m] and angle [rad] off each own line of R + 1 samples, by its index."""
+    lines = [group.paths[index] for index in plan.own_lines]
     if not lines:
-        return [None] * len(group.paths)
-    shares = [np.linspace(0.0, 1.0, between * (path.q.shape[1] - 1) + 1) for path in lines]
-    poses = stack_poses([plan.line(path.motion, share) for path, share in zip(lines, shares, strict=True)])
-    q = np.concatenate([path.at(share) for path, share in zip(lines, shares, strict=True)], axis=1)
-    errors = iter(np.split(tool_errors(group.arms, poses, q, device), np.cumsum([len(s) for s in shares])[:-1], axis=1))
-    return [next(errors) if path.motion.by == "line" else None for path in group.paths]
+        return {}
+    counts = tuple(between * (path.q.shape[1] - 1) + 1 for path in lines)
+    q = np.concatenate([path.at(np.linspace(0.0, 1.0, n)) for path, n in zip(lines, counts, strict=True)], axis=1)
+    errors = tool_errors(group.arms, plan.line_poses(counts), q, device)
+    return dict(zip(plan.own_lines, np.split(errors, np.cumsum(counts)[:-1], axis=1), strict=True))

@@ -112,7 +112,7 @@ def _clearance(
 ) -> Array:
     """Return the (N, B, S) clearance of postures at the first poses [m], at most 0; -inf for those that are unfit."""
     samples = plan.sample()
-    rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], q.shape[2])]
+    rules = plan.sample_rules[np.repeat(samples.first[:-1], q.shape[2])]
     q = np.where(unfit[..., None], 0.0, q).reshape(len(arms), -1, arms.dof)
     found = np.minimum(*clearances(arms, q, obstacles, device, rules, most=0.0))
     return np.where(unfit, -np.inf, found.reshape(unfit.shape))
