@@ -155,6 +155,18 @@ class CyclePlan:
                     open_lines.append(index)
         return tuple(source)
 
+    @cached_property
+    def alike(self) -> tuple[list[int], list[int]]:
+        """The blocks with entries, lines and rules of their own, and which of these each block is like."""
+        samples = self.sample()
+        rules = self.sampled_rules(samples)[samples.first[:-1]]
+        keys = [
+            (block.entry, *((self.motions[i].start, self.motions[i].end) for i in block.lines), carries, *allowed)
+            for block, carries, allowed in zip(self.blocks, rules.carries, rules.allowed, strict=True)
+        ]
+        own = [keys.index(key) for key in dict.fromkeys(keys)]
+        return own, [own.index(keys.index(key)) for key in keys]
+
     @property
     def _order(self) -> list[int]:
         """Indices of the motions, from the first of the blocks on."""

@@ -47,7 +47,8 @@ def entry_postures(
     room to the joint limits, each other one is the farthest from those before. If none reaches the pose, the nearest is
     the only one; if all collide, those that do so least. All are exact in float32.
     """
-    poses = plan.poses[[block.entry for block in plan.blocks]]
+    own, alike = plan.alike
+    poses = plan.poses[[plan.blocks[block].entry for block in own]]
     lower, upper = (limit.astype(np.float64)[:, None, None] for limit in (arms.lower, arms.upper))
     start = arms.random_postures(STARTS).swapaxes(0, 1)[:, None]  # (N, 1, S, D)
     start[:, :, 0] = 0.0
@@ -75,7 +76,7 @@ def entry_postures(
     unfit = clearance < np.where(most < 0.0, most - DEPTH, 0.0)
     cost = np.where(unfit, np.inf, _cost(arms, q, off))
     q, _ = _branches(arms, q, cost, candidates, candidates, APART, device)
-    return _rounded(q[:, :, : (~np.isnan(q[..., 0])).sum(axis=2).max()], lower, upper)
+    return _rounded(q[:, :, : (~np.isnan(q[..., 0])).sum(axis=2).max()], lower, upper)[:, alike]
 
 
 def _solve(arms: ArmArrays, poses: Poses, start: Array, updates: int, device: Device) -> tuple[Array, Array]:
@@ -112,7 +113,7 @@ def _clearance(
 ) -> Array:
     """Return the (N, B, S) clearance of postures at the first poses [m], at most 0; -inf for those that are unfit."""
     samples = plan.sample()
-    rules = plan.sampled_rules(samples)[np.repeat(samples.first[:-1], q.shape[2])]
+    rules = plan.sampled_rules(samples)[np.repeat(samples.first[plan.alike[0]], q.shape[2])]
     q = np.where(unfit[..., None], 0.0, q).reshape(len(arms), -1, arms.dof)
     found = np.minimum(*clearances(arms, q, obstacles, device, rules, most=0.0))
     return np.where(unfit, -np.inf, found.reshape(unfit.shape))
