@@ -17,13 +17,14 @@ from armwright.arrays import Array
 from armwright.rotations import rotation_about
 from armwright.tasks.cycle import By, Cycle
 from armwright.tasks.targets import ORIENTATION, TargetArrays
-from armwright.tasks.tip_rules import APART, TipRules
+from armwright.tasks.tip_rules import APART, TipRules, joined_rules
 
 LINE_STEP = 0.02  # [m] largest distance of two samples of a line
 ANGLE_STEP = 0.1  # [rad] likewise of the tool's angle
 MIN_STEPS = 4  # of a line, for its spline
 MAX_SAMPLES = 20_000  # of all lines of a cycle
 NEAR_END = 1.0 / 16.0  # share of a joint motion at each end, where tool and payload leave what they rest on
+JOINT_STEPS = 16  # of a joint motion at least
 OPPOSITE = 1e-3  # [rad] from half a turn; the shortest rotation is not unique there
 
 
@@ -158,8 +159,7 @@ class CyclePlan:
     @cached_property
     def alike(self) -> tuple[list[int], list[int]]:
         """The blocks with entries, lines and rules of their own, and which of these each block is like."""
-        samples = self.sample()
-        rules = self.sampled_rules(samples)[samples.first[:-1]]
+        rules = self.coarse_rules[self.sample().first[:-1]]
         keys = [
             (block.entry, *((self.motions[i].start, self.motions[i].end) for i in block.lines), carries, *allowed)
             for block, carries, allowed in zip(self.blocks, rules.carries, rules.allowed, strict=True)
@@ -205,8 +205,10 @@ class CyclePlan:
         carries = np.full(len(share), motion.carries and self.tip_rules.carries.any())
         return TipRules(carries, allowed, self.tip_rules.solids)
 
-    def sampled_rules(self, samples: LineSamples) -> TipRules:
-        """Return what holds at samples of lines; at those that motions share, what holds for any of them."""
+    @cached_property
+    def coarse_rules(self) -> TipRules:
+        """What holds at the samples of lines, of shared ones for any of the motions, then within each joint motion."""
+        samples, share = self.sample(), np.arange(1, JOINT_STEPS) / JOINT_STEPS
         n, first = len(samples.poses), samples.first
         apart = np.full((n, self.tip_rules.allowed.shape[1]), APART)
         found = TipRules(np.zeros(n, dtype=np.bool_), apart, self.tip_rules.solids)
@@ -218,7 +220,7 @@ class CyclePlan:
             rules = self.rules(motion, np.linspace(0.0, 1.0, len(at)))
             found.carries[at] |= rules.carries
             found.allowed[at] = np.maximum(found.allowed[at], rules.allowed)
-        return found
+        return joined_rules([found, *(self.rules(self.motions[index], share) for index in self.joint_motions)])
 
     def sample(self, refinement: float = 1) -> LineSamples:
         """Return samples of all lines, `refinement` times as many as a path needs at least."""

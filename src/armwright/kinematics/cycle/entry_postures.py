@@ -13,7 +13,8 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.contact.clearance import clearances
-from armwright.kinematics.cycle.cycle_choice import DEPTH, cost_of
+from armwright.kinematics.cycle.costs import cost_of
+from armwright.kinematics.cycle.cycle_choice import DEPTH
 from armwright.kinematics.cycle.line_following import follow_lines
 from armwright.kinematics.devices import Device, load_kernels
 from armwright.kinematics.ik.ik import solve_postures
@@ -112,8 +113,7 @@ def _clearance(
     arms: ArmArrays, plan: CyclePlan, obstacles: Sequence[Obstacle], q: Array, unfit: NDArray[np.bool_], device: Device
 ) -> Array:
     """Return the (N, B, S) clearance of postures at the first poses [m], at most 0; -inf for those that are unfit."""
-    samples = plan.sample()
-    rules = plan.sampled_rules(samples)[np.repeat(samples.first[plan.alike[0]], q.shape[2])]
+    rules = plan.coarse_rules[np.repeat(plan.sample().first[plan.alike[0]], q.shape[2])]
     q = np.where(unfit[..., None], 0.0, q).reshape(len(arms), -1, arms.dof)
     found = np.minimum(*clearances(arms, q, obstacles, device, rules, most=0.0))
     return np.where(unfit, -np.inf, found.reshape(unfit.shape))
@@ -133,8 +133,7 @@ def _colliding_branches(arms: ArmArrays, poses: Poses, q: Array, clearance: Arra
 def _aside(arms: ArmArrays, poses: Poses, start: Array, device: Device) -> tuple[Array, Array]:
     """Return self-motions of postures (N, B, S, D) at B poses, and what they are off by, as `_solve` does."""
     lines = follow_lines(arms, single_samples(poses), start, device, ASIDE)
-    off = np.maximum(lines.position_error / poses.tolerance, lines.angle_error / poses.angle_tolerance)
-    return lines.q.swapaxes(1, 2), np.where(np.isnan(start[..., 0]), np.inf, off.swapaxes(1, 2))
+    return lines.q.swapaxes(1, 2), lines.off
 
 
 def _rounded(q: Array, lower: Array, upper: Array) -> Array:
