@@ -116,7 +116,7 @@ def test_self_motions_keep_the_tool_where_it_is() -> None:
     samples = single_samples(poses)
     start, moved = follow_lines(arms, samples, entry), follow_lines(arms, samples, entry, aside_by=0.03)
     (distance, angle), moved_off = (
-        np.moveaxis([tool_errors(arms, poses, lines.q[:, k]) for k in range(entry.shape[2])], (0, -1), (1, 0))
+        np.transpose([tool_errors(arms, poses, q) for q in lines.q.swapaxes(0, 1)], (3, 1, 0, 2))
         for lines in (start, moved)
     )
     reached = (distance < 1e-6) & (angle < 1e-6)

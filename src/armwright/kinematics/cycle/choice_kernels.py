@@ -21,7 +21,7 @@ from armwright.kinematics.cycle.path_math import path_math
 def choice_kernels() -> SimpleNamespace:
     """Return the kernels."""
     real, cost_of = wp.float64, path_math().cost_of
-    one, peak_speed, spent = real(1.0), real(PEAK_SPEED), real(SPENT)
+    one, peak_speed = real(1.0), real(PEAK_SPEED)
 
     @kernel
     def joint_motions(
@@ -40,7 +40,7 @@ def choice_kernels() -> SimpleNamespace:
         arm, motion, i = wp.tid()
         start, goal = end[motion], first[(motion + 1) % end.shape[0]]
         for j in range(q.shape[1]):
-            cost = real(spent)
+            cost = real(wp.static(SPENT))
             if not wp.isnan(q[arm, i, start, 0]) and not wp.isnan(q[arm, j, goal, 0]):
                 cost = real(0.0)
                 for d in range(q.shape[3]):
@@ -64,15 +64,15 @@ def choice_kernels() -> SimpleNamespace:
         """
         row = wp.tid()
         arm, n_blocks, k = arms[row], blocks.shape[1], blocks.shape[2]
-        least = real(spent)
+        least = real(wp.static(SPENT))
         for start in range(k):
             for j in range(k):
-                total[row, 0, j] = spent
+                total[row, 0, j] = real(wp.static(SPENT))
             total[row, 0, start] = blocks[arm, 0, start]
             for block in range(1, n_blocks):
                 now = block % 2
                 for j in range(k):
-                    total[row, now, j] = spent
+                    total[row, now, j] = real(wp.static(SPENT))
                 for i in range(k):
                     so_far = total[row, 1 - now, i]
                     if so_far < least:

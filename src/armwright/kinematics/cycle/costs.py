@@ -11,6 +11,7 @@ SUSPECT = 100.0  # cost of such a step: above any detour, below what is certain 
 PEAK_SPEED = 1.875  # of a motion, relative to its mean speed
 SPENT = 1e12  # cost of what there is not
 BLOCKED = 1e3  # cost of a chain that is off by its tolerance, far above any detour
+FAR = 1e30  # distance of postures from none, and cost of one that is not chosen
 MOST_EXCESS = 1e6  # relative to a tolerance, beyond which more costs no more
 
 

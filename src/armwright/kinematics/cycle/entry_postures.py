@@ -13,7 +13,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.contact.clearance import clearances
-from armwright.kinematics.cycle.costs import cost_of
+from armwright.kinematics.cycle.costs import FAR, cost_of
 from armwright.kinematics.cycle.cycle_choice import DEPTH
 from armwright.kinematics.cycle.line_following import follow_lines
 from armwright.kinematics.devices import Device, load_kernels
@@ -152,7 +152,7 @@ def _branches(
     """
     loaded = load_kernels("cycle.branch_kernels", device)
     n, b, s, dof = q.shape
-    found, nearness = np.full((n, b, count, dof), np.nan), np.full(cost.shape, np.inf)
+    found, nearness = np.full((n, b, count, dof), np.nan), np.full(cost.shape, FAR)
 
     def find(chunk: slice) -> None:
         values = {name: getattr(arms[chunk], name) for name in ("dof", "motion", "axis", "offset", "lower", "upper")}

@@ -43,8 +43,8 @@ def path_kernels() -> SimpleNamespace:
     hopeless, hopeless_angle = real(HOPELESS), real(HOPELESS_ANGLE)
     zero, one = real(0.0), real(1.0)
     converged, max_rotation, tiny = real(CONVERGED), real(MAX_ROTATION), real(1e-18)
-    blocked, suspect, spent = real(BLOCKED), real(SUSPECT), real(SPENT)
-    on_limit, large_step, infinity = real(ON_LIMIT), real(LARGE_STEP), real(wp.inf)
+    blocked, suspect = real(BLOCKED), real(SUSPECT)
+    on_limit, large_step = real(ON_LIMIT), real(LARGE_STEP)
 
     @kernel
     def follow(
@@ -73,8 +73,8 @@ def path_kernels() -> SimpleNamespace:
             if path.motion[arm, j] < wp.static(FIXED):
                 aside[j] = aside_by * (path.upper[arm, j] - path.lower[arm, j]) * real(wp.randn(random))
         if wp.isnan(q[0]):  # no candidate
-            worst_off[arm, block, candidate] = infinity
-            block_cost[arm, block, candidate] = spent
+            worst_off[arm, block, candidate] = real(wp.inf)
+            block_cost[arm, block, candidate] = real(wp.static(SPENT))
             for sample in range(path.first[block], path.first[block + 1]):
                 for j in range(path.dof):
                     q_path[arm, candidate, sample, j] = q[j]
@@ -150,7 +150,7 @@ def path_kernels() -> SimpleNamespace:
                 if distance > hopeless or angle > hopeless_angle:
                     updates = int(1)  # noqa: RUF046, UP018
             else:
-                largest, slowest, margin = real(0.0), real(0.0), real(infinity)
+                largest, slowest, margin = real(0.0), real(0.0), real(1.0)
                 for j in range(path.dof):
                     change = wp.abs(q[j] - begin[j])
                     largest = wp.max(largest, change)
