@@ -67,7 +67,7 @@ class Goal:
         )
         q = found.q.astype(np.float64)
         off = np.maximum(found.distance(each.position) / each.tolerance, found.angle / each.angle_tolerance)
-        rules = self.plan.sample_rules[np.full(s, samples.first[self.block])]
+        rules = self.plan.coarse_rules[np.full(s, samples.first[self.block])]
         return q, (off <= slack) & (np.minimum(*clearances(arms, q, self.obstacles, rules=rules, most=0.0)) >= 0.0)
 
     def lost(self, arm: ArmArrays, q: Array, own: Array) -> tuple[int, list[Array]]:

@@ -200,7 +200,7 @@ def test_choice_of_candidates_equals_brute_force(blocks: int, closed: bool) -> N
         joined = sum(edges[arm, b, chosen[b], chosen[(b + 1) % blocks]] for b in range(edges.shape[1]))
         return float(joined + sum(own[arm, b, chosen[b]] for b in range(blocks)))
 
-    found = choose_candidates(own, edges, closed)
+    found = choose_candidates(own, edges, np.arange(n))
     for arm in range(n):
         best = min(cost(arm, chosen) for chosen in product(range(k), repeat=blocks))
         assert cost(arm, found[arm]) == pytest.approx(best, abs=1e-12)

@@ -264,7 +264,7 @@ def test_depths_are_allowed_on_the_lines_of_a_target_and_near_it() -> None:
     # out of the bin, over to 3, over to the tray and into it, out of it, over to the bin and into it
     assert allowed == [line, [*apart[:3], REACHED, REACHED], [REACHED, REACHED, *apart[2:]], line, line, apart, line]
     assert [found.rules(motion, share).carries.all() for motion in found.motions] == [True] * 4 + [False] * 3
-    samples = found.sample_rules
+    samples = found.coarse_rules[: len(found.sample().poses)]
     assert samples.allowed.shape == (len(found.sample().poses), 2)
     ways_in = [found.sample().of_motion[index] for index, source in enumerate(found.source) if source == index]
     assert (samples.allowed.max(axis=1) == REACHED).sum() == 1 + sum(map(len, ways_in))

@@ -24,6 +24,7 @@ ANGLE_STEP = 0.1  # [rad] likewise of the tool's angle
 MIN_STEPS = 4  # of a line, for its spline
 MAX_SAMPLES = 20_000  # of all lines of a cycle
 NEAR_END = 1.0 / 16.0  # share of a joint motion at each end, where tool and payload leave what they rest on
+JOINT_STEPS = 16  # of a joint motion at least
 OPPOSITE = 1e-3  # [rad] from half a turn; the shortest rotation is not unique there
 
 
@@ -162,6 +163,17 @@ class CyclePlan:
         visited, first = np.unique(np.sort(target), return_index=True)
         return visited, np.argsort(target, kind="stable"), first
 
+    @cached_property
+    def alike(self) -> tuple[list[int], list[int]]:
+        """The blocks with entries, lines and rules of their own, and which of these each block is like."""
+        rules = self.coarse_rules[self.sample().first[:-1]]
+        keys = [
+            (block.entry, *((self.motions[i].start, self.motions[i].end) for i in block.lines), carries, *allowed)
+            for block, carries, allowed in zip(self.blocks, rules.carries, rules.allowed, strict=True)
+        ]
+        own = [keys.index(key) for key in dict.fromkeys(keys)]
+        return own, [own.index(keys.index(key)) for key in keys]
+
     @property
     def _order(self) -> list[int]:
         """Indices of the motions, from the first of the blocks on."""
@@ -201,9 +213,9 @@ class CyclePlan:
         return TipRules(carries, allowed, self.tip_rules.solids)
 
     @cached_property
-    def sample_rules(self) -> TipRules:
-        """What holds at the samples of lines; at those that motions share, what holds for any of them."""
-        samples = self.sample()
+    def coarse_rules(self) -> TipRules:
+        """What holds at the samples of lines, of shared ones for any of the motions, then within each joint motion."""
+        samples, share = self.sample(), np.arange(1, JOINT_STEPS) / JOINT_STEPS
         n, first = len(samples.poses), samples.first
         apart = np.full((n, self.tip_rules.allowed.shape[1]), APART)
         found = TipRules(np.zeros(n, dtype=np.bool_), apart, self.tip_rules.solids)
@@ -215,7 +227,20 @@ class CyclePlan:
             rules = self.rules(motion, np.linspace(0.0, 1.0, len(at)))
             found.carries[at] |= rules.carries
             found.allowed[at] = np.maximum(found.allowed[at], rules.allowed)
-        return found
+        return joined_rules([found, *(self.rules(self.motions[index], share) for index in self.joint_motions)])
+
+    @cached_property
+    def coarse_spans(self) -> tuple[NDArray[np.intp], NDArray[np.bool_], NDArray[np.intp]]:
+        """Spans of `coarse_rules` that carry the payload or not, each of one block or one joint motion.
+
+        The index of the first sample of each, and their number; whether each carries; and the first of each block and
+        joint motion.
+        """
+        n_edges, lengths = len(self.joint_motions), np.diff(self.sample().first)
+        of = np.repeat(np.arange(len(self.blocks) + n_edges), [*lengths, *[JOINT_STEPS - 1] * n_edges])
+        carries = self.coarse_rules.carries
+        first = np.flatnonzero(np.diff(2 * of + carries, prepend=-1))
+        return np.append(first, len(of)), carries[first], np.flatnonzero(np.diff(of[first], prepend=-1))
 
     def path_rules(self, counts: tuple[int, ...]) -> TipRules:
         """Return what holds along all motions, one after another, at so many equally spaced samples of each."""

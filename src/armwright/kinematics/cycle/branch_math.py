@@ -77,15 +77,12 @@ def branch_math() -> SimpleNamespace:
         """Return the image by an elbow or a turn about the axis of a joint; 2 if it is exact, 1 if near, 0 if none."""
         a = chain.axis[arm, joint]
         end, others = int(joint + 1), int(0)  # noqa: RUF046, UP018
-        length = real(0.0)
         while end < chain.dof and sense(chain, arm, end, a) == zero:
             if chain.motion[arm, end] < wp.static(PRISMATIC):
                 others += 1
                 if wp.abs(wp.dot(chain.axis[arm, end], a)) > off:
                     return q, 0
             end += 1
-        for j in range(chain.dof):
-            length += wp.length(chain.offset[arm, j])
         u, way = links_across(chain, arm, a, joint, end), real(0.0)
         if end < chain.dof:
             way = sense(chain, arm, end, a)
@@ -99,6 +96,9 @@ def branch_math() -> SimpleNamespace:
             for j in range(joint + 1, end):
                 if chain.motion[arm, j] < wp.static(PRISMATIC):
                     q[j] = -q[j]
+            length = real(0.0)
+            for j in range(chain.dof):
+                length += wp.length(chain.offset[arm, j])
             if end < chain.dof:
                 q[end] = q[end] - way * pi
             return q, wp.where(wp.length(u) < tiny, 2, wp.where(wp.length(u) < narrow * length, 1, 0))

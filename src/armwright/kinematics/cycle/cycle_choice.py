@@ -8,30 +8,23 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.contact.clearance import span_clearances
+from armwright.kinematics.cycle.costs import BLOCKED, cost_of, joint_speeds
 from armwright.kinematics.cycle.line_following import BlockPaths, IndexArray, follow_lines
-from armwright.kinematics.devices import Device
+from armwright.kinematics.devices import Device, load_kernels
 from armwright.kinematics.ik.ik import solve_postures
-from armwright.tasks.motions import CyclePlan, LineSamples
+from armwright.tasks.motions import JOINT_STEPS, CyclePlan, LineSamples
 from armwright.tasks.obstacles import Obstacle
-from armwright.tasks.tip_rules import joined_rules
 
 MAX_STEP = 0.05  # [rad] between neighbouring samples
 MAX_SLIDE = 0.005  # [m] likewise of sliding joints
-JOINT_STEPS = 16  # of a joint motion
 HOPELESS = 10.0  # times the tolerance that a path is off, beyond which it is not refined
 ROUNDS = 4  # of choosing candidates again where the chosen ones collide
 LOOPS = 3  # of a closed cycle without joint motions, until it ends where it began
 CLOSED = 1e-3  # [rad] or [m] between the ends of a closed cycle
-ON_LIMIT = 1e-6  # [rad] or [m] from the limit of a joint
-LARGE_STEP = 0.5  # [rad] or [m] between coarse samples, where a jump is possible
-SUSPECT = 100.0  # cost of such a step: above any detour, below what is certain to be infeasible
 DEPTH = 1e-3  # [m] of a collision that costs as much as a path that is off by its tolerance
 LOAD = 1.0  # cost in seconds of a block in which a motor at rest gives its continuous torque
 OVERLOAD = 3.0  # times the continuous torque; more costs no more, so that collisions count first
-PEAK_SPEED = 1.875  # of a motion, relative to its mean speed
-SPENT = 1e12  # cost of what there is not
-BLOCKED = 1e3  # cost in seconds or radians of a chain that is off by its tolerance, far above any detour
 
 
 @dataclass(frozen=True)
@@ -67,27 +60,20 @@ def choose_postures(
         begin = ends
         lines = follow_lines(arms, samples, begin, device)
         starts, ends = lines.ends(samples)
-    speed = _speeds(arms)
-    blocks = np.nan_to_num(_block_costs(arms, lines, samples, speed), nan=SPENT, posinf=SPENT)
+    blocks = lines.cost
     if plan.is_loop:
-        blocks += cost_of(np.abs(ends - starts).max(axis=-1) / CLOSED - 1.0)
-    following = starts[:, [(b + 1) % len(plan.blocks) for b in range(len(plan.joint_motions))]]
-    change = np.abs(following[:, :, None] - ends[:, : len(plan.joint_motions), :, None])  # (N, E, K, K, D)
-    edges = np.nan_to_num((change / speed[:, None, None, None]).max(axis=-1), nan=SPENT, posinf=SPENT)
+        blocks = blocks + cost_of(np.abs(ends - starts).max(axis=-1) / CLOSED - 1.0)
     branches = (blocks < BLOCKED).sum(axis=2)
     loads = LOAD * _static_loads(arms, plan, np.stack([starts, ends]), payload, device)
-    if arms.actuation is not None:
-        times = [plan.times[plan.motions[index].step] or np.inf for index in plan.joint_motions]
-        edges += cost_of(PEAK_SPEED * edges / np.array(times)[:, None, None] - 1.0)
-    block_costs, edge_costs = blocks + loads, edges.copy()
+    block_costs, edge_costs = blocks + loads, _joint_motions(arms, plan, samples, lines.q, device)
     choice = _avoid_collisions(arms, plan, samples, lines, block_costs, edge_costs, obstacles, device)
-    index, block = np.arange(len(arms), dtype=np.intp), np.arange(len(plan.blocks))
-    chosen, arm = lines.choose(samples, choice, index), index[:, None]
+    arm, block = np.arange(len(arms), dtype=np.intp)[:, None], np.arange(len(plan.blocks))
+    chosen, edge = lines.choose(samples, choice, arm[:, 0]), np.arange(len(plan.joint_motions))
     steps = np.abs(chosen - chosen[:, samples.before])
-    joint_motion = np.arange(len(plan.joint_motions))
-    taken = (arm, joint_motion, choice[:, joint_motion], choice[:, (joint_motion + 1) % len(plan.blocks)])
-    turn = change[taken]
-    costs = np.concatenate([block_costs[arm, block, choice], edge_costs[taken]], axis=1)
+    following = (edge + 1) % len(plan.blocks)
+    turn = np.abs(chosen[:, samples.first[following]] - chosen[:, samples.end[edge]])
+    taken = edge_costs[arm, edge, choice[:, edge], choice[:, following]]
+    costs = np.concatenate([block_costs[arm, block, choice], taken], axis=1)
     allowed = np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
     ratios = [(part / allowed).max(axis=(1, 2), initial=0.0) for part in (steps, turn / JOINT_STEPS)]
     hopeless = blocks[arm, block, choice].max(axis=1) > HOPELESS * BLOCKED
@@ -127,31 +113,15 @@ def _static_loads(arms: ArmArrays, plan: CyclePlan, q: Array, payload: float, de
     return (np.minimum(share, OVERLOAD) ** 4).mean(axis=1)
 
 
-def _speeds(arms: ArmArrays) -> Array:
-    """Return the (N, D) speeds of the joints, 1 rad/s or 1 m/s if unknown, for costs."""
-    if arms.actuation is None:
-        return np.ones(arms.motion.shape)
-    speed = arms.actuation.no_load_speed
-    return np.where(np.isfinite(speed), speed, 1.0)
-
-
-def _block_costs(arms: ArmArrays, lines: BlockPaths, samples: LineSamples, speed: Array) -> Array:
-    """Return the (N, B, K) cost of each block: least time along its lines, what it is off by, and what may jump."""
-    poses, first = samples.poses, samples.first[:-1]
-    off = np.maximum(lines.position_error / poses.tolerance, lines.angle_error / poses.angle_tolerance)
-    change = np.abs(lines.q - lines.q[:, :, samples.before])
-    on_limit = arms.limit_distance(lines.q) <= ON_LIMIT
-    on_limit[:, :, first] = False
-    blocked = BLOCKED * on_limit + SUSPECT * (change.max(axis=-1) > LARGE_STEP)
-    step = samples.passes * (change / speed[:, None, None]).max(axis=-1)
-    worst = np.maximum.reduceat(off, first, axis=2).swapaxes(1, 2)
-    cost = np.add.reduceat(step, first, axis=2).swapaxes(1, 2) + cost_of(worst - 1.0)
-    return cost + np.maximum.reduceat(blocked, first, axis=2).swapaxes(1, 2)
-
-
-def cost_of(excess: Array) -> Array:
-    """Return the cost of exceeding a tolerance; excess: relative to the tolerance."""
-    return np.where(excess > 0.0, BLOCKED * (1.0 + np.minimum(excess, 1e6)), 0.0)
+def _joint_motions(arms: ArmArrays, plan: CyclePlan, samples: LineSamples, q: Array, device: Device) -> Array:
+    """Return (N, E, K, K) costs of the joint motions between candidates, whose lines are at q: (N, K, S, D)."""
+    times = np.full(len(plan.joint_motions), np.inf)
+    if arms.actuation is not None:
+        times[:] = [plan.times[plan.motions[index].step] or np.inf for index in plan.joint_motions]
+    costs = np.empty((len(arms), len(times), *q.shape[1:2] * 2))
+    inputs = (q, samples.first, samples.end, joint_speeds(arms), times)
+    load_kernels("cycle.choice_kernels", device).launch("joint_motions", costs.shape[:3], *inputs, outputs=[costs])
+    return costs
 
 
 def _avoid_collisions(
@@ -165,65 +135,54 @@ def _avoid_collisions(
     device: Device,
 ) -> IndexArray:
     """Return the (N, B) candidates with the least cost of those whose collisions were measured, the cheapest first."""
-    closed = plan.cycle.closed and not plan.is_loop
-    choice = choose_candidates(blocks, edges, closed)
-    index = np.arange(len(arms))
+    index = np.arange(len(arms), dtype=np.intp)
+    choice = choose_candidates(blocks, edges, index, device)
     share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
-    n_blocks, n_edges, candidates = blocks.shape[1], edges.shape[1], blocks.shape[2]
-    joint_motions = [plan.rules(plan.motions[i], share) for i in plan.joint_motions[:n_edges]]
-    rules = joined_rules([plan.sample_rules, *joint_motions])
+    edge, block = np.arange(edges.shape[1]), np.arange(blocks.shape[1])
+    following = (edge + 1) % len(block)
+    first, carries, first_of_each = plan.coarse_spans
     best, least = choice.copy(), np.full(len(arms), np.inf)
     free_blocks, free_edges = blocks.copy(), edges.copy()
-    for _ in range(ROUNDS if candidates > 1 else 0):
-        if not len(index):
-            break
-        part = arms[index]
+    for _ in range(ROUNDS if blocks.shape[2] > 1 else 0):
         chosen = lines.choose(samples, choice, index)  # (n, S, D)
-        start = chosen[:, samples.end[:n_edges]]
-        change = chosen[:, [samples.first[(b + 1) % n_blocks] for b in range(n_edges)]] - start
+        start = chosen[:, samples.end[edge]]
+        change = chosen[:, samples.first[following]] - start
         between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)
         q = np.concatenate([chosen, between.reshape(len(index), -1, arms.dof)], axis=1)
-        depth = np.maximum(0.0, -np.minimum(*clearances(part, q, obstacles, device, rules, most=0.0)))
-        in_blocks = np.maximum.reduceat(depth[:, : chosen.shape[1]], samples.first[:-1], axis=1)
-        in_edges = depth[:, chosen.shape[1] :].reshape(len(index), n_edges, len(share)).max(axis=2, initial=0.0)
+        found = span_clearances(arms[index], q, first, obstacles, device, plan.coarse_rules, most=0.0)
+        depth = np.maximum.reduceat(-np.minimum(*found.carrying(carries)[:2]), first_of_each, axis=1)
+        in_blocks, in_edges = depth[:, : len(block)], depth[:, len(block) :]
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)
-        edge, block = np.arange(n_edges, dtype=np.intp), np.arange(n_blocks, dtype=np.intp)
-        of_blocks = index[:, None], block, choice[index]
-        of_edges = index[:, None], edge, choice[index][:, :n_edges], choice[index][:, (edge + 1) % n_blocks]
+        arm, taken = index[:, None], choice[index]
+        of_blocks, of_edges = (arm, block, taken), (arm, edge, taken[:, edge], taken[:, following])
         blocks[of_blocks] = free_blocks[of_blocks] + cost_of(in_blocks / DEPTH)
         edges[of_edges] = free_edges[of_edges] + cost_of(in_edges / DEPTH)
         cost = blocks[of_blocks].sum(axis=1) + edges[of_edges].sum(axis=1)
         better = index[cost < least[index]]
         best[better], least[index] = choice[better], np.minimum(cost, least[index])
-        index = index[colliding]
-        before, choice[index] = choice[index], choose_candidates(blocks[index], edges[index], closed)
+        index, before = index[colliding], taken[colliding]
+        if not len(index):
+            break
+        choice[index] = choose_candidates(blocks, edges, index, device)
         index = index[(before != choice[index]).any(axis=1)]  # else nothing is better
+        if not len(index):
+            break
     return best
 
 
-def choose_candidates(blocks: Array, edges: Array, closed: bool) -> IndexArray:
-    """Return the (N, B) candidates with the least sum of costs.
+def choose_candidates(blocks: Array, edges: Array, arms: IndexArray, device: Device = "cpu") -> IndexArray:
+    """Return the (n, B) candidates with the least sum of costs, those of some arms (n,).
 
     Args:
         blocks: (N, B, K) cost of each block from each of its candidates.
         edges: (N, E, K, K) cost of the joint motion from candidate i of block b to candidate j of the next one; of the
             last block to the first one if the cycle is closed by a joint motion (E = B), else E = B - 1.
-        closed: Whether a joint motion leads from the last block to the first.
+        arms: the indices of the arms.
+        device: where they are chosen.
     """
-    n, b, k = blocks.shape
-    # total[:, s, j]: cost of the best chain from candidate s of the first block to candidate j of the present one.
-    total = np.where(np.eye(k, dtype=bool), blocks[:, 0, :, None], np.inf)
-    came_from: list[IndexArray] = []
-    for block in range(1, b):
-        through = total[:, :, :, None] + edges[:, block - 1, None]  # (N, s, i, j)
-        came_from.append(through.argmin(axis=2))
-        total = through.min(axis=2) + blocks[:, block, None]
-    if closed:
-        total = total + edges[:, b - 1].swapaxes(1, 2)  # from candidate j of the last block to s
-    start, end = np.divmod(total.reshape(n, k * k).argmin(axis=1), k)
-    arm = np.arange(n, dtype=np.intp)
-    choice = np.empty((n, b), dtype=np.intp)
-    choice[:, -1] = end
-    for block in range(b - 1, 0, -1):
-        choice[:, block - 1] = came_from[block - 1][arm, start, choice[:, block]]
-    return choice
+    _, b, k = blocks.shape
+    choice, n = np.zeros((len(arms), b), dtype=np.int32), len(arms)
+    scratch = np.empty((n, 2, k)), np.empty((n, b, k), dtype=np.int32)
+    loaded = load_kernels("cycle.choice_kernels", device)
+    loaded.launch("choose", (n,), blocks, edges, arms, *scratch, outputs=[choice])
+    return choice.astype(np.intp)

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.contact.clearance import span_clearances
-from armwright.kinematics.cycle.cycle_choice import CLOSED, JOINT_STEPS, MAX_SLIDE, MAX_STEP, ON_LIMIT, choose_postures
+from armwright.kinematics.cycle.costs import ON_LIMIT
+from armwright.kinematics.cycle.cycle_choice import CLOSED, MAX_SLIDE, MAX_STEP, choose_postures
 from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
 from armwright.kinematics.cycle.instants import EQUAL, FEW, Instants
 from armwright.kinematics.cycle.line_following import IndexArray, follow_lines, tool_errors
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device
-from armwright.tasks.motions import NEAR_END, CyclePlan
+from armwright.tasks.motions import JOINT_STEPS, NEAR_END, CyclePlan
 from armwright.tasks.obstacles import Obstacle
 
 MAX_REFINEMENT = 64  # of the samples

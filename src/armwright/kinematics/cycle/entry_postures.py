@@ -13,7 +13,8 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.contact.clearance import clearances
-from armwright.kinematics.cycle.cycle_choice import DEPTH, cost_of
+from armwright.kinematics.cycle.costs import FAR, cost_of
+from armwright.kinematics.cycle.cycle_choice import DEPTH
 from armwright.kinematics.cycle.line_following import follow_lines
 from armwright.kinematics.devices import Device, load_kernels
 from armwright.kinematics.ik.ik import solve_postures
@@ -47,7 +48,8 @@ def entry_postures(
     room to the joint limits, each other one is the farthest from those before. If none reaches the pose, the nearest is
     the only one; if all collide, those that do so least. All are exact in float32.
     """
-    poses = plan.poses[[block.entry for block in plan.blocks]]
+    own, alike = plan.alike
+    poses = plan.poses[[plan.blocks[block].entry for block in own]]
     lower, upper = (limit.astype(np.float64)[:, None, None] for limit in (arms.lower, arms.upper))
     start = arms.random_postures(STARTS).swapaxes(0, 1)[:, None]  # (N, 1, S, D)
     start[:, :, 0] = 0.0
@@ -75,7 +77,7 @@ def entry_postures(
     unfit = clearance < np.where(most < 0.0, most - DEPTH, 0.0)
     cost = np.where(unfit, np.inf, _cost(arms, q, off))
     q, _ = _branches(arms, q, cost, candidates, candidates, APART, device)
-    return _rounded(q[:, :, : (~np.isnan(q[..., 0])).sum(axis=2).max()], lower, upper)
+    return _rounded(q[:, :, : (~np.isnan(q[..., 0])).sum(axis=2).max()], lower, upper)[:, alike]
 
 
 def _solve(arms: ArmArrays, poses: Poses, start: Array, updates: int, device: Device) -> tuple[Array, Array]:
@@ -111,8 +113,7 @@ def _clearance(
     arms: ArmArrays, plan: CyclePlan, obstacles: Sequence[Obstacle], q: Array, unfit: NDArray[np.bool_], device: Device
 ) -> Array:
     """Return the (N, B, S) clearance of postures at the first poses [m], at most 0; -inf for those that are unfit."""
-    samples = plan.sample()
-    rules = plan.sample_rules[np.repeat(samples.first[:-1], q.shape[2])]
+    rules = plan.coarse_rules[np.repeat(plan.sample().first[plan.alike[0]], q.shape[2])]
     q = np.where(unfit[..., None], 0.0, q).reshape(len(arms), -1, arms.dof)
     found = np.minimum(*clearances(arms, q, obstacles, device, rules, most=0.0))
     return np.where(unfit, -np.inf, found.reshape(unfit.shape))
@@ -132,8 +133,7 @@ def _colliding_branches(arms: ArmArrays, poses: Poses, q: Array, clearance: Arra
 def _aside(arms: ArmArrays, poses: Poses, start: Array, device: Device) -> tuple[Array, Array]:
     """Return self-motions of postures (N, B, S, D) at B poses, and what they are off by, as `_solve` does."""
     lines = follow_lines(arms, single_samples(poses), start, device, ASIDE)
-    off = np.maximum(lines.position_error / poses.tolerance, lines.angle_error / poses.angle_tolerance)
-    return lines.q.swapaxes(1, 2), np.where(np.isnan(start[..., 0]), np.inf, off.swapaxes(1, 2))
+    return lines.q.swapaxes(1, 2), lines.off
 
 
 def _rounded(q: Array, lower: Array, upper: Array) -> Array:
@@ -152,7 +152,7 @@ def _branches(
     """
     loaded = load_kernels("cycle.branch_kernels", device)
     n, b, s, dof = q.shape
-    found, nearness = np.full((n, b, count, dof), np.nan), np.full(cost.shape, np.inf)
+    found, nearness = np.full((n, b, count, dof), np.nan), np.full(cost.shape, FAR)
 
     def find(chunk: slice) -> None:
         values = {name: getattr(arms[chunk], name) for name in ("dof", "motion", "axis", "offset", "lower", "upper")}

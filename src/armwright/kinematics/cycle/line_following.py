@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
+from armwright.kinematics.cycle.costs import joint_speeds
 from armwright.kinematics.devices import Device, Loaded, load_kernels
 from armwright.tasks.motions import LineSamples, Poses, single_samples
 
@@ -20,8 +21,8 @@ class BlockPaths:
     """N arms along the S samples of all blocks, from K candidates."""
 
     q: Array  # (N, K, S, D) joint values [rad] or [m]
-    position_error: Array  # (N, K, S) distance of the tip from its sample [m]
-    angle_error: Array  # (N, K, S) angle of the tool from its sample [rad]
+    off: Array  # (N, B, K) largest distance or angle of the tool from its sample, relative to the tolerance
+    cost: Array  # (N, B, K) least time along the lines, what they are off by, and what may jump
 
     def choose(self, samples: LineSamples, choice: IndexArray, arms: IndexArray) -> Array:
         """Return the (n, S, D) joint values of some arms (n,) from one candidate per block; choice: (N, B)."""
@@ -43,7 +44,7 @@ def follow_lines(
     loaded = load_kernels("cycle.path_kernels", device)
     n, b, k, dof = entry.shape
     s = len(samples.poses)
-    paths = BlockPaths(np.empty((n, k, s, dof)), np.empty((n, k, s)), np.empty((n, k, s)))
+    paths = BlockPaths(np.empty((n, k, s, dof)), np.empty((n, b, k)), np.empty((n, b, k)))
 
     def solve(chunk: slice) -> None:
         start, found = entry[chunk].reshape(-1, b * k, dof), [values[chunk] for values in vars(paths).values()]
@@ -69,15 +70,9 @@ def tool_errors(arms: ArmArrays, poses: Poses, q: Array, device: Device = "cpu")
 
 def _path(arms: ArmArrays, samples: LineSamples, loaded: Loaded) -> Any:
     """Return arms and samples as the kernels take them."""
-    poses, names = (
-        samples.poses,
-        ("dof", "base", "motion", "axis", "lower", "upper", "offset", "tool_axis", "tool_side"),
-    )
+    names = ("dof", "base", "motion", "axis", "lower", "upper", "offset", "tool_axis", "tool_side")
     values = {name: getattr(arms, name) for name in names}
-    values |= {
-        "first": samples.first,
-        "before": samples.before,
-        "n_angular": poses.n_angular,
-        "position": poses.position,
-    }
-    return loaded.struct("Path", values | {axis: poses.rotation[:, :, i] for i, axis in enumerate("xyz")})
+    values |= {name: getattr(samples, name) for name in ("first", "before", "passes")}
+    values |= {name: getattr(samples.poses, name) for name in ("n_angular", "position", "tolerance", "angle_tolerance")}
+    values |= {axis: samples.poses.rotation[:, :, i] for i, axis in enumerate("xyz")}
+    return loaded.struct("Path", values | {"speed": joint_speeds(arms)})

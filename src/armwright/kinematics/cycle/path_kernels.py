@@ -21,6 +21,7 @@ import warp as wp
 from armwright.kinematics.arms.arm_arrays import FIXED, MAX_JOINTS, PRISMATIC
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
+from armwright.kinematics.cycle.costs import BLOCKED, LARGE_STEP, ON_LIMIT, SPENT, SUSPECT
 from armwright.kinematics.cycle.path_math import path_math
 
 UPDATES = 6  # at most, of a sample
@@ -36,12 +37,14 @@ def path_kernels() -> SimpleNamespace:
     base, steps = frame_math("float64"), path_math()
     real, Vector3, advance = base.real, base.Vector3, base.advance
     Path, Row, Square = steps.Path, steps.Row, steps.Square
-    tool_error, solve_damped = steps.tool_error, steps.solve_damped
+    tool_error, solve_damped, cost_of = steps.tool_error, steps.solve_damped, steps.cost_of
     Columns = wp.types.matrix(shape=(MAX_JOINTS, 6), dtype=real)
     Values = wp.types.vector(length=MAX_JOINTS, dtype=real)
     hopeless, hopeless_angle = real(HOPELESS), real(HOPELESS_ANGLE)
     zero, one = real(0.0), real(1.0)
     converged, max_rotation, tiny = real(CONVERGED), real(MAX_ROTATION), real(1e-18)
+    blocked, suspect = real(BLOCKED), real(SUSPECT)
+    on_limit, large_step = real(ON_LIMIT), real(LARGE_STEP)
 
     @kernel
     def follow(
@@ -49,29 +52,35 @@ def path_kernels() -> SimpleNamespace:
         entry: wp.array3d(dtype=real),
         aside_by: real,
         q_path: wp.array4d(dtype=real),
-        position_error: wp.array3d(dtype=real),
-        angle_error: wp.array3d(dtype=real),
+        worst_off: wp.array3d(dtype=real),
+        block_cost: wp.array3d(dtype=real),
     ):
         """Follow the samples of a block.
 
         entry: (N, B K, D) postures at the first sample of each block.  aside_by: standard deviation of w, as a share
-        of each joint's range.  q_path: (N, K, S, D) [rad] or [m].
-        position_error: (N, K, S) [m].  angle_error: (N, K, S) [rad].
+        of each joint's range.  q_path: (N, K, S, D) [rad] or [m].  worst_off: (N, B, K) relative to the tolerance.
+        block_cost: (N, B, K) least time along the lines, what they are off by, and what may jump.
         """
         arm, thread = wp.tid()
         n_candidates = q_path.shape[1]
         block = thread / n_candidates
         candidate = thread % n_candidates
-        q, free, aside = Values(), Values(), Values()
+        q, free, aside, begin = Values(), Values(), Values(), Values()
         columns = Columns()
         random = wp.rand_init(0, candidate)
         for j in range(path.dof):
             q[j] = entry[arm, thread, j]
             if path.motion[arm, j] < wp.static(FIXED):
                 aside[j] = aside_by * (path.upper[arm, j] - path.lower[arm, j]) * real(wp.randn(random))
-        updates = int(UPDATES)
         if wp.isnan(q[0]):  # no candidate
-            updates = int(0)  # noqa: RUF046, UP018
+            worst_off[arm, block, candidate] = real(wp.inf)
+            block_cost[arm, block, candidate] = real(wp.static(SPENT))
+            for sample in range(path.first[block], path.first[block + 1]):
+                for j in range(path.dof):
+                    q_path[arm, candidate, sample, j] = q[j]
+            return
+        updates = int(UPDATES)
+        time, off, obstruction = real(0.0), real(0.0), real(0.0)
         for sample in range(path.first[block], path.first[block + 1]):
             kind = path.n_angular[sample]
             before = path.before[sample]
@@ -79,6 +88,7 @@ def path_kernels() -> SimpleNamespace:
                 free[j] = one
                 if before < sample - 1:  # the way led back to it
                     q[j] = q_path[arm, candidate, before, j]
+                begin[j] = q[j]
             distance, angle = real(0.0), real(0.0)
             for update in range(wp.static(UPDATES) + 1):
                 x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
@@ -135,12 +145,25 @@ def path_kernels() -> SimpleNamespace:
                     q[j] = wp.clamp(moved, path.lower[arm, j], path.upper[arm, j])
                     if q[j] != moved:
                         free[j] = zero
-            if sample == path.first[block] and (distance > hopeless or angle > hopeless_angle):
-                updates = int(1)  # noqa: RUF046, UP018
+            off = wp.max(off, wp.max(distance / path.tolerance[sample], angle / path.angle_tolerance[sample]))
+            if sample == path.first[block]:
+                if distance > hopeless or angle > hopeless_angle:
+                    updates = int(1)  # noqa: RUF046, UP018
+            else:
+                largest, slowest, margin = real(0.0), real(0.0), real(1.0)
+                for j in range(path.dof):
+                    change = wp.abs(q[j] - begin[j])
+                    largest = wp.max(largest, change)
+                    slowest = wp.max(slowest, change / path.speed[arm, j])
+                    if path.motion[arm, j] < wp.static(FIXED):
+                        margin = wp.min(margin, wp.min(q[j] - path.lower[arm, j], path.upper[arm, j] - q[j]))
+                time += real(path.passes[sample]) * slowest
+                jump = wp.where(largest > large_step, suspect, zero)
+                obstruction = wp.max(obstruction, jump + wp.where(margin <= on_limit, blocked, zero))
             for j in range(path.dof):
                 q_path[arm, candidate, sample, j] = q[j]
-            position_error[arm, candidate, sample] = distance
-            angle_error[arm, candidate, sample] = angle
+        worst_off[arm, block, candidate] = off
+        block_cost[arm, block, candidate] = time + cost_of(off - one) + obstruction
 
     @kernel
     def tool_errors(path: Path, q: wp.array3d(dtype=real), errors: wp.array3d(dtype=real)):

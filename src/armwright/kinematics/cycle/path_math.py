@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from armwright.kinematics.arms.frame_math import frame_math
+from armwright.kinematics.cycle.costs import BLOCKED, MOST_EXCESS
 
 DAMPING = 1e-6  # of the mean square singular value of J
 
@@ -21,6 +22,7 @@ def path_math() -> SimpleNamespace:
     Square = wp.types.matrix(shape=(6, 6), dtype=real)
     zero, one, half = real(0.0), real(1.0), real(0.5)
     damping, tiny = real(DAMPING), real(1e-18)
+    blocked, most_excess = real(BLOCKED), real(MOST_EXCESS)
 
     @wp.struct
     class Path:
@@ -32,16 +34,25 @@ def path_math() -> SimpleNamespace:
         axis: wp.array2d(dtype=Vector3)  # (N, D)
         lower: wp.array2d(dtype=real)  # (N, D)
         upper: wp.array2d(dtype=real)  # (N, D)
+        speed: wp.array2d(dtype=real)  # (N, D)
         offset: wp.array2d(dtype=Vector3)  # (N, D)
         tool_axis: wp.array(dtype=Vector3)  # (N,)
         tool_side: wp.array(dtype=Vector3)  # (N,)
         first: wp.array(dtype=int)  # (B + 1,)
         before: wp.array(dtype=int)  # (S,) the sample from whose posture each one is followed
+        passes: wp.array(dtype=int)  # (S,) how often the step to each one is driven
         n_angular: wp.array(dtype=int)  # (S,)
+        tolerance: wp.array(dtype=real)  # (S,)
+        angle_tolerance: wp.array(dtype=real)  # (S,)
         position: wp.array(dtype=Vector3)  # (S,)
         x: wp.array(dtype=Vector3)  # (S,) of the tool
         y: wp.array(dtype=Vector3)  # (S,)
         z: wp.array(dtype=Vector3)  # (S,)
+
+    @wp.func
+    def cost_of(excess: real):
+        """Return the cost of exceeding a tolerance; excess: relative to the tolerance."""
+        return wp.where(excess > zero, blocked * (one + wp.min(excess, most_excess)), zero)
 
     @wp.func
     def rotation_error(kind: int, s: Vector3, t: Vector3, a: Vector3, x: Vector3, y: Vector3, z: Vector3):
@@ -107,4 +118,6 @@ def path_math() -> SimpleNamespace:
             error[i] = error[i] / square[i, i]
         return error
 
-    return SimpleNamespace(Path=Path, Row=Row, Square=Square, tool_error=tool_error, solve_damped=solve_damped)
+    return SimpleNamespace(
+        Path=Path, Row=Row, Square=Square, cost_of=cost_of, tool_error=tool_error, solve_damped=solve_damped
+    )
