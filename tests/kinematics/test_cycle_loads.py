@@ -9,8 +9,8 @@ import pinocchio
 import pytest
 
 from armwright.kinematics.arms.arm_arrays import stack_arms
-from armwright.kinematics.cycle.cycle_loads import BETWEEN, CycleLoads, cycle_loads
-from armwright.kinematics.cycle.cycle_path import find_paths
+from armwright.kinematics.cycle.cycle_loads import CycleLoads, cycle_loads
+from armwright.kinematics.cycle.cycle_path import BETWEEN_INSTANTS, find_paths
 from armwright.kinematics.cycle.instants import INSTANTS
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.cycle.torque_terms import torque_terms
@@ -80,12 +80,15 @@ def test_torque_terms_agree_with_pinocchio(dof: int, kind: str) -> None:
     assert carried == {True, False}
     for group, own in zip(found.paths.groups, terms, strict=True):
         for at, row in enumerate(group.index):
-            arm, ends = found.arms[row], np.cumsum(group.counts)
-            for path, last in zip(group.paths, ends, strict=True):
-                peer = loaded_peer(arm, found.task.payload, path.motion.carries)
-                some = np.linspace(0, len(path.share) - 1, 4).astype(int)
-                samples = last - path.q.shape[1] + some
-                q = own_joints(arm, path.q[at, some])
+            arm, begin = found.arms[row], np.cumsum([0, *group.counts])
+            picked = group.picks(found.paths)
+            for index, path in enumerate(group.paths):
+                if group.source[at, index] != index:
+                    continue
+                peer = loaded_peer(arm, found.task.payload, carries=True)
+                (of_motion,) = np.nonzero(picked.motion_of == index)
+                samples = of_motion[np.linspace(0, len(of_motion) - 1, 4).astype(int)]
+                q = own_joints(arm, path.q[at, picked.sample[samples] - begin[index]])
                 q_s, q_ss = (own_joints(arm, values) for values in own.states[at, samples].swapaxes(0, 1))
                 still = np.zeros_like(q)
                 gravity = rnea(peer, q, still, still)
@@ -94,13 +97,11 @@ def test_torque_terms_agree_with_pinocchio(dof: int, kind: str) -> None:
                 size = load(arm) + np.abs(q_s).max() ** 2 + np.abs(q_ss).max()
                 bare = loaded_peer(arm, found.task.payload, carries=False)
                 resting = rnea(bare, q, still, still)
-                added = (
-                    gravity - resting,
-                    drag - rnea(bare, q, q_s, q_ss) + resting,
-                    push - np.array([bare.mass_matrix(a) @ b for a, b in zip(q, q_s, strict=True)]),
-                )
+                bare_push = np.array([bare.mass_matrix(a) @ b for a, b in zip(q, q_s, strict=True)])
+                alone = (resting, rnea(bare, q, q_s, q_ss) - resting, bare_push)
+                added = tuple(all_of - part for all_of, part in zip((gravity, drag, push), alone, strict=True))
                 ours = own.torques[at, samples].swapaxes(0, 1)
-                for mine, theirs in zip(ours, (gravity, drag, push, *added), strict=True):
+                for mine, theirs in zip(ours, (*alone, *added), strict=True):
                     assert own_joints(arm, mine) == pytest.approx(theirs, rel=1e-7, abs=1e-8 * size)
 
 
@@ -226,10 +227,10 @@ def test_short_peaks_of_torque_and_speed_count() -> None:
     found = Case(task, (arm,), arrays, plan, find_paths(arrays, plan))
     assert tolerated(found.paths)[0]
     assert is_sharp(found, 0)
-    of_cycle, tau = loads(found), np.linspace(0.0, 1.0, BETWEEN * (INSTANTS - 1) + 1)
+    of_cycle, tau = loads(found), np.linspace(0.0, 1.0, BETWEEN_INSTANTS * (INSTANTS - 1) + 1)
     q, v, a = states(arm, found.paths.of_arm(0)[1][0], tau, 2.0)
     theirs = np.abs(rnea(peer_of(arm), q, v, a))
     mine, speeds = np.abs(of_cycle.torques[0, 0]), np.abs(of_cycle.speeds[0, 0])
     assert mine.max(axis=0) == pytest.approx(theirs.max(axis=0), rel=0.02)
     assert speeds.max(axis=0) == pytest.approx(np.abs(v).max(axis=0), rel=0.02)
-    assert theirs.max() > 1.5 * theirs[::BETWEEN].max()  # 33 instants would miss the peak
+    assert theirs.max() > 1.5 * theirs[::BETWEEN_INSTANTS].max()  # 33 instants would miss the peak

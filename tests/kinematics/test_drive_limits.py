@@ -12,10 +12,11 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.actuation import Actuation, actuation_at_joints, ratings_of
 from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.cycle.drive_limits import (
+    DRIVES,
     MotionLoad,
     available_torque,
+    drive_torques,
     least_time,
-    motion_load,
     torque_speed_utilisation,
 )
 from armwright.robot.actuators import ActuatorRecord, catalogue
@@ -42,7 +43,7 @@ def loads(motors: Actuation, rng: np.random.Generator, samples: int = S) -> Moti
     shape = (len(motors.peak), samples, motors.peak.shape[1])
     gravity, inertial, velocity, acceleration = rng.normal(size=(4, *shape)) * 10.0 ** rng.uniform(-2, 0.2, (4, *shape))
     velocity[:, 0] = 0.0
-    return motion_load(gravity, inertial, velocity, acceleration, motors)
+    return MotionLoad(gravity, inertial, velocity, acceleration)
 
 
 def are_within(torque: Array, speed: Array, motors: Actuation, slack: float = 0.0) -> Array:
@@ -59,7 +60,7 @@ def are_within(torque: Array, speed: Array, motors: Actuation, slack: float = 0.
 
 def can_follow(load: MotionLoad, motors: Actuation, time: Array, slack: float = 0.0) -> Array:
     """(N,) whether that holds at every sample."""
-    return are_within(load.torque(time), load.velocity / time[:, None, None], motors, slack).all(axis=(1, 2))
+    return are_within(*drive_torques(load, motors, time), motors, slack).all(axis=(1, 2))
 
 
 def random_motions(seed: int, samples: int = S, joints: int = D) -> tuple[MotionLoad, Actuation]:
@@ -89,14 +90,33 @@ def test_lifting_takes_the_friction_of_the_gear_and_lowering_gets_none_of_it() -
     still, gravity = np.zeros((3, 1, 1)), np.full((3, 1, 1), 2.0)
     ratings = np.stack([np.full((3, 1), each) for each in (2.4, 1.0, 0.0, 9.0, *[0.0] * 3, 0.4, 0.25, *[1.0] * 9)], -1)
     motors = actuation_at_joints(ratings, np.ones((3, 1)), np.zeros(3), np.ones(3))
-    load = motion_load(gravity, still, velocity, still, motors)
-    torques = load.torque(np.full(3, 10.0)).ravel()
-    assert torques.tolist() == [2.5, 2.0, 2.0]
-    use = torque_speed_utilisation(load.torque(np.full(3, 10.0)), velocity / 10.0, motors).ravel()
+    load = MotionLoad(gravity, still, velocity, still)
+    torques, speeds = drive_torques(load, motors, np.full(3, 10.0))
+    assert (torques.ravel().tolist(), speeds.ravel().tolist()) == ([2.5, 2.0, 2.0], [0.1, -0.1, 0.0])
+    use = torque_speed_utilisation(torques, speeds, motors).ravel()
     assert use.tolist() == [2.5 / 2.4 + 0.1 / 9.0, 2.0 / 2.4, 2.0 / 2.4]
     assert np.isfinite(least_time((load, motors))).tolist() == [False, True, True]
     at_output = replace(motors, limit_friction=np.zeros((3, 1)))
-    assert np.isfinite(least_time((motion_load(gravity, still, velocity, still, at_output), at_output))).all()
+    assert np.isfinite(least_time((load, at_output))).all()
+
+
+def test_torques_in_motion_are_those_of_rotors_and_friction_and_the_largest_nearby() -> None:
+    load, motors = random_motions(4, samples=13)
+    time = np.random.default_rng(1).uniform(0.2, 3.0, N)
+    torques, speeds = drive_torques(load, motors, time)
+    t, (coulomb, viscous, rotor, gear) = time[:, None, None], (
+        getattr(motors, name)[:, None] for name in ("coulomb", "viscous", "rotor_inertia", "limit_friction")
+    )  # fmt: skip
+    speed = load.velocity / t
+    before = load.gravity + coulomb * np.sign(speed) + viscous * speed
+    before += (load.inertial + rotor * load.acceleration) / t**2
+    assert speeds == pytest.approx(speed, rel=1e-12)
+    expected = before * np.where(before * speed > 0.0, 1.0 + gear, 1.0)
+    assert torques == pytest.approx(expected, rel=1e-12, abs=1e-9 * np.abs(expected).max())
+    for values, few in zip((torques, speeds), drive_torques(load, motors, time, density=4), strict=True):
+        assert np.array_equal(few[:, [0, -1]], values[:, [0, -1]])
+        for kept, around in ((few[:, 1], values[:, 0:9]), (few[:, 2], values[:, 4:13])):
+            assert np.array_equal(np.abs(kept), np.abs(around).max(axis=1))
 
 
 def test_least_time_of_several_cases_is_the_least_that_all_of_them_allow() -> None:
@@ -141,9 +161,10 @@ def test_torque_at_less_voltage_is_that_at_a_higher_speed(record: ActuatorRecord
 def test_fixed_joints_do_not_limit_a_motion() -> None:
     load, motors = random_motions(17)
     names = ("peak", "continuous", "corner_speed", "no_load_speed")
+    of_joints = (*names, *DRIVES[4:])
     fixed = replace(motors, **{name: np.where(np.arange(D) == 1, np.inf, getattr(motors, name)) for name in names})
     still = MotionLoad(*(np.where(np.arange(D) == 1, 0.0, each) for each in vars(load).values()))
-    without = replace(motors, **{name: getattr(motors, name)[:, [0, 2]] for name in names})
+    without = replace(motors, **{name: getattr(motors, name)[:, [0, 2]] for name in of_joints})
     two = MotionLoad(*(each[:, :, [0, 2]] for each in vars(load).values()))
     assert np.array_equal(least_time((still, fixed)), least_time((two, without)))
     rest = MotionLoad(*(np.zeros_like(each) for each in vars(load).values()))
@@ -231,7 +252,7 @@ def test_time_optimal_motion_is_a_lower_bound() -> None:
         none = np.zeros(len(share))
         gravity = inverse_dynamics(arms, q, np.zeros_like(q), np.zeros_like(q), none)
         inertial = inverse_dynamics(arms, q, velocity[None], acceleration[None], none, gravity=False)
-        load = motion_load(gravity, inertial, velocity[None], acceleration[None], motors)
+        load = MotionLoad(gravity, inertial, velocity[None], acceleration[None])
         (time,) = least_time((load, motors))
         bound = fastest_by_toppra(arms, motors, start, end)
         ratios.append(time / bound)

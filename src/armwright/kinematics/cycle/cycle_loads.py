@@ -6,31 +6,26 @@ s' = s_τ / T and s'' = s_ττ / T², and the torque is a polynomial in 1 / T at
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import UnknownQuantityError
-from armwright.kinematics.arms.actuation import Actuation
+from armwright.kinematics.arms.actuation import FIXED_RATINGS, Actuation, actuation_at_joints
 from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.arms.bearings import bearing_offsets
 from armwright.kinematics.chunks import SAMPLES
 from armwright.kinematics.cycle.cycle_path import CycleGroup, CyclePaths
-from armwright.kinematics.cycle.drive_limits import MotionLoad, least_time, motion_load
-from armwright.kinematics.cycle.instants import Instants
+from armwright.kinematics.cycle.drive_limits import MotionLoad, drive_torques, least_time
 from armwright.kinematics.cycle.torque_terms import TorqueTerms
-from armwright.kinematics.devices import Device, load_kernels
+from armwright.kinematics.devices import Device, Loaded, load_kernels
 from armwright.tasks.motions import CyclePlan
 
 ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite of rounding
 MIN_TIME, MAX_TIME = 0.15, 1e3  # [s] of a motion that is as fast as possible; drives cannot follow shorter ones
 MORE_PAYLOAD = 0.1  # share of the payload by which it may be heavier in a motion as fast as possible
 VOLTAGE_SHARE = 0.9  # of the voltage, that suffices for it
-Counts = tuple[int, ...]  # of samples along each motion
-BETWEEN = 16  # times as many instants of a sharp path, of which the largest values count
 
 
 @dataclass(frozen=True)
@@ -64,13 +59,14 @@ class CycleLoads:
         return (total.T / self.cycle_time).T
 
 
-def holding_torques(paths: CyclePaths, terms: Sequence[TorqueTerms]) -> Array:
+def holding_torques(paths: CyclePaths, terms: Sequence[TorqueTerms], device: Device = "cpu") -> Array:
     """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
     torques = np.empty((len(paths.jumps), len(paths.plan.motions), len(paths.instants), paths.groups[0].arms.dof))
     for group, own in zip(paths.groups, terms, strict=True):
-        density = _density(group)
-        gravity = _at_instants(own.torques[:, :, 0], group.counts, paths.instants.times(density))
-        torques[group.index] = _thinned(gravity, density)
+        load, _ = _loads(paths, group, own, device)
+        at_rest = replace(load, inertial=np.zeros_like(load.inertial), velocity=np.zeros_like(load.velocity))
+        drives, times = _without_drives(group.arms), np.ones(load.gravity.shape[:2])
+        torques[group.index], _ = drive_torques(at_rest, drives, times, group.density, device)
     return torques
 
 
@@ -79,7 +75,8 @@ def cycle_loads(
 ) -> CycleLoads:
     """Return the loads of N arms along a cycle, by their torque terms from `torque_terms`.
 
-    kept: (N, M) durations of the motions [s]; None for those of the cycle and of the drives.
+    kept: (N, M) durations of the motions [s]; None for those of the cycle and of the drives. The drives' own inertia
+        and friction count where they are known.
 
     Raises:
         UnknownQuantityError: A step should be as fast as possible, but the arms have no actuators with known speeds.
@@ -89,20 +86,29 @@ def cycle_loads(
     durations, holding = np.empty((n, m)), np.empty((n, m, dof))
     torques, speeds = np.empty((2, n, m, len(paths.instants), dof))
     for group, own in zip(paths.groups, terms, strict=True):
-        density, gravity = _density(group), own.torques[:, :, 0]
-        instants = paths.instants.times(density)
-        size = max(1, 4 * SAMPLES[device] // (m * len(instants)))
+        size = max(1, 4 * SAMPLES[device] // (m * len(paths.instants) * group.density))
         for rows in (slice(at, at + size) for at in range(0, len(group.index), size)):
-            index, arms = group.index[rows], group.arms[rows]
-            load, heavier = _loads(own[rows], arms, group.counts, instants)
-            times = _durations(arms, plan, load, heavier, device) if kept is None else kept[index]
-            durations[index] = times
-            torques[index] = _thinned(load.torque(times), density)
-            speeds[index] = _thinned(load.velocity / times[:, :, None, None], density)
-        holding[group.index] = gravity[:, np.cumsum(group.counts) % gravity.shape[1]]  # as the next motion begins
-        if not plan.cycle.closed:
-            holding[group.index, -1] = gravity[:, -1]
+            part = CycleGroup(group.index[rows], group.arms[rows], group.paths, group.source[rows], group.is_sharp)
+            load, heavier = _loads(paths, part, own[rows], device)
+            times = _durations(part.arms, plan, load, heavier, device) if kept is None else kept[part.index]
+            durations[part.index], drives = times, _known(part.arms)
+            torques[part.index], speeds[part.index] = drive_torques(load, drives, times, group.density, device)
+        holding[group.index] = _resting(paths, group, own)
     return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding, np.array(paths.instants.weight))
+
+
+def _resting(paths: CyclePaths, group: CycleGroup, terms: TorqueTerms) -> Array:
+    """Return (N, M, D) torques at rest after each motion, with what the next one carries [N m], or forces [N]."""
+    plan, picked = paths.plan, group.picks(paths)
+    m = np.arange(len(plan.motions))
+    then = (m + 1) % len(m)
+    ends = picked.start[group.source[:, then]] + picked.first[then]
+    carries = np.array([motion.carries for motion in plan.motions])[then]
+    if not plan.cycle.closed:
+        ends[:, -1] = picked.start[group.source[:, -1]] + picked.last[-1]
+        carries[-1] = plan.motions[-1].carries
+    at = terms.torques[np.arange(len(ends))[:, None], ends]  # (N, M, 6, D)
+    return at[:, :, 0] + carries[:, None] * at[:, :, 3]
 
 
 def cycle_bearing_loads(
@@ -112,83 +118,50 @@ def cycle_bearing_loads(
 
     terms: with wrenches.  durations: (N, M) of the motions [s].
     """
-    loaded = load_kernels("cycle.bearing_kernels", device)
+    loaded = load_kernels("cycle.load_kernels", device)
     largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
     for group, own in zip(paths.groups, terms, strict=True):
-        moments = _at(group.counts, paths.instants.times(_density(group)))
         arms, found = group.arms, np.empty_like(largest[group.index])
-        given = (*moments, durations[group.index], arms.motion, arms.axis, bearing_offsets(arms), own.wrenches)
-        loaded.launch("bearing_loads", found.shape[:2], *given, outputs=[found])
+        given = (_picks_on(paths, group, loaded), durations[group.index], arms.motion, arms.axis, bearing_offsets(arms))
+        loaded.launch("bearing_loads", found.shape[:2], *given, own.wrenches, outputs=[found])
         largest[group.index] = found
     return largest
 
 
-def _density(group: CycleGroup) -> int:
-    """Return how many times as many instants are evaluated as are kept."""
-    return BETWEEN if group.is_sharp else 1
+def _picks_on(paths: CyclePaths, group: CycleGroup, loaded: Loaded) -> Any:
+    """Return samples and instants as kernels take them."""
+    picked = group.picks(paths)
+    values = {name: getattr(picked, name) for name in ("start", "low", "high", "share", "rate", "change", "way")}
+    carried = np.array([float(motion.carries) for motion in paths.plan.motions])
+    return loaded.struct("Picks", values | {"source": group.source, "carried": carried})
 
 
-def _thinned(values: Array, density: int) -> Array:
-    """Return (..., F, D) of values (..., density (F - 1) + 1, D): the largest in magnitude from instant to instant.
-
-    The first and the last one, at rest, stay as they are.
-    """
-    if density == 1:
-        return values
-    windows = sliding_window_view(values, 2 * density + 1, axis=-2)
-    nearby = windows[..., ::density, :, :]  # (..., F - 2, D, 2 density + 1)
-    largest = np.abs(nearby).argmax(axis=-1)[..., None]
-    between = np.take_along_axis(nearby, largest, axis=-1)[..., 0]
-    return np.concatenate([values[..., :1, :], between, values[..., -1:, :]], axis=-2)
-
-
-def _loads(terms: TorqueTerms, arms: ArmArrays, counts: Counts, instants: Instants) -> tuple[MotionLoad, MotionLoad]:
-    """Return the loads of all motions as they are and with a heavier payload.
-
-    The drives' own inertia and friction count where they are known.
-    """
-    _, _, s_t, s_tt = _at(counts, instants)
-    rate, change = s_t[:, None], s_tt[:, None]
-    torques, states = (_at_instants(each, counts, instants) for each in (terms.torques, terms.states))
-    gravity, drag, push, *payload = np.ascontiguousarray(np.moveaxis(torques, 3, 0))
-    q_s, q_ss = np.ascontiguousarray(np.moveaxis(states, 3, 0))
-    inertial, velocity = drag * rate**2 + push * change, q_s * rate
-    if arms.actuation is None:
-        nothing = np.zeros(gravity.shape)
-        load = MotionLoad(gravity, nothing, nothing, inertial, velocity, nothing)
-    else:
-        names = ("rotor_inertia", "coulomb", "viscous", "limit_friction")
-        known = {name: np.nan_to_num(getattr(arms.actuation, name)) for name in names}
-        acceleration = q_ss * rate**2 + q_s * change
-        load = motion_load(gravity, inertial, velocity, acceleration, replace(arms.actuation, **known))
-    more_gravity, more_drag, more_push = (MORE_PAYLOAD * part for part in payload)
-    more_inertial = more_drag * rate**2 + more_push * change
-    return load, replace(load, gravity=gravity + more_gravity, inertial=load.inertial + more_inertial)
+def _loads(
+    paths: CyclePaths, group: CycleGroup, terms: TorqueTerms, device: Device
+) -> tuple[MotionLoad, MotionLoad]:  # fmt: skip
+    """Return the loads of all motions as they are and with a heavier payload."""
+    loaded = load_kernels("cycle.load_kernels", device)
+    n, m = group.source.shape
+    shape = n, m, len(paths.instants.times(group.density)), terms.torques.shape[3]
+    gravity, inertial, velocity, acceleration, *heavier = np.empty((6, *shape))
+    given = _picks_on(paths, group, loaded), terms.torques, terms.states, loaded.kernels.real(MORE_PAYLOAD)
+    found = [gravity, inertial, velocity, acceleration, *heavier]
+    loaded.launch("motion_loads", (n, m), *given, outputs=found)
+    load = MotionLoad(gravity, inertial, velocity, acceleration)
+    return load, replace(load, gravity=heavier[0], inertial=heavier[1])
 
 
-def quintic(t: Array) -> tuple[Array, Array, Array]:
-    """Return s, s_τ and s_ττ of the profile at shares of the duration."""
-    s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
-    return s, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
+def _known(arms: ArmArrays) -> Actuation:
+    """Return the drives with the inertia and friction that are known; without any, such of no inertia and friction."""
+    drives = _without_drives(arms) if arms.actuation is None else arms.actuation
+    names = ("rotor_inertia", "coulomb", "viscous", "limit_friction")
+    return replace(drives, **{name: np.nan_to_num(getattr(drives, name)) for name in names})
 
 
-def _at_instants(values: Array, counts: Counts, instants: Instants) -> Array:
-    """Return (N, M, F, ...) of values at the samples of all motions (N, R, ...), interpolated at F instants of each."""
-    before, share, _, _ = _at(counts, instants)
-    share = share.reshape(*share.shape, *(1,) * (values.ndim - 2))
-    return (1.0 - share) * values[:, before] + share * values[:, before + 1]
-
-
-@cache
-def _at(counts: Counts, instants: Instants) -> tuple[NDArray[np.int32], Array, Array, Array]:
-    """Return the sample before each of F instants of M motions, the share of the way to the next (M, F), s_τ and s_ττ.
-
-    counts: Samples of each motion, equally spaced in s.
-    """
-    s, rate, change = quintic(np.array(instants.time))
-    steps = np.array(counts)[:, None] - 1
-    before = np.minimum((s * steps).astype(np.int32), steps - 1)
-    return before + np.cumsum([[0], *steps[:-1] + 1], axis=0, dtype=np.int32), s * steps - before, rate, change
+def _without_drives(arms: ArmArrays) -> Actuation:
+    """Return drives that deliver any torque, without inertia and friction."""
+    ratings = np.broadcast_to(FIXED_RATINGS, (*arms.motion.shape, len(FIXED_RATINGS)))
+    return actuation_at_joints(ratings, np.ones(arms.motion.shape), np.zeros(len(arms)), np.ones(len(arms)))
 
 
 def check_durations(drives: Actuation | None, plan: CyclePlan) -> Actuation | None:
@@ -215,8 +188,10 @@ def _durations(arms: ArmArrays, plan: CyclePlan, load: MotionLoad, heavier: Moti
     known torques and speeds, the motions of a step share its time by the largest travel of a joint.
     """
     drives = check_durations(arms.actuation, plan)
-    durations = np.abs(load.velocity).max(axis=(2, 3)) + 1e-9  # (N, M), in proportion to the travel
-    if drives is not None:
+    if drives is None:
+        durations = np.abs(load.velocity).max(axis=(2, 3)) + 1e-9  # (N, M), in proportion to the travel
+    else:
+        drives = _known(arms)
         bare = drives.at_makers_limits
         cases = (load, drives), (load, bare.at_voltage(VOLTAGE_SHARE)), (heavier, bare)
         least = least_time(*cases[: 3 if any(motion.carries for motion in plan.motions) else 2], device=device)

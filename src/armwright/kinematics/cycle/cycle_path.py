@@ -19,7 +19,7 @@ from armwright.kinematics.contact.clearance import span_clearances
 from armwright.kinematics.cycle.costs import ON_LIMIT
 from armwright.kinematics.cycle.cycle_choice import CLOSED, MAX_SLIDE, MAX_STEP, choose_postures
 from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
-from armwright.kinematics.cycle.instants import EQUAL, FEW, Instants
+from armwright.kinematics.cycle.instants import EQUAL, FEW, Instants, Picks, picks
 from armwright.kinematics.cycle.line_following import IndexArray, follow_lines, tool_errors
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.devices import Device
@@ -32,6 +32,7 @@ REDUCED = 0.75  # a step that twice the samples leave above this share of it is 
 NEAR = 0.03  # [m] clearance at samples of a joint motion, below which bodies may touch between them
 ZOOMS, BETWEEN = 3, np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # rounds of a search there; its places in quarter steps
 ROUGH = 0.25  # refinement of a rough path
+BETWEEN_INSTANTS = 16  # times as many instants of a sharp path, of which the largest values count
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,15 @@ class CycleGroup:
     def counts(self) -> tuple[int, ...]:
         """Number of samples along each motion."""
         return tuple(path.q.shape[1] for path in self.paths)
+
+    @property
+    def density(self) -> int:
+        """How many times as many instants are evaluated as are kept."""
+        return BETWEEN_INSTANTS if self.is_sharp else 1
+
+    def picks(self, paths: "CyclePaths") -> Picks:
+        """Return the samples that the loads at the instants need."""
+        return picks(self.counts, paths.plan.source, paths.instants.times(self.density))
 
 
 @dataclass(frozen=True)

@@ -9,62 +9,66 @@ pushes needs (1 + μ) τ. One that brakes or holds needs τ at most, since frict
 share of limits that makers state at the output is 0 (`Actuation.limit_friction`).
 """
 
+import math
 from dataclasses import dataclass
-from itertools import cycle
 from typing import Any
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.actuation import Actuation
-from armwright.kinematics.devices import Device, load_kernels
+from armwright.kinematics.devices import Device, Loaded, load_kernels
 
 MAX_RATE = 1e9  # [1/s] of motions without any limit, which take no time
-LIMITS = ("safety_factor", "peak", "no_load_speed", "falling_range")  # of `Actuation`, that bound rates
 STILL = 1e-6  # [rad] or [m] in a duration of 1 s; a joint that rests moves by less, from rounding
+DRIVES = (  # of `Actuation`, that kernels take
+    "safety_factor", "peak", "no_load_speed", "falling_range", "rotor_inertia", "coulomb", "viscous", "limit_friction",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class MotionLoad:
     """What motions of N arms, such as M of each, require of D joints at S samples, for any duration T.
 
-    The torque at a sample is gravity + coulomb + viscous / T + inertial / T², with the friction of the gear if it is in
-    the direction of the velocity. The speed is velocity / T. Sliding joints have N, m/s and m instead of N m, rad/s and
-    rad.
+    The torque without friction and rotors is gravity + inertial / T², the speed is velocity / T, and the acceleration
+    acceleration / T². Sliding joints have N, m/s and m instead of N m, rad/s and rad.
     """
 
     gravity: Array  # (N, ..., S, D) [N m]
-    coulomb: Array  # (N, ..., S, D) friction in the direction of the velocity, 0 at rest [N m]
-    viscous: Array  # (N, ..., S, D) friction at T = 1 s [N m s]
-    inertial: Array  # (N, ..., S, D) of links and rotors, with Coriolis terms, at T = 1 s [N m s²]
-    velocity: Array  # (N, ..., S, D) at T = 1 s [rad]
-    gear: Array  # (N, ..., S, D) share of the torque that the gear takes, with the sign of the velocity, 0 at rest
+    inertial: Array  # (N, ..., S, D) of the links, with Coriolis terms, at T = 1 s [N m s²]
+    velocity: Array  # (N, ..., S, D) of the joints at T = 1 s [rad]
+    acceleration: Array  # (N, ..., S, D) likewise [rad]
 
-    def torque(self, time: Array) -> Array:
-        """Return the (N, ..., S, D) torques [N m] for durations (N, ...) [s]."""
-        duration = time[..., None, None]
-        torque = self.gravity + self.coulomb + self.viscous / duration + self.inertial / duration**2
-        return torque * (1.0 + np.maximum(self.gear * np.sign(torque), 0.0))
+    def on(self, loaded: Loaded) -> Any:
+        """Return the load as kernels take it, of M motions."""
+        n, *_, s, dof = self.gravity.shape
+        return loaded.struct("Load", {name: each.reshape(n, -1, s, dof) for name, each in vars(self).items()})
 
 
-def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: Array, drives: Actuation) -> MotionLoad:
-    """Return the load of a motion of N arms, with friction and rotor inertia of the drives.
+def drive_torques(
+    load: MotionLoad, drives: Actuation, durations: Array, density: int = 1, device: Device = "cpu"
+) -> tuple[Array, Array]:
+    """Return (N, ..., F, D) torques that drives deliver [N m] and speeds [rad/s], for durations (N, ...) [s].
 
-    gravity: (N, ..., S, D) torques that hold the arm [N m].  inertial: (N, ..., S, D) torques that move its links in
-    T = 1 s, without gravity [N m s²].  velocity, acceleration: (N, ..., S, D) of the joints, for T = 1 s [rad].
+    The torque is gravity + c sign(ω) + v ω + (inertial + J acceleration) / T² with the Coulomb friction c, the viscous
+    friction v and the inertia J of the rotor, and 1 + μ times this with the friction of the gear if the motor pushes.
+    Joints that rest have no friction.
+
+    density: of samples; above 1, every so manieth is kept, with the largest torque and speed up to the next ones.
     """
-    along = tuple(range(1, gravity.ndim - 1))
-    ratings = (drives.coulomb, drives.viscous, drives.rotor_inertia, drives.limit_friction)
-    coulomb, viscous, rotor, gear = (np.expand_dims(each, along) for each in ratings)
-    direction = np.sign(np.where(np.abs(velocity) > STILL, velocity, 0.0))
-    return MotionLoad(
-        gravity=gravity,
-        coulomb=coulomb * direction,
-        viscous=viscous * velocity,
-        inertial=inertial + rotor * acceleration,
-        velocity=velocity,
-        gear=gear * direction,
+    *of_motions, s, dof = load.gravity.shape
+    loaded, times = load_kernels("cycle.drive_kernels", device), durations.reshape(len(durations), -1)
+    found = np.empty((2, *times.shape, (s - 1) // density + 1, dof))
+    loaded.launch(
+        "drive_torques", times.shape, load.on(loaded), _on(drives, loaded), times, density, outputs=list(found)
     )
+    torques, speeds = found.reshape(2, *of_motions, -1, dof)
+    return torques, speeds
+
+
+def _on(drives: Actuation, loaded: Loaded) -> Any:
+    """Return drives as kernels take them."""
+    return loaded.struct("Drives", {name: getattr(drives, name) for name in DRIVES})
 
 
 def torque_speed_utilisation(torque: Array, velocity: Array, drives: Actuation) -> Array:
@@ -94,7 +98,8 @@ def available_torque(torque: Array, velocity: Array, drives: Actuation) -> Array
 def least_time(*cases: tuple[MotionLoad, Actuation], device: Device = "cpu") -> Array:
     """Return the least durations (N, ...) of motions of N arms that drives can follow [s]; infinite if there is none.
 
-    cases: Loads of the motions and their drives, such as with a heavier payload or less voltage; all of them hold.
+    cases: Up to three loads of the motions and their drives, such as with a heavier payload or less voltage; all of
+        them hold.
 
     With u = 1 / T, each limit at each sample is a quadratic inequality α u² + β u + γ <= 0. Turned so that the velocity
     w is not negative, with the safety factor k and η = 1 + μ by the friction μ of the gear, the torque without this
@@ -119,22 +124,14 @@ def least_time(*cases: tuple[MotionLoad, Actuation], device: Device = "cpu") -> 
         >>> ratings = np.array([[ratings_of(motor)]])
         >>> drives = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
         >>> still, turn = np.zeros((1, 1, 1)), np.ones((1, 1, 1))
-        >>> float(least_time((motion_load(still, still, turn, still, drives), drives))[0])
+        >>> float(least_time((MotionLoad(still, still, turn, still), drives))[0])
         0.1
     """
     *of_motions, _, _ = cases[0][0].gravity.shape
-    loaded, rate = load_kernels("cycle.drive_kernels", device), np.full(of_motions, MAX_RATE).reshape(of_motions[0], -1)
-    given: list[tuple[Any, Any]] = []
-    for load, drives in cases:
-        fields = {name: each.reshape(*rate.shape, *each.shape[-2:]) for name, each in vars(load).items()}
-        limits = {name: getattr(drives, name) for name in LIMITS}
-        given.append((loaded.struct("Load", fields), loaded.struct("Limits", limits)))
-    left = len(given)
-    for case in cycle(given):  # until all others leave what one of them allows
-        before = rate.copy()
-        loaded.launch("lower_rates", rate.shape, *case, outputs=[rate])
-        left = len(given) - 1 if (rate < before).any() else left - 1
-        if not left:
-            break
+    loaded, rate = load_kernels("cycle.drive_kernels", device), np.empty((of_motions[0], math.prod(of_motions[1:])))
+    given = [
+        part for load, drives in (*cases, cases[0], cases[0])[:3] for part in (load.on(loaded), _on(drives, loaded))
+    ]
+    loaded.launch("largest_rates", rate.shape, *given, outputs=[rate])
     with np.errstate(divide="ignore", over="ignore"):
         return np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0)).reshape(of_motions)

@@ -66,16 +66,19 @@ def dynamics_kernels() -> SimpleNamespace:
     @kernel
     def torque_terms(
         bodies: Bodies, q: wp.array3d(dtype=real), q_s: wp.array3d(dtype=real), q_ss: wp.array3d(dtype=real),
-        carried: wp.array(dtype=real), terms: wp.array4d(dtype=real), wrenches: wp.array4d(dtype=Wrench),
+        motion_of: wp.array(dtype=int), source: wp.array2d(dtype=int), terms: wp.array4d(dtype=real),
+        wrenches: wp.array4d(dtype=Wrench),
     ):  # fmt: skip
-        """Compute the terms of the torque along a motion.
+        """Compute the terms of the torque along motions that take no other one's path.
 
-        q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  carried: (S,) share of
-        the payload that is carried.  terms: (N, S, 6, D) gravity, drag and push, and what the payload adds to each
-        [N m] or [N].  wrenches: (N, S, 3, D) of gravity, drag and push, the force on each link and the moment about
-        its joint, in its frame [N], [N m]; empty if they are not wanted.
+        q, q_s, q_ss: (N, S, D) joint values and their derivatives by the share [rad] or [m].  motion_of: (S,) motion of
+        each sample.  source: (N, M) motion whose path each one takes.  terms: (N, S, 6, D) gravity, drag and push, and
+        what the payload adds to each [N m] or [N].  wrenches: (N, S, 6, D) likewise the force on each link and the
+        moment about its joint, in its frame [N], [N m]; empty if they are not wanted.
         """
         arm, sample = wp.tid()
+        if source[arm, motion_of[sample]] != motion_of[sample]:
+            return
         # Frames of all links: position of the joint, its axis, and the x and y axes of what it carries.
         place, axis, along_x, along_y = Vectors(), Vectors(), Vectors(), Vectors()
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
@@ -124,10 +127,10 @@ def dynamics_kernels() -> SimpleNamespace:
             # The payload moves with the last link; x, y, z are its axes.
             frame = wp.matrix_from_cols(x, y, z)
             lever = tip - before + frame * bodies.payload_com[arm]
-            mass, inertia = carried[sample] * bodies.payload_mass, carried[sample] * bodies.payload_inertia[arm]
-            carried_force, carried_moment = wrench(mass, inertia, frame, lever, acceleration, alpha, omega)
-            # Products are copies; names alone would be the same variables, which the loop changes.
-            total_force, total_moment = one * carried_force, one * carried_moment
+            carried_force, carried_moment = wrench(
+                bodies.payload_mass, bodies.payload_inertia[arm], frame, lever, acceleration, alpha, omega
+            )
+            total_force, total_moment = Vector3(), Vector3()
             after = before
             for step in range(bodies.dof):
                 j = bodies.dof - 1 - step
@@ -144,9 +147,10 @@ def dynamics_kernels() -> SimpleNamespace:
                 terms[arm, sample, 3 + term, j] = added
                 if wrenches.shape[1] > 0:
                     local = wp.matrix_from_rows(along_x[j], along_y[j], wp.cross(along_x[j], along_y[j]))
-                    f = local * total_force
-                    n = local * total_moment
+                    f, n = local * total_force, local * total_moment
                     wrenches[arm, sample, term, j] = Wrench(f[0], f[1], f[2], n[0], n[1], n[2])
+                    f, n = local * carried_force, local * carried_moment
+                    wrenches[arm, sample, 3 + term, j] = Wrench(f[0], f[1], f[2], n[0], n[1], n[2])
                 after = here
 
     return SimpleNamespace(real=real, Bodies=Bodies, torque_terms=torque_terms)

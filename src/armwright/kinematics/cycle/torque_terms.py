@@ -10,21 +10,22 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.arms.rigid_bodies import PerArm
 from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.cycle.cycle_path import CyclePaths
+from armwright.kinematics.cycle.line_following import IndexArray
 from armwright.kinematics.devices import Device, load_kernels
 
 
 @dataclass(frozen=True)
 class TorqueTerms(PerArm):
-    """Terms of N arms at the R samples of all motions, one motion after another, with s the share of a motion.
+    """Terms of N arms at P samples (`instants.Picks`) of motions that take no other one's path, with s their share.
 
-    The torque is gravity + drag s'² + push s'' [N m], or a force [N].
+    The torque is gravity + drag s'² + push s'' [N m], or a force [N]. Elsewhere, the terms are arbitrary.
     """
 
-    torques: Array  # (N, R, 6, D) gravity, drag, push, and what the payload adds to each, in proportion to its mass
-    states: Array  # (N, R, 2, D) first and second derivative of the joint values by s [rad] or [m]
+    torques: Array  # (N, P, 6, D) gravity, drag, push of the arm, and what the payload adds to each
+    states: Array  # (N, P, 2, D) first and second derivative of the joint values by s [rad] or [m]
     wrenches: Array
-    """(N, R, 3, D, 6) terms of the forces on the links and moments about their joints, in the frames of the links [N],
-    [N m]; R = 0 if they were not wanted."""
+    """(N, P, 6, D, 6) likewise terms of the forces on the links and moments about their joints, in the frames of the
+    links [N], [N m]; P = 0 if they were not wanted."""
 
 
 def torque_terms(
@@ -36,13 +37,18 @@ def torque_terms(
     """
     found: list[TorqueTerms] = []
     for group in paths.groups:
-        q = np.concatenate([path.q for path in group.paths], axis=1)
-        of_motions = [[np.broadcast_to(path.at(path.share, n), path.q.shape) for n in (1, 2)] for path in group.paths]
-        states = np.concatenate([np.stack(each, axis=2) for each in of_motions], axis=1)
-        carried = np.repeat([float(path.motion.carries) for path in group.paths], group.counts)
-        whole = np.empty((len(q), q.shape[1] if wrenches else 0, 3, q.shape[2], 6))
-        torques = _terms(group.arms, q, states[:, :, 0], states[:, :, 1], carried, payload, device, whole)
-        found.append(TorqueTerms(torques, states, whole))
+        picked = group.picks(paths)
+        n, dof = len(group.index), group.arms.dof
+        q, (q_s, q_ss) = np.empty((n, len(picked.sample), dof)), np.empty((2, n, len(picked.sample), dof))
+        begin = np.cumsum([0, *group.counts])
+        for index in sorted(set(paths.plan.source)):
+            at, path = picked.motion_of == index, group.paths[index]
+            rows = picked.sample[at] - begin[index]
+            share = path.share[rows]
+            q[:, at], q_s[:, at], q_ss[:, at] = path.q[:, rows], path.at(share, 1), path.at(share, 2)
+        whole = np.empty((n, len(picked.sample) if wrenches else 0, 6, dof, 6))
+        torques = _terms(group.arms, q, q_s, q_ss, payload, device, (picked.motion_of, group.source), whole)
+        found.append(TorqueTerms(torques, np.stack([q_s, q_ss], axis=2), whole))
     return found
 
 
@@ -54,8 +60,9 @@ def inverse_dynamics_torques(
     q, qd, qdd: (N, S, D) joint values [rad] or [m], speeds [rad/s] or [m/s] and accelerations [rad/s²] or [m/s²].
     carried: (S,) share of the payload that is carried.  payload: its mass [kg].
     """
-    terms = _terms(arms, q, qd, qdd, carried, payload, device)
-    return terms[:, :, 0] + terms[:, :, 1]  # gravity, and M q_ss + C q_s with the time as share
+    terms = _terms(arms, q, qd, qdd, payload, device)
+    own, added = terms[:, :, :2].sum(axis=2), terms[:, :, 3:5].sum(axis=2)
+    return own + carried[:, None] * added  # gravity, and M q_ss + C q_s with the time as share
 
 
 def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, device: Device = "cpu") -> Array:
@@ -65,20 +72,23 @@ def inertia_matrices(arms: ArmArrays, q: Array, carried: Array, payload: float, 
     """
     rest = np.zeros_like(q)
     units = (np.broadcast_to(unit, q.shape) for unit in np.eye(arms.dof))
-    return np.stack([_terms(arms, q, unit, rest, carried, payload, device)[:, :, 2] for unit in units], axis=-1)
+    columns = (_terms(arms, q, unit, rest, payload, device) for unit in units)
+    return np.stack([each[:, :, 2] + carried[:, None] * each[:, :, 5] for each in columns], axis=-1)
 
 
 def _terms(
-    arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device,
-    wrenches: Array | None = None,
+    arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, payload: float, device: Device,
+    motions: tuple[IndexArray, IndexArray] | None = None, wrenches: Array | None = None,
 ) -> Array:  # fmt: skip
     """Return (N, S, 6, D) gravity, drag and push of N arms at S samples, and what the payload adds to each.
 
-    wrenches: (N, S, 3, D, 6) to be filled, if any.
+    motions: (S,) motion of each sample, and (N, M) motion whose path each one takes; None to compute all samples.
+    wrenches: (N, S, 6, D, 6) to be filled, if any.
     """
     loaded = load_kernels("cycle.dynamics_kernels", device)
     terms = np.empty((*q.shape[:2], 6, q.shape[2]))
-    full = np.empty((len(q), 0, 3, q.shape[2], 6)) if wrenches is None else wrenches
+    full = np.empty((len(q), 0, 6, q.shape[2], 6)) if wrenches is None else wrenches
+    motion_of, source = motions or (np.zeros(q.shape[1], dtype=np.intp), np.zeros((len(q), 1), dtype=np.intp))
 
     def solve(chunk: slice) -> None:
         part = arms[chunk]
@@ -86,9 +96,8 @@ def _terms(
         values |= vars(part.rigid_bodies) | {"payload_mass": loaded.warp.float64(payload)}
         values |= {"payload_com": part.payload_center, "payload_inertia": payload * part.payload_gyration}
         bodies, states, outputs = loaded.struct("Bodies", values), (q, q_s, q_ss), (terms[chunk], full[chunk])
-        loaded.launch(
-            "torque_terms", q[chunk].shape[:2], bodies, *(each[chunk] for each in states), carried, outputs=outputs
-        )
+        given = (bodies, *(each[chunk] for each in states), motion_of, source[chunk])
+        loaded.launch("torque_terms", q[chunk].shape[:2], *given, outputs=outputs)
 
     in_chunks(solve, len(arms), max(1, SAMPLES[device] // q.shape[1]), device)
     return terms

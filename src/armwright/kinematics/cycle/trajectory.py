@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
-from armwright.kinematics.cycle.cycle_loads import quintic
+from armwright.kinematics.cycle.instants import quintic
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.cycle.torque_terms import inverse_dynamics_torques
 from armwright.tasks.motions import CyclePlan
