@@ -113,10 +113,12 @@ def _clearance(
     arms: ArmArrays, plan: CyclePlan, obstacles: Sequence[Obstacle], q: Array, unfit: NDArray[np.bool_], device: Device
 ) -> Array:
     """Return the (N, B, S) clearance of postures at the first poses [m], at most 0; -inf for those that are unfit."""
-    rules = plan.coarse_rules[np.repeat(plan.sample().first[plan.alike[0]], q.shape[2])]
-    q = np.where(unfit[..., None], 0.0, q).reshape(len(arms), -1, arms.dof)
-    found = np.minimum(*clearances(arms, q, obstacles, device, rules, most=0.0))
-    return np.where(unfit, -np.inf, found.reshape(unfit.shape))
+    rules = plan.coarse_rules[plan.sample().first[plan.alike[0]]]
+    arm, posture = np.nonzero(~unfit.all(axis=1))
+    there = np.where(unfit[..., None], 0.0, q)[arm, :, posture]  # (P, B, D)
+    found = np.zeros(unfit.shape)
+    found[arm, :, posture] = np.minimum(*clearances(arms[arm], there, obstacles, device, rules, most=0.0))
+    return np.where(unfit, -np.inf, found)
 
 
 def _colliding_branches(arms: ArmArrays, poses: Poses, q: Array, clearance: Array, device: Device) -> Array:
