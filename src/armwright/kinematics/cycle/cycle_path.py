@@ -123,6 +123,7 @@ def find_paths(
     n, entry, ratios = len(arms), chosen.entry, chosen.step_ratios
     is_line = np.array([motion.by == "line" for motion in plan.motions])
     refinement, before = _refined(np.ones(n, dtype=np.intp), ratios.max(axis=1)), ratios[:, 0]
+    refinement[chosen.hopeless] = 1  # samples cannot mend these paths
     jumps = np.zeros((n, len(plan.motions)), dtype=bool)
     groups: list[CycleGroup] = []
     unfinished = np.arange(n)
