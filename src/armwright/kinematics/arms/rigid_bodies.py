@@ -15,6 +15,8 @@ class PerArm:
 
     def __getitem__(self, part: slice | NDArray[np.integer]) -> Self:
         values = vars(self).items()
+        if isinstance(part, slice) and part.indices(n := len(next(iter(vars(self).values())))) == (0, n, 1):
+            return self  # as often: making all arrays anew takes as long as a kernel
         return type(self)(**{name: None if value is None else value[part] for name, value in values})
 
 

@@ -284,22 +284,20 @@ def _look_between(
     """
     least = clearance.min(axis=0)
     is_joint, span = [motion.by == "joint" for motion in plan.motions], np.array([0, len(BETWEEN)])
-    near = is_joint & (least < NEAR) & (least.min(axis=1, keepdims=True) > 0.0)
-    for carries in (False, True):
-        place = np.nonzero(near & [motion.carries == carries for motion in plan.motions])  # P of N, of M
-        if not len(place[0]):
-            continue
-        part, (start, end), size = arms[place[0]], ends[place].swapaxes(0, 1)[:, :, None], step[place][:, None]
-        rules = plan.rules(plan.motions[int(place[1][0])], np.full(len(BETWEEN), 0.5))
-        for _ in range(ZOOMS):
-            size = size / 4.0
-            share = np.clip(worst[place][:, None] + size * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (P, S)
-            q = start + share[..., None] * (end - start)
-            own, free, at = span_clearances(part, q, span, obstacles, device, rules).carrying(np.array([carries]))
-            best = np.take_along_axis(share, at, axis=1)[:, 0]
-            found = np.stack([own[:, 0], free[:, 0]])
-            worst[place] = np.where(found.min(axis=0) < clearance[:, *place].min(axis=0), best, worst[place])
-            clearance[:, *place] = np.minimum(clearance[:, *place], found)
+    place = np.nonzero(is_joint & (least < NEAR) & (least.min(axis=1, keepdims=True) > 0.0))  # P of N, of M
+    if not len(place[0]):
+        return
+    part, (start, end), size = arms[place[0]], ends[place].swapaxes(0, 1)[:, :, None], step[place][:, None]
+    carries = np.array([motion.carries for motion in plan.motions])[place[1], None]
+    rules = plan.rules(plan.motions[int(place[1][0])], np.full(len(BETWEEN), 0.5))
+    for _ in range(ZOOMS):
+        size = size / 4.0
+        share = np.clip(worst[place][:, None] + size * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (P, S)
+        q = start + share[..., None] * (end - start)
+        own, free, at = span_clearances(part, q, span, obstacles, device, rules).carrying(carries)
+        best, found = np.take_along_axis(share, at, axis=1)[:, 0], np.stack([own[:, 0], free[:, 0]])
+        worst[place] = np.where(found.min(axis=0) < clearance[:, *place].min(axis=0), best, worst[place])
+        clearance[:, *place] = np.minimum(clearance[:, *place], found)
 
 
 def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> dict[int, Array]:
