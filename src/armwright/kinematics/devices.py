@@ -75,6 +75,7 @@ class Compilation:
 
 compilation = Compilation()
 _loading = threading.Lock()
+_all_loaded: set[Hashable] = set()  # by `load_all_kernels`
 
 
 def find_cache() -> None:
@@ -181,7 +182,10 @@ def load_kernels(name: str, device: Device, *variant: Hashable) -> Loaded:
 def load_all_kernels(variants: Iterable[tuple[str, *tuple[Hashable, ...]]], device: Device) -> None:
     """Load variants of kernels, each as `load_kernels` takes it, so that nothing is left to compile later."""
     with _loading:
-        _load_modules([_made(*variant) for variant in variants], device)
+        missing = [variant for variant in variants if (variant, device) not in _all_loaded]
+        if missing:
+            _load_modules([_made(*variant) for variant in missing], device)
+            _all_loaded.update((variant, device) for variant in missing)
 
 
 def _has_cuda() -> bool:

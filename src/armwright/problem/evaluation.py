@@ -1,6 +1,6 @@
 """Per-target kinematics and statics of arms, not aggregated."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, cast
@@ -21,7 +21,7 @@ from armwright.kinematics.cycle.reserves import Reserves, bearing_reserves, hold
 from armwright.kinematics.cycle.supply_currents import SupplyCurrents, supply_currents
 from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
-from armwright.kinematics.ik.ik import UPDATES, Postures, solve_postures
+from armwright.kinematics.ik.ik import LANES, UPDATES, Postures, solve_postures
 from armwright.kinematics.reach.compliance import joint_loads, own_loads, unit_payload
 from armwright.problem.dexterous_volume import dexterous_volumes
 from armwright.problem.scene import Scene, task_scene
@@ -335,6 +335,20 @@ def evaluate(
     return evaluate_arrays(stack_arms(arms), scene, device)
 
 
+def cycle_kernels(oriented: bool, device: Device) -> list[tuple[str, *tuple[Hashable, ...]]]:
+    """Return the variants of kernels that `evaluate_arrays` needs for arms of a space along a cycle.
+
+    oriented: whether targets have an axis or an orientation.
+    """
+    ik = ("ik.ik_kernels", "float32", LANES[device], "any", "pose" if oriented else "position")
+    contact = ("contact.clearance_kernels", "float32")
+    return [
+        ik,
+        contact,
+        *((f"cycle.{name}_kernels",) for name in ("branch", "choice", "drive", "dynamics", "load", "path")),
+    ]
+
+
 def evaluate_arrays(
     arrays: ArmArrays,
     scene: Scene,
@@ -369,6 +383,7 @@ def evaluate_arrays(
             restarts=restarts,
             precision=arrays.precision,
             device=device,
+            motions=None if scene.plan is None else arrays.general_motions,
         )
 
     restarts = scene.target_arrays.restarts

@@ -12,11 +12,11 @@ from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.cycle.line_following import IndexArray
-from armwright.kinematics.devices import Device, cores, resolve_device
+from armwright.kinematics.devices import Device, cores, load_all_kernels, resolve_device
 from armwright.problem.arm_quantities import orientation_error
 from armwright.problem.best_chain import best_chain
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
-from armwright.problem.evaluation import Evaluation, evaluate_arrays
+from armwright.problem.evaluation import Evaluation, cycle_kernels, evaluate_arrays
 from armwright.problem.evaluators import Evaluator, Measurement
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Need, Objective
@@ -159,6 +159,11 @@ class Problem:
         """Return the arms of N designs with the task's tool, stacked; matrix: (N, P)."""
         return stack_designs(self.space, matrix, self.task.tool, precision)
 
+    def load_kernels(self) -> None:
+        """Load all kernels that evaluations along a cycle need, so that none is compiled in the middle of a search."""
+        if self.task.cycle is not None:
+            load_all_kernels(cycle_kernels(self.task.target_arrays.oriented, self.device), self.device)
+
     @property
     def max_reach(self) -> float:
         """The length of the longest possible arm, with its tool and all slides extended [m]."""
@@ -196,6 +201,7 @@ class Problem:
         def solve(rows: slice) -> None:
             parts[rows.start] = self._worst_case(matrix[rows], {name: each[rows] for name, each in measured.items()})
 
+        self.load_kernels()
         if self.task.cycle is None:  # whose kernels divide the designs among threads
             for rows in self.chunks(len(matrix)):
                 solve(rows)

@@ -90,9 +90,12 @@ class ArmArrays(PerArm):
     @property
     def motions(self) -> Motions:
         """The kernel variant that all arms need."""
-        if np.any(self.motion % PRISMATIC == OBLIQUE):
-            return "oblique"
-        return "revolute" if np.all(self.motion < PRISMATIC) else "any"
+        return "revolute" if np.all(self.motion < OBLIQUE) else self.general_motions
+
+    @property
+    def general_motions(self) -> Motions:
+        """The variant that these arms and others of their space need, whatever joints a batch happens to have."""
+        return "oblique" if np.any(self.motion % PRISMATIC == OBLIQUE) else "any"
 
     @property
     def prismatic(self) -> NDArray[np.bool_]:

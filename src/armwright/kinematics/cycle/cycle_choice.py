@@ -98,14 +98,17 @@ def _static_loads(arms: ArmArrays, plan: CyclePlan, q: Array, payload: float, de
         return np.zeros((n, b, k))
     motions = [(*block.lines, *plan.joint_motions[max(at - 1, 0) : at + 1]) for at, block in enumerate(plan.blocks)]
     carries = [float(any(plan.motions[index].carries for index in each)) for each in motions]
+    anywhere = plan.poses[[0] * (2 * b * k)]
     torque = solve_postures(
         arms,
-        np.zeros((2 * b * k, 3)),
+        anywhere.position,
         0,
         initial_q=np.nan_to_num(q.swapaxes(0, 1).reshape(n, -1, dof)),
         payload=payload * np.tile(np.repeat(carries, k), 2),
+        target_arrays=anywhere.arrays,
         precision=arms.precision,
         device=device,
+        motions=arms.general_motions,
     ).torque.reshape(n, 2, b, k, dof)
     drives = arms.actuation
     limit = np.nan_to_num(np.fmin(drives.continuous, drives.peak), nan=np.inf) / drives.safety_factor[:, None]

@@ -95,6 +95,7 @@ def _solve(arms: ArmArrays, poses: Poses, start: Array, updates: int, device: De
         target_arrays=each.arrays,
         precision=arms.precision,
         device=device,
+        motions=arms.general_motions,
     )
     off = np.maximum(solved.distance(each.position) / each.tolerance, solved.angle / each.angle_tolerance)
     off = np.where(np.isnan(start).any(axis=-1), np.inf, off.reshape(n, b, s))
