@@ -35,18 +35,38 @@ def clearances(
         neither counts.
     most: largest clearance of interest, which greater ones count as; 0 is fast for those who ask for overlaps alone.
     """
-    n, t, _ = q.shape
-    distances = np.empty((2, n, t))
-    solids = _solids(tuple(obstacles), arms.precision, device) if obstacles else None
+    (_, own), (_, free) = path_clearances(arms, q, np.arange(q.shape[1] + 1), obstacles, device, rules, most)[0]
+    return own, free
+
+
+def path_clearances(
+    arms: ArmArrays, q: Array, first: Sequence[int] | NDArray[np.intp], obstacles: Sequence[Obstacle] = (),
+    device: Device = "cpu", rules: TipRules | None = None, most: float = np.inf,
+    omitted: NDArray[np.bool_] | None = None,
+) -> tuple[Array, NDArray[np.intp]]:  # fmt: skip
+    """Return the smallest `clearances` in G spans of samples q (N, T, D), and the samples where they are.
+
+    They are (2, 2, N, G): self-clearance and obstacle clearance, without the payload and with it where it is carried.
+    The samples are (2, N, G), of the smaller of both.
+
+    first: (G + 1,) first sample of each span, and T.
+    omitted: (N, G) True for spans that are not measured.
+    """
+    (n, t, _), spans = q.shape, len(first) - 1
+    distances, worst = np.empty((2, 2, n, spans)), np.empty((2, n, spans), dtype=np.intp)
+    solids, at = _solids(tuple(obstacles), arms.precision, device), np.asarray(first, dtype=np.int32)
+    left_out = np.zeros((n, spans), dtype=np.int32) if omitted is None else omitted.astype(np.int32)
 
     def measure(chunk: slice) -> None:
-        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, device, rules, most)
+        distances[:, :, chunk], worst[:, chunk] = _distances(
+            arms[chunk], q[chunk], at, left_out[chunk], solids, device, rules, most
+        )
 
     size = MAX_CHUNK[device] // t
     if device == "cpu":
         size = min(size, max(-(-n // cores()), SMALLEST_CHUNK // t))
     in_chunks(measure, n, max(1, size), device)
-    return distances[0], distances[1]
+    return distances, worst
 
 
 def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
@@ -60,45 +80,39 @@ def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
 
 
 def _distances(
-    arms: ArmArrays, q: Array, solids: Any, device: Device, rules: TipRules | None, most: float
-) -> NDArray[np.floating[Any]]:
-    """Return the (2, N, T) clearances of a chunk of arms [m]."""
-    dim, links = q.shape[:2], load_kernels("contact.clearance_kernels", device, arms.precision)
-    own, free = (links.array(np.full(dim, most), links.kernels.real) for _ in range(2))
+    arms: ArmArrays, q: Array, first: NDArray[np.int32], omitted: NDArray[np.int32], solids: Any, device: Device,
+    rules: TipRules | None, most: float,
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.int32]]:  # fmt: skip
+    """Return what `path_clearances` does of a chunk of arms."""
+    loaded, (n, t, dof), tool = load_kernels("contact.clearance_kernels", device, arms.precision), q.shape, arms.tool
     offset = arms.offset.copy()
-    offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
-    values = {name: getattr(arms, name) for name in ("base", "motion", "axis", "radius")} | {"offset": offset, "q": q}
-    values |= {name: links.empty(q.shape, links.kernels.Vector3) for name in ("starts", "ends")}
-    posed = links.struct("Posed", values)
-    links.launch("link_axes", dim, posed)
-    links.launch("self_clearance", dim, posed, own)
-    if solids is not None:
-        links.launch("obstacle_clearance", dim, posed, solids, free)
-    if arms.columns is not None:
-        links.launch("column_clearance", dim, posed, arms.columns, own)
+    offset[np.arange(n), arms.n_joints - 1] -= tool.tip.astype(arms.precision)
+    bodies = arms.motor_bodies or bodies_in(without_bodies(n, dof), arms.precision)
     at_tip: Solids = {} if rules is None else rules.solids
-    if arms.motor_bodies is not None or at_tip:
-        motors = load_kernels("contact.motor_kernels", device, arms.precision)
-        bodies = arms.motor_bodies or bodies_in(without_bodies(*q.shape[::2]), arms.precision)
-        tip, tool, size = _stacked(tuple(at_tip.values())), arms.tool, (*dim, arms.dof + len(at_tip))
-        body = {
-            "shape": np.hstack([bodies.shape, np.tile(tip["shape"], (len(arms), 1))]),
-            "half": np.hstack([bodies.half, np.tile(tip["half"], (len(arms), 1, 1))]),
-            "middle": motors.empty(size, links.kernels.Vector3),
-            "into": motors.empty(size, motors.kernels.Matrix3),
-            "count": np.full(dim[1], size[2]) - (0 if rules is None else ("payload" in at_tip) & ~rules.carries),
-            "allowed": np.empty((0, 0)) if rules is None else rules.allowed,
-        }
-        placed = motors.struct("Motors", body)
-        frame = np.stack([tool.side, np.cross(tool.axis, tool.side), tool.axis], axis=1)
-        at = motors.struct("Solids", tip)
-        motors.launch("motor_frames", dim, posed, bodies.axis, bodies.centre, tool.tip, frame, at, placed)
-        motors.launch("self_clearance", dim, posed, placed, own)
-        if solids is not None:
-            motors.launch("obstacle_clearance", dim, posed, placed, solids, free)
-        if arms.columns is not None:
-            motors.launch("column_clearance", dim, posed, placed, arms.columns, own)
-    return np.stack([own.numpy(), free.numpy()])
+    tip, n_bodies = _stacked(tuple(at_tip.values())), dof + len(at_tip)
+    values = {name: getattr(arms, name) for name in ("base", "motion", "axis", "radius")} | {"offset": offset, "q": q}
+    values |= {
+        "column": np.zeros((n, 3)) if arms.columns is None else arms.columns,
+        "tip": tool.tip,
+        "tip_into": np.stack([tool.side, np.cross(tool.axis, tool.side), tool.axis], axis=1),
+        "shape": np.hstack([bodies.shape, np.tile(tip["shape"], (n, 1))]),
+        "half": np.hstack([bodies.half, np.tile(tip["half"], (n, 1, 1))]),
+        "body_axis": bodies.axis,
+        "centre": bodies.centre,
+        "unloaded": n_bodies - ("payload" in at_tip),
+        "carries": np.zeros(t, dtype=np.int32) if rules is None else rules.carries,
+        "allowed": np.empty((0, 0)) if rules is None else rules.allowed,
+    }
+    kernels = loaded.kernels
+    values |= {name: loaded.empty((n, t, dof), kernels.Vector3) for name in ("starts", "ends")}
+    values |= {"middle": loaded.empty((n, t, n_bodies), kernels.Vector3)}
+    values |= {"into": loaded.empty((n, t, n_bodies), kernels.Matrix3)}
+    posed = loaded.struct("Posed", values)
+    loaded.launch("pose", (n, t), posed, loaded.struct("Solids", tip))
+    clearance = np.empty((2, 2, *omitted.shape), dtype=arms.precision)
+    worst = np.empty((2, *omitted.shape), dtype=np.int32)
+    loaded.launch("measure", omitted.shape, posed, solids, first, omitted, most, outputs=(clearance, worst))
+    return clearance, worst
 
 
 @cache

@@ -1,7 +1,7 @@
-"""Warp kernels of clearance: distances of the links of posed arms from each other, from obstacles and from the column.
+"""Warp kernels of clearance: distances of the parts of arms from each other, from obstacles and from the column.
 
-A link is a capsule: all points within its radius of its axis, a segment. A thread takes one arm at one target, and
-branches: a bound excludes distant obstacles. docs/method.md §13 defines the distances.
+A link is a capsule: all points within its radius of its axis, a segment. A thread takes one arm along one span of
+samples, pair by pair. docs/method.md §13 defines the distances.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -11,161 +11,105 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from armwright.kinematics.arms.arm_arrays import FIXED, Precision
+from armwright.kinematics.arms.arm_arrays import Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.arms.ik_math import kernel
-from armwright.kinematics.contact.convex_math import SEGMENT, convex_math
-from armwright.kinematics.contact.solid_math import CYLINDER, MESH, solid_math
+from armwright.kinematics.contact.body_math import body_math
+from armwright.kinematics.contact.link_math import link_math
+from armwright.kinematics.contact.solid_math import solid_math
+from armwright.kinematics.contact.span_math import span_math
 
 
 @cache
 def clearance_kernels(precision: Precision) -> SimpleNamespace:
-    """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
-    base = frame_math(precision)
-    real, Vector3, advance = base.real, base.Vector3, base.advance
-    solid, separation = solid_math(precision), convex_math(precision).separation
-    Posed, Solids = solid.Posed, solid.Solids
-    along_segment, may_be_nearer, nearer_link = solid.along_segment, solid.may_be_nearer, solid.nearer_link
-    zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
-    tiny, parallel = real(1e-30), real(1e-12)  # the latter is the square of the sine of an angle that is 0 in float32
+    """Return the kernels in this precision, for N arms with D links at T samples in G spans, and O obstacles."""
+    base, solid, spans = frame_math(precision), solid_math(precision), span_math(precision)
+    body, link = body_math(precision), link_math(precision)
+    real, Vector3, Matrix3, advance = base.real, base.Vector3, base.Matrix3, base.advance
+    Posed, Search, Solids, reach_of = spans.Posed, spans.Search, solid.Solids, spans.reach_of
+    links_from_arm, links_from_obstacles = link.from_arm, link.from_obstacles
+    body_from_arm, body_from_obstacles = body.from_arm, body.from_obstacles
+    zero, one = real(0.0), real(1.0)
 
     @kernel
-    def link_axes(arms: Posed):
-        """Compute start and end of the axis of each link by forward kinematics."""
-        arm, target = wp.tid()
+    def pose(arms: Posed, at_tip: Solids):
+        """Compute start and end of links, middle of bodies and rotations into their frames, by forward kinematics.
+
+        at_tip: tool and payload.
+        """
+        arm, t = wp.tid()
         x, y, z = Vector3(one, zero, zero), Vector3(zero, one, zero), Vector3(zero, zero, one)
         p = arms.base[arm]
-        for j in range(arms.motion.shape[1]):
+        dof = arms.motion.shape[1]
+        for j in range(dof):
+            if arms.shape[arm, j] >= 0:
+                c = arms.centre[arm, j]
+                arms.middle[arm, t, j] = p + c[0] * x + c[1] * y + c[2] * z
+                if arms.body_axis[arm, j] == 0:
+                    arms.into[arm, t, j] = wp.matrix_from_rows(y, z, x)
+                elif arms.body_axis[arm, j] == 1:
+                    arms.into[arm, t, j] = wp.matrix_from_rows(z, x, y)
+                else:
+                    arms.into[arm, t, j] = wp.matrix_from_rows(x, y, z)
             _axis, place, p, x, y, z = advance(
-                arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], arms.q[arm, target, j], p, x, y, z
+                arms.motion[arm, j], arms.axis[arm, j], arms.offset[arm, j], arms.q[arm, t, j], p, x, y, z
             )
-            arms.starts[arm, target, j] = place
-            arms.ends[arm, target, j] = p
+            arms.starts[arm, t, j] = place
+            arms.ends[arm, t, j] = p
+        tip = arms.tip[arm]
+        p += tip[0] * x + tip[1] * y + tip[2] * z
+        into = arms.tip_into[arm] * wp.matrix_from_rows(x, y, z)
+        for k in range(at_tip.shape.shape[0]):
+            arms.middle[arm, t, dof + k] = p + wp.transpose(into) * at_tip.centre[k]
+            arms.into[arm, t, dof + k] = at_tip.into[k] * into
 
     @wp.func
-    def to_segment(p: Vector3, a: Vector3, u: Vector3):
-        """Return the squared distance of a point from the segment from a to a + u."""
-        t = wp.clamp(wp.dot(p - a, u) / wp.max(wp.dot(u, u), tiny), zero, one)
-        return wp.length_sq(p - a - t * u)
-
-    @wp.func
-    def between_segments(a: Vector3, u: Vector3, b: Vector3, v: Vector3):
-        """Return the distance between the segments from a to a + u and from b to b + v.
-
-        The nearest points are an end of a segment or the feet of the common perpendicular. The cross product
-        determines the feet well even if the segments are nearly parallel.
-        """
-        square = wp.min(
-            wp.min(to_segment(a, b, v), to_segment(a + u, b, v)),
-            wp.min(to_segment(b, a, u), to_segment(b + v, a, u)),
-        )
-        n = wp.cross(u, v)
-        nn = wp.dot(n, n)
-        if nn > parallel * wp.dot(u, u) * wp.dot(v, v):
-            w = b - a
-            s = wp.clamp(wp.dot(wp.cross(w, v), n) / nn, zero, one)
-            t = wp.clamp(wp.dot(wp.cross(w, u), n) / nn, zero, one)
-            square = wp.min(square, wp.length_sq(w + t * v - s * u))
-        return wp.sqrt(square)
+    def run_end(arms: Posed, i: int, t: int, end: int):
+        """Return the first sample from t to `end` at which body i is not there."""
+        if i < arms.unloaded:
+            return end
+        for sample in range(t, end):
+            if arms.carries[sample] == 0:
+                return sample
+        return end
 
     @kernel
-    def self_clearance(arms: Posed, clearance: wp.array2d(dtype=real)):
-        """Lower (N, T) clearances to the distance between links that are neither neighbours nor rigidly connected."""
-        arm, target = wp.tid()
-        nearest = clearance[arm, target]
-        for i in range(arms.radius.shape[1]):
-            r = arms.radius[arm, i]
-            a = arms.starts[arm, target, i]
-            u = arms.ends[arm, target, i] - a
-            length = wp.length(u)
-            links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-            n_joints = int(0)  # noqa: RUF046, UP018
-            between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
-            for j in range(i + 1, arms.radius.shape[1]):
-                b = arms.starts[arm, target, j]
-                between += wp.length(b - arms.ends[arm, target, j - 1])  # displacement of a prismatic joint
-                if arms.motion[arm, j] < wp.static(FIXED):
-                    n_joints += 1
-                v = arms.ends[arm, target, j] - b
-                other_length = wp.length(v)
-                radii = r + arms.radius[arm, j]
-                if r > zero and arms.radius[arm, j] > zero:
-                    # Parts of the arm that are this near along it cannot be farther apart, so they are excluded.
-                    excluded = half * wp.max(two * radii - between, zero)
-                    if links_between > 0 and n_joints > 0 and excluded <= wp.min(length, other_length):
-                        u_counted = u * (one - excluded / wp.max(length, tiny))
-                        v_excluded = v * (excluded / wp.max(other_length, tiny))
-                        nearest = wp.min(
-                            nearest, between_segments(a, u_counted, b + v_excluded, v - v_excluded) - radii
-                        )
-                    links_between += 1
-                between += other_length
-        clearance[arm, target] = nearest
-
-    @wp.func
-    def from_axis(p: Vector3, v: Vector3, solids: Solids, o: int, enough: real):
-        """Return the distance of the segment from p to p + v from an obstacle, in the obstacle's frame."""
-        h, shape, size = half * v, solids.shape[o], solids.half[o]
-        if shape == wp.static(MESH):
-            unturned = wp.identity(n=3, dtype=real)
-            return separation(-(p + h), wp.static(SEGMENT), h, unturned, shape, size, solids, o, enough)
-        return along_segment(shape, p, v, size)
-
-    @kernel
-    def obstacle_clearance(arms: Posed, solids: Solids, clearance: wp.array2d(dtype=real)):
-        """Lower (N, T) clearances to the distance of a link from an obstacle."""
-        arm, target = wp.tid()
-        nearest = clearance[arm, target]
-        for j in range(arms.radius.shape[1]):
-            r = arms.radius[arm, j]
-            if r > zero:
-                a = arms.starts[arm, target, j]
-                along = arms.ends[arm, target, j] - a
-                foot = real(0.0)  # share of the first link that is its foot, where the arm is mounted
-                if j == 0:
-                    foot = two * r / wp.max(wp.length(along), tiny)
-                if foot < one:
-                    for o in range(solids.shape.shape[0]):
-                        base = solids.into[o] * (a - solids.centre[o])
-                        v = solids.into[o] * along
-                        p = base + foot * v
-                        v = (one - foot) * v
-                        if may_be_nearer(nearest + r, solids.shape[o], solids.half[o], p, v):
-                            distance = from_axis(p, v, solids, o, nearest + r) - r
-                            mounted = j == 0 and from_axis(base, Vector3(), solids, o, two * r) <= r
-                            # The first link is always close to what the arm is mounted on: only overlaps count.
-                            if not mounted or distance < zero:
-                                nearest = wp.min(nearest, distance)
-        clearance[arm, target] = nearest
-
-    @kernel
-    def column_clearance(arms: Posed, column: wp.array(dtype=Vector3), clearance: wp.array2d(dtype=real)):
-        """Lower (N, T) clearances to the distance of a column from links that move, except the first one.
-
-        column: (N,) radius, radius, half the length [m], 0 without one.
-        """
-        arm, target = wp.tid()
-        size = column[arm]
-        if size[2] > zero:
-            middle = arms.base[arm] - Vector3(zero, zero, size[2])
-            nearest = clearance[arm, target]
-            n_links = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-            n_joints = int(0)  # noqa: RUF046, UP018
-            for j in range(arms.motion.shape[1]):
-                if arms.motion[arm, j] < wp.static(FIXED):
-                    n_joints += 1
-                r = arms.radius[arm, j]
-                if r > zero:
-                    if n_links > 0 and n_joints > 0:
-                        a = arms.starts[arm, target, j]
-                        nearest = nearer_link(
-                            nearest, wp.static(CYLINDER), size, a - middle, arms.ends[arm, target, j] - a, r
-                        )
-                    n_links += 1
-            clearance[arm, target] = nearest
+    def measure(
+        arms: Posed, solids: Solids, first: wp.array(dtype=int), omitted: wp.array2d(dtype=int), most: real,
+        clearance: wp.array4d(dtype=real), worst: wp.array3d(dtype=int),
+    ):  # fmt: skip
+        """Find clearances (2, 2, N, G) and their samples (2, N, G) as `path_clearances` does."""
+        arm, span = wp.tid()
+        start, end = int(first[span]), int(first[span + 1])
+        if omitted[arm, span] != 0:
+            end = start
+        own = Search()
+        own.first = start
+        own.end = end
+        own.nearest = most
+        own.at = start
+        reach = reach_of(arms, arm, start, end)
+        free = links_from_obstacles(arms, reach, solids, arm, own)
+        own = links_from_arm(arms, reach, arm, own)
+        n_bodies = arms.shape.shape[1]
+        for i in range(n_bodies + 1):
+            for loaded in range(2):
+                if i == wp.where(loaded == 1, n_bodies, arms.unloaded):
+                    clearance[0, loaded, arm, span] = own.nearest
+                    clearance[1, loaded, arm, span] = free.nearest
+                    worst[loaded, arm, span] = wp.where(own.nearest <= free.nearest, own.at, free.at)
+            if i < n_bodies:
+                t = int(start)
+                while t < end and arms.shape[arm, i] >= 0:
+                    own.first = t
+                    own.end = run_end(arms, i, t, end)
+                    free.first = t
+                    free.end = own.end
+                    if own.end > t:
+                        own = body_from_arm(arms, reach, arm, i, own)
+                        free = body_from_obstacles(arms, reach, solids, arm, i, free)
+                    t = wp.max(own.end, t + 1)
 
     return SimpleNamespace(
-        real=real, Vector3=Vector3, Posed=Posed, Solids=Solids,
-        link_axes=link_axes, self_clearance=self_clearance, obstacle_clearance=obstacle_clearance,
-        column_clearance=column_clearance,
-    )  # fmt: skip
+        real=real, Vector3=Vector3, Matrix3=Matrix3, Posed=Posed, Solids=Solids, pose=pose, measure=measure
+    )

@@ -1,4 +1,4 @@
-"""Warp functions of the signed distance of points and segments from solids, in the frame of the solid; and what moves.
+"""Warp functions of the signed distance of points and segments from solids, in the frame of the solid.
 
 docs/method.md §13 defines the distances.
 """
@@ -26,30 +26,6 @@ def solid_math(precision: Precision) -> SimpleNamespace:
     Vector4 = wp.types.vector(length=4, dtype=real)
     zero, half = real(0.0), real(0.5)
     tiny = real(1e-30)
-
-    @wp.struct
-    class Posed:
-        """The links of N arms of up to D joints at T targets."""
-
-        base: wp.array(dtype=Vector3)  # (N,) [m]
-        motion: wp.array2d(dtype=int)  # (N, D)
-        axis: wp.array2d(dtype=Vector3)  # (N, D) of the joints
-        offset: wp.array2d(dtype=Vector3)  # (N, D) [m]
-        q: wp.array3d(dtype=real)  # (N, T, D) [rad] or [m]
-        radius: wp.array2d(dtype=real)  # (N, D) [m], 0 for links to ignore
-        starts: wp.array3d(dtype=Vector3)  # (N, T, D) of their axes [m]
-        ends: wp.array3d(dtype=Vector3)  # (N, T, D) [m]
-
-    @wp.struct
-    class Motors:
-        """K bodies: those of their D actuators, and behind these tool and payload if they count."""
-
-        shape: wp.array2d(dtype=int)  # (N, K)
-        half: wp.array2d(dtype=Vector3)  # (N, K) [m]
-        middle: wp.array3d(dtype=Vector3)  # (N, T, K) [m]
-        into: wp.array3d(dtype=Matrix3)  # (N, T, K) rotation into the body's frame
-        count: wp.array(dtype=int)  # (T,) how many are there: without the payload, which is the last, if not carried
-        allowed: wp.array2d(dtype=real)  # (T, O) depth of tool and payload that does not count [m], as of `TipRules`
 
     @wp.struct
     class Solids:
@@ -118,26 +94,26 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         return signed_distance(shape, p + half * (low + high) * v, size)
 
     @wp.func
-    def may_be_nearer(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3):
-        """Return whether a point of the segment from p to p + v may have a smaller signed distance, by lower bounds.
+    def lower_bound(shape: int, p: Vector3, v: Vector3, size: Vector3):
+        """Return a lower bound of the least signed distance on the segment from p to p + v.
 
         Distance changes by no more than the path length, and rises with each coordinate, except from the ground.
         """
-        if signed_distance(shape, p + half * v, size) - half * wp.length(v) >= nearest:
-            return False
+        bound = signed_distance(shape, p + half * v, size) - half * wp.length(v)
         if shape == wp.static(GROUND):
-            return True
+            return bound
         low, high = wp.min(p, p + v), wp.max(p, p + v)
-        return signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size) < nearest
+        return wp.max(bound, signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size))
 
     @wp.func
-    def nearer_link(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real):
-        """Return the smaller of a distance and that of a solid from a link with the axis from p to p + v."""
-        if may_be_nearer(nearest + radius, shape, size, p, v):
-            return wp.min(nearest, along_segment(shape, p, v, size) - radius)
-        return nearest
+    def from_link(shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real, enough: real):
+        """Return the distance of a solid from a link with the axis from p to p + v, or a lower bound above `enough`."""
+        bound = lower_bound(shape, p, v, size)
+        if bound < enough + radius:
+            bound = along_segment(shape, p, v, size)
+        return bound - radius
 
     return SimpleNamespace(
-        Posed=Posed, Motors=Motors, Solids=Solids, signed_distance=signed_distance, along_segment=along_segment,
-        may_be_nearer=may_be_nearer, nearer_link=nearer_link,
+        Solids=Solids, signed_distance=signed_distance, along_segment=along_segment, lower_bound=lower_bound,
+        from_link=from_link,
     )  # fmt: skip

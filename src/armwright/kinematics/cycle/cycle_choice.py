@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.contact.clearance import path_clearances
 from armwright.kinematics.cycle.line_following import BlockPaths, IndexArray, follow_lines
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik.ik import solve_postures
@@ -186,9 +186,9 @@ def _avoid_collisions(
         change = chosen[:, [samples.first[(b + 1) % n_blocks] for b in range(n_edges)]] - start
         between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)
         q = np.concatenate([chosen, between.reshape(len(index), -1, arms.dof)], axis=1)
-        depth = np.maximum(0.0, -np.minimum(*clearances(part, q, obstacles, device, rules, most=0.0)))
-        in_blocks = np.maximum.reduceat(depth[:, : chosen.shape[1]], samples.first[:-1], axis=1)
-        in_edges = depth[:, chosen.shape[1] :].reshape(len(index), n_edges, len(share)).max(axis=2, initial=0.0)
+        first = np.concatenate([samples.first, samples.first[-1] + len(share) * np.arange(1, n_edges + 1)])
+        depth = -path_clearances(part, q, first, obstacles, device, rules, most=0.0)[0][:, 1].min(axis=0)  # (n, B + E)
+        in_blocks, in_edges = depth[:, :n_blocks], depth[:, n_blocks:]
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)
         edge, block = np.arange(n_edges, dtype=np.intp), np.arange(n_blocks, dtype=np.intp)
         of_blocks = index[:, None], block, choice[index]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.contact.clearance import clearances
+from armwright.kinematics.contact.clearance import path_clearances
 from armwright.kinematics.cycle.cycle_choice import CLOSED, JOINT_STEPS, MAX_SLIDE, MAX_STEP, ON_LIMIT, choose_postures
 from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
 from armwright.kinematics.cycle.instants import EQUAL, FEW, Instants
@@ -210,17 +210,17 @@ def _measure(
         errors = _line_errors(group, plan, device, between)
         q = np.concatenate([path.q for path in group.paths], axis=1)
         rules = joined_rules([plan.rules(path.motion, path.share) for path in group.paths])
-        clearance = np.stack(clearances(group.arms, q, obstacles, device, rules))  # (2, n, R)
+        first = np.concatenate([[0], np.cumsum(group.counts)])
+        clearance, nearest = path_clearances(group.arms, q, first, obstacles, device, rules)
+        values[2:4, group.index], worst[group.index, :, 2] = clearance[:, 1], nearest[1] - first[:-1]
         margin = group.arms.limit_distance(q)
         at = 0
         for i, path in enumerate(group.paths):
             end = at + path.q.shape[1]
-            own = clearance[:, :, at:end]
             if errors[i] is not None:
                 values[:2, group.index, i] = errors[i].max(axis=1).T
                 worst[group.index, i, :2] = errors[i].argmax(axis=1) / (errors[i].shape[1] - 1)
-            values[2:4, group.index, i] = own.min(axis=2)
-            worst[group.index, i, 2] = own.min(axis=0).argmin(axis=1) / (path.q.shape[1] - 1)
+            worst[group.index, i, 2] /= path.q.shape[1] - 1
             values[4, group.index, i] = margin[:, at:end].min(axis=1)
             if path.motion.by == "line":  # where a joint meets its limit, the speeds of the others jump
                 jumps[group.index, i] |= (margin[:, at + 1 : end - 1] <= ON_LIMIT).any(axis=1)
@@ -256,10 +256,10 @@ def _look_between(
             size = size / 4.0
             share = np.clip(worst[place][:, None] + size * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (P, S)
             q = start + share[..., None] * (end - start)
-            found = np.stack(clearances(part, q, obstacles, device, rules))  # (2, P, S)
-            best = np.take_along_axis(share, found.min(axis=0).argmin(axis=1)[:, None], axis=1)[:, 0]
-            worst[place] = np.where(found.min(axis=(0, 2)) < clearance[:, *place].min(axis=0), best, worst[place])
-            clearance[:, *place] = np.minimum(clearance[:, *place], found.min(axis=2))
+            lowest, nearest = path_clearances(part, q, (0, len(BETWEEN)), obstacles, device, rules)
+            found, best = lowest[:, 1, :, 0], np.take_along_axis(share, nearest[1], axis=1)[:, 0]
+            worst[place] = np.where(found.min(axis=0) < clearance[:, *place].min(axis=0), best, worst[place])
+            clearance[:, *place] = np.minimum(clearance[:, *place], found)
 
 
 def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> list[Any]:

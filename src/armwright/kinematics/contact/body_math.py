@@ -1,0 +1,158 @@
+"""Warp functions of clearance for the bodies of actuators, tool and payload: from each other and everything else.
+
+docs/method.md §13 defines the distances and which pairs count. Bounds exclude distant pairs.
+"""
+
+# Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from armwright.kinematics.arms.arm_arrays import FIXED, Precision
+from armwright.kinematics.arms.frame_math import frame_math
+from armwright.kinematics.contact.convex_math import convex_math
+from armwright.kinematics.contact.solid_math import CYLINDER, solid_math
+from armwright.kinematics.contact.span_math import span_math
+
+
+@cache
+def body_math(precision: Precision) -> SimpleNamespace:
+    """Return the functions in this precision; `arm` and `i` are an arm and its body."""
+    base, solid, convex, spans = (make(precision) for make in (frame_math, solid_math, convex_math, span_math))
+    real, Vector3, Solids = base.real, base.Vector3, solid.Solids
+    Posed, Reach, Search, moved, looked = spans.Posed, spans.Reach, spans.Search, spans.moved, spans.looked
+    signed_distance, from_link = solid.signed_distance, solid.from_link
+    separation, from_obstacle = convex.separation, convex.from_obstacle
+    zero = real(0.0)
+
+    @wp.func
+    def lever_of(arms: Posed, arm: int, i: int, t: int):
+        """Return how far the body reaches from the origin of its frame at most [m]."""
+        origin = arms.base[arm]
+        if i > 0:
+            origin = arms.ends[arm, t, wp.min(i, arms.motion.shape[1]) - 1]
+        return wp.length(arms.middle[arm, t, i] - origin) + wp.length(arms.half[arm, i])
+
+    @wp.func
+    def is_at_rest(arms: Posed, arm: int, i: int):
+        """Return whether no joint moves the body."""
+        for j in range(wp.min(i, arms.motion.shape[1])):  # noqa: SIM110 (Warp has no `all`)
+            if arms.motion[arm, j] < wp.static(FIXED):
+                return False
+        return True
+
+    @wp.func
+    def to_link(arms: Posed, arm: int, i: int, k: int, motion: real, search: Search):
+        """Search for the least distance of the body from link k."""
+        search.t = search.first
+        while search.t < search.end:
+            t = search.t
+            place, frame, start = arms.middle[arm, t, i], arms.into[arm, t, i], arms.starts[arm, t, k]
+            p, v = frame * (start - place), frame * (arms.ends[arm, t, k] - start)
+            found = from_link(arms.shape[arm, i], arms.half[arm, i], p, v, arms.radius[arm, k], search.nearest)
+            search = looked(search, found, found, motion)
+        return search
+
+    @wp.func
+    def to_body(arms: Posed, arm: int, i: int, j: int, motion: real, search: Search):
+        """Search for the least distance of the body from another one."""
+        size, other_size = arms.half[arm, i], arms.half[arm, j]
+        reach = wp.length(size) + wp.length(other_size)
+        search.t = search.first
+        while search.t < search.end:
+            t = search.t
+            d = arms.middle[arm, t, j] - arms.middle[arm, t, i]
+            found = wp.length(d) - reach
+            if found < search.nearest:
+                frame = arms.into[arm, t, i]
+                between, kind, other = (
+                    arms.into[arm, t, j] * wp.transpose(frame),
+                    arms.shape[arm, i],
+                    arms.shape[arm, j],
+                )
+                found = separation(frame * d, kind, size, between, other, other_size, Solids(), 0, search.nearest)
+            search = looked(search, found, found, motion)
+        return search
+
+    @wp.func
+    def to_column(arms: Posed, arm: int, i: int, motion: real, search: Search):
+        """Search for the least distance of the body from the column."""
+        column, kind, size = arms.column[arm], arms.shape[arm, i], arms.half[arm, i]
+        centre = arms.base[arm] - Vector3(zero, zero, column[2])
+        search.t = search.first
+        while search.t < search.end:
+            t = search.t
+            d = arms.middle[arm, t, i] - centre
+            found = signed_distance(wp.static(CYLINDER), d, column) - wp.length(size)
+            if found < search.nearest:
+                frame = arms.into[arm, t, i]
+                found = separation(d, wp.static(CYLINDER), column, frame, kind, size, Solids(), 0, search.nearest)
+            search = looked(search, found, found, motion)
+        return search
+
+    @wp.func
+    def from_arm(arms: Posed, reach: Reach, arm: int, i: int, search: Search):
+        """Search for the least distance of the body from bodies before it, links that it does not join, and the column.
+
+        Tool and payload are parts of the last link: they count from what is not next to it, and not from each other.
+        """
+        dof = arms.motion.shape[1]
+        frame, lever = wp.min(i, dof), lever_of(arms, arm, i, search.first)
+        links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
+        for k in range(i, dof):
+            if arms.radius[arm, k] > zero:
+                if links_between > 0:
+                    search = to_link(arms, arm, i, k, moved(reach, frame, k + 1, zero), search)
+                links_between += 1
+        links_before = int(0)  # noqa: RUF046, UP018
+        n_joints = int(0)  # noqa: RUF046, UP018
+        length = real(0.0)  # [m] along the arm, from the end of link k to tool and payload
+        for back in range(frame):
+            k = frame - 1 - back
+            r = arms.radius[arm, k]
+            if r > zero:
+                # A link whose round end reaches up to the tool always touches it.
+                if links_before > 0 and n_joints > 0 and (i < dof or length > r):
+                    search = to_link(arms, arm, i, k, moved(reach, k + 1, frame, lever), search)
+                length += wp.length(arms.ends[arm, search.first, k] - arms.starts[arm, search.first, k])
+                links_before += 1
+            if arms.motion[arm, k] < wp.static(FIXED):
+                n_joints += 1
+            if arms.shape[arm, k] >= 0 and (i < dof or links_before > 1):
+                search = to_body(arms, arm, k, i, moved(reach, k, frame, lever), search)
+        if arms.column[arm][2] > zero and not is_at_rest(arms, arm, i):
+            search = to_column(arms, arm, i, moved(reach, 0, frame, lever), search)
+        return search
+
+    @wp.func
+    def from_obstacles(arms: Posed, reach: Reach, solids: Solids, arm: int, i: int, search: Search):
+        """Search for the least distance of the body from an obstacle."""
+        kind, size, dof, rests = arms.shape[arm, i], arms.half[arm, i], arms.motion.shape[1], is_at_rest(arms, arm, i)
+        motion = moved(reach, 0, wp.min(i, dof), lever_of(arms, arm, i, search.first))
+        for o in range(solids.shape.shape[0]):
+            search.t = search.first
+            while search.t < search.end:
+                t = search.t
+                # A body at rest is always close to what the arm is mounted on, tool and payload to what they may
+                # touch: only overlaps count, and only what is deeper than allowed.
+                allowed, counts = zero, real(search.nearest)
+                if i >= dof and arms.allowed[t, o] >= zero:
+                    allowed = arms.allowed[t, o]
+                    counts = wp.min(counts, zero)
+                if rests:
+                    counts = wp.min(counts, zero)
+                counts -= allowed
+                place = arms.middle[arm, t, i]
+                at = -(solids.into[o] * (solids.centre[o] - place))
+                found = signed_distance(solids.shape[o], at, solids.half[o]) - wp.length(size)
+                if found < counts:
+                    found = from_obstacle(place, kind, size, arms.into[arm, t, i], solids, o, counts)
+                distance = search.nearest
+                if found < counts:
+                    distance = found + allowed
+                search = looked(search, distance, found, motion)
+        return search
+
+    return SimpleNamespace(from_arm=from_arm, from_obstacles=from_obstacles)

@@ -1,0 +1,165 @@
+"""Warp functions of clearance for links: from each other, from the column and from obstacles.
+
+docs/method.md §13 defines the distances and which pairs count.
+"""
+
+# Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from armwright.kinematics.arms.arm_arrays import FIXED, Precision
+from armwright.kinematics.arms.frame_math import frame_math
+from armwright.kinematics.contact.convex_math import SEGMENT, convex_math
+from armwright.kinematics.contact.solid_math import CYLINDER, MESH, solid_math
+from armwright.kinematics.contact.span_math import span_math
+
+
+@cache
+def link_math(precision: Precision) -> SimpleNamespace:
+    """Return the functions in this precision."""
+    base, solid, spans = frame_math(precision), solid_math(precision), span_math(precision)
+    real, Vector3, Solids, separation = base.real, base.Vector3, solid.Solids, convex_math(precision).separation
+    Posed, Reach, Search, moved, looked = spans.Posed, spans.Reach, spans.Search, spans.moved, spans.looked
+    along_segment, lower_bound, from_link = solid.along_segment, solid.lower_bound, solid.from_link
+    zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
+    tiny, parallel = real(1e-30), real(1e-12)  # the latter is the square of the sine of an angle that is 0 in float32
+
+    @wp.func
+    def to_segment(p: Vector3, a: Vector3, u: Vector3):
+        """Return the squared distance of a point from the segment from a to a + u."""
+        t = wp.clamp(wp.dot(p - a, u) / wp.max(wp.dot(u, u), tiny), zero, one)
+        return wp.length_sq(p - a - t * u)
+
+    @wp.func
+    def between_segments(a: Vector3, u: Vector3, b: Vector3, v: Vector3):
+        """Return the distance between the segments from a to a + u and from b to b + v.
+
+        The nearest points are an end of a segment or the feet of the common perpendicular. The cross product
+        determines the feet well even if the segments are nearly parallel.
+        """
+        square = wp.min(
+            wp.min(to_segment(a, b, v), to_segment(a + u, b, v)),
+            wp.min(to_segment(b, a, u), to_segment(b + v, a, u)),
+        )
+        n = wp.cross(u, v)
+        nn = wp.dot(n, n)
+        if nn > parallel * wp.dot(u, u) * wp.dot(v, v):
+            w = b - a
+            s = wp.clamp(wp.dot(wp.cross(w, v), n) / nn, zero, one)
+            t = wp.clamp(wp.dot(wp.cross(w, u), n) / nn, zero, one)
+            square = wp.min(square, wp.length_sq(w + t * v - s * u))
+        return wp.sqrt(square)
+
+    @wp.func
+    def to_link(arms: Posed, arm: int, i: int, j: int, motion: real, search: Search):
+        """Search for the least distance of link i from link j behind it."""
+        radii = arms.radius[arm, i] + arms.radius[arm, j]
+        search.t = search.first
+        while search.t < search.end:
+            t = search.t
+            a, b = arms.starts[arm, t, i], arms.starts[arm, t, j]
+            u, v = arms.ends[arm, t, i] - a, arms.ends[arm, t, j] - b
+            length, other_length = wp.length(u), wp.length(v)
+            between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
+            for k in range(i + 1, j + 1):
+                start = arms.starts[arm, t, k]
+                between += wp.length(start - arms.ends[arm, t, k - 1])  # displacement of a prismatic joint
+                if k < j:
+                    between += wp.length(arms.ends[arm, t, k] - start)
+            # Parts of the arm that are this near along it cannot be farther apart, so they are excluded.
+            excluded = half * wp.max(two * radii - between, zero)
+            if excluded <= wp.min(length, other_length):
+                u_counted = u * (one - excluded / wp.max(length, tiny))
+                v_excluded = v * (excluded / wp.max(other_length, tiny))
+                found = between_segments(a, u_counted, b + v_excluded, v - v_excluded) - radii
+                search = looked(search, found, found, motion)
+            else:
+                search.t += 1
+        return search
+
+    @wp.func
+    def from_arm(arms: Posed, reach: Reach, arm: int, search: Search):
+        """Search for the least distance of two links, and of a link from the column.
+
+        They are neither neighbours nor rigidly connected; the column counts from links that move, except the first one.
+        """
+        column = arms.column[arm]
+        middle = arms.base[arm] - Vector3(zero, zero, column[2])
+        for i in range(-1, arms.motion.shape[1]):  # -1: the column
+            inner = real(column[2])
+            if i >= 0:
+                inner = arms.radius[arm, i]
+            if inner > zero:
+                links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
+                n_joints = int(0)  # noqa: RUF046, UP018
+                for j in range(i + 1, arms.motion.shape[1]):
+                    if arms.motion[arm, j] < wp.static(FIXED):
+                        n_joints += 1
+                    r = arms.radius[arm, j]
+                    if r > zero:
+                        motion = moved(reach, i + 1, j + 1, zero)
+                        if links_between > 0 and n_joints > 0 and i >= 0:
+                            search = to_link(arms, arm, i, j, motion, search)
+                        elif links_between > 0 and n_joints > 0:
+                            search.t = search.first
+                            while search.t < search.end:
+                                a = arms.starts[arm, search.t, j]
+                                v = arms.ends[arm, search.t, j] - a
+                                found = from_link(wp.static(CYLINDER), column, a - middle, v, r, search.nearest)
+                                search = looked(search, found, found, motion)
+                        links_between += 1
+        return search
+
+    @wp.func
+    def from_axis(p: Vector3, v: Vector3, solids: Solids, o: int, enough: real):
+        """Return the distance of the segment from p to p + v from an obstacle, in the obstacle's frame."""
+        h, shape, size = half * v, solids.shape[o], solids.half[o]
+        if shape == wp.static(MESH):
+            unturned = wp.identity(n=3, dtype=real)
+            return separation(-(p + h), wp.static(SEGMENT), h, unturned, shape, size, solids, o, enough)
+        return along_segment(shape, p, v, size)
+
+    @wp.func
+    def to_obstacle(arms: Posed, solids: Solids, arm: int, j: int, o: int, motion: real, search: Search):
+        """Search for the least distance of link j from an obstacle."""
+        r = arms.radius[arm, j]
+        search.t = search.first
+        while search.t < search.end:
+            a = arms.starts[arm, search.t, j]
+            along = arms.ends[arm, search.t, j] - a
+            foot = real(0.0)  # share of the first link that is its foot, where the arm is mounted
+            if j == 0:
+                foot = two * r / wp.max(wp.length(along), tiny)
+            if foot < one:
+                base = solids.into[o] * (a - solids.centre[o])
+                v = solids.into[o] * along
+                p = base + foot * v
+                v = (one - foot) * v
+                enough = search.nearest + r
+                found = lower_bound(solids.shape[o], p, v, solids.half[o])
+                if found < enough:
+                    found = from_axis(p, v, solids, o, enough)
+                found -= r
+                distance = real(found)
+                if j == 0 and found >= zero:  # noqa: SIM102 (Warp evaluates all operands of `and`)
+                    # The first link is always close to what the arm is mounted on: only overlaps count.
+                    if found < search.nearest and from_axis(base, Vector3(), solids, o, two * r) <= r:
+                        distance = search.nearest
+                search = looked(search, distance, found, motion)
+            else:
+                search.t += 1
+        return search
+
+    @wp.func
+    def from_obstacles(arms: Posed, reach: Reach, solids: Solids, arm: int, search: Search):
+        """Search for the least distance of a link from an obstacle."""
+        for j in range(arms.motion.shape[1]):
+            if arms.radius[arm, j] > zero:
+                for o in range(solids.shape.shape[0]):
+                    search = to_obstacle(arms, solids, arm, j, o, moved(reach, 0, j + 1, zero), search)
+        return search
+
+    return SimpleNamespace(from_arm=from_arm, from_obstacles=from_obstacles)
