@@ -25,9 +25,9 @@ def body_math(precision: Precision) -> SimpleNamespace:
     Posed, Reach, Search, moved, looked = spans.Posed, spans.Reach, spans.Search, spans.moved, spans.looked
     signed_distance, from_link = solid.signed_distance, solid.from_link
     separation, from_obstacle = convex.separation, convex.from_obstacle
-    zero = real(0.0)
+    zero, half = real(0.0), real(0.5)
 
-    @wp.func
+    @wp.func(inline=True)
     def lever_of(arms: Posed, arm: int, i: int, t: int):
         """Return how far the body reaches from the origin of its frame at most [m]."""
         origin = arms.base[arm]
@@ -35,7 +35,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
             origin = arms.ends[arm, t, wp.min(i, arms.motion.shape[1]) - 1]
         return wp.length(arms.middle[arm, t, i] - origin) + wp.length(arms.half[arm, i])
 
-    @wp.func
+    @wp.func(inline=True)
     def is_at_rest(arms: Posed, arm: int, i: int):
         """Return whether no joint moves the body."""
         for j in range(wp.min(i, arms.motion.shape[1])):  # noqa: SIM110 (Warp has no `all`)
@@ -43,19 +43,24 @@ def body_math(precision: Precision) -> SimpleNamespace:
                 return False
         return True
 
-    @wp.func
-    def to_link(arms: Posed, arm: int, i: int, k: int, motion: real, search: Search):
+    @wp.func(inline=True)
+    def to_link(arms: Posed, arm: int, i: int, k: int, length: real, motion: real, search: Search):
         """Search for the least distance of the body from link k."""
+        size, r = arms.half[arm, i], arms.radius[arm, k]
+        reach = wp.length(size) + half * length + r
         search.t = search.first
         while search.t < search.end:
             t = search.t
-            place, frame, start = arms.middle[arm, t, i], arms.into[arm, t, i], arms.starts[arm, t, k]
-            p, v = frame * (start - place), frame * (arms.ends[arm, t, k] - start)
-            found = from_link(arms.shape[arm, i], arms.half[arm, i], p, v, arms.radius[arm, k], search.nearest)
+            place, start, end = arms.middle[arm, t, i], arms.starts[arm, t, k], arms.ends[arm, t, k]
+            found = wp.length(half * (start + end) - place) - reach
+            if found < search.nearest:
+                frame = arms.into[arm, t, i]
+                p, v = frame * (start - place), frame * (end - start)
+                found = from_link(arms.shape[arm, i], size, p, v, r, search.nearest)
             search = looked(search, found, found, motion)
         return search
 
-    @wp.func
+    @wp.func(inline=True)
     def to_body(arms: Posed, arm: int, i: int, j: int, motion: real, search: Search):
         """Search for the least distance of the body from another one."""
         size, other_size = arms.half[arm, i], arms.half[arm, j]
@@ -76,7 +81,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
             search = looked(search, found, found, motion)
         return search
 
-    @wp.func
+    @wp.func(inline=True)
     def to_column(arms: Posed, arm: int, i: int, motion: real, search: Search):
         """Search for the least distance of the body from the column."""
         column, kind, size = arms.column[arm], arms.shape[arm, i], arms.half[arm, i]
@@ -92,7 +97,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
             search = looked(search, found, found, motion)
         return search
 
-    @wp.func
+    @wp.func(inline=True)
     def from_arm(arms: Posed, reach: Reach, arm: int, i: int, search: Search):
         """Search for the least distance of the body from bodies before it, links that it does not join, and the column.
 
@@ -104,7 +109,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
         for k in range(i, dof):
             if arms.radius[arm, k] > zero:
                 if links_between > 0:
-                    search = to_link(arms, arm, i, k, moved(reach, frame, k + 1, zero), search)
+                    search = to_link(arms, arm, i, k, reach.length[k], moved(reach, frame, k + 1, zero), search)
                 links_between += 1
         links_before = int(0)  # noqa: RUF046, UP018
         n_joints = int(0)  # noqa: RUF046, UP018
@@ -115,7 +120,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
             if r > zero:
                 # A link whose round end reaches up to the tool always touches it.
                 if links_before > 0 and n_joints > 0 and (i < dof or length > r):
-                    search = to_link(arms, arm, i, k, moved(reach, k + 1, frame, lever), search)
+                    search = to_link(arms, arm, i, k, reach.length[k], moved(reach, k + 1, frame, lever), search)
                 length += wp.length(arms.ends[arm, search.first, k] - arms.starts[arm, search.first, k])
                 links_before += 1
             if arms.motion[arm, k] < wp.static(FIXED):
@@ -126,7 +131,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
             search = to_column(arms, arm, i, moved(reach, 0, frame, lever), search)
         return search
 
-    @wp.func
+    @wp.func(inline=True)
     def from_obstacles(arms: Posed, reach: Reach, solids: Solids, arm: int, i: int, search: Search):
         """Search for the least distance of the body from an obstacle."""
         kind, size, dof, rests = arms.shape[arm, i], arms.half[arm, i], arms.motion.shape[1], is_at_rest(arms, arm, i)

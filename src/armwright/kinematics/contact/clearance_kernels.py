@@ -63,7 +63,7 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
             arms.middle[arm, t, dof + k] = p + wp.transpose(into) * at_tip.centre[k]
             arms.into[arm, t, dof + k] = at_tip.into[k] * into
 
-    @wp.func
+    @wp.func(inline=True)
     def run_end(arms: Posed, i: int, t: int, end: int):
         """Return the first sample from t to `end` at which body i is not there."""
         if i < arms.unloaded:

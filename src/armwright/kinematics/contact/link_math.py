@@ -53,34 +53,48 @@ def link_math(precision: Precision) -> SimpleNamespace:
             square = wp.min(square, wp.length_sq(w + t * v - s * u))
         return wp.sqrt(square)
 
-    @wp.func
-    def to_link(arms: Posed, arm: int, i: int, j: int, motion: real, search: Search):
+    @wp.func(inline=True)
+    def between_links(
+        arms: Posed, arm: int, t: int, i: int, j: int, a: Vector3, u: Vector3, b: Vector3, v: Vector3, radii: real
+    ):  # fmt: skip
+        """Return the distance of the parts that count of links i and j, from a to a + u and from b to b + v.
+
+        It is infinite if nothing counts.
+        """
+        between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
+        for k in range(i + 1, j + 1):
+            start = arms.starts[arm, t, k]
+            between += wp.length(start - arms.ends[arm, t, k - 1])  # displacement of a prismatic joint
+            if k < j:
+                between += wp.length(arms.ends[arm, t, k] - start)
+        # Parts of the arm that are this near along it cannot be farther apart, so they are excluded.
+        excluded, length, other_length = half * wp.max(two * radii - between, zero), wp.length(u), wp.length(v)
+        if excluded > wp.min(length, other_length):
+            return real(wp.inf)
+        u_counted = u * (one - excluded / wp.max(length, tiny))
+        v_excluded = v * (excluded / wp.max(other_length, tiny))
+        return between_segments(a, u_counted, b + v_excluded, v - v_excluded) - radii
+
+    @wp.func(inline=True)
+    def to_link(arms: Posed, reach: Reach, arm: int, i: int, j: int, motion: real, search: Search):
         """Search for the least distance of link i from link j behind it."""
         radii = arms.radius[arm, i] + arms.radius[arm, j]
+        lengths = reach.length[i] + reach.length[j]
         search.t = search.first
         while search.t < search.end:
             t = search.t
             a, b = arms.starts[arm, t, i], arms.starts[arm, t, j]
             u, v = arms.ends[arm, t, i] - a, arms.ends[arm, t, j] - b
-            length, other_length = wp.length(u), wp.length(v)
-            between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
-            for k in range(i + 1, j + 1):
-                start = arms.starts[arm, t, k]
-                between += wp.length(start - arms.ends[arm, t, k - 1])  # displacement of a prismatic joint
-                if k < j:
-                    between += wp.length(arms.ends[arm, t, k] - start)
-            # Parts of the arm that are this near along it cannot be farther apart, so they are excluded.
-            excluded = half * wp.max(two * radii - between, zero)
-            if excluded <= wp.min(length, other_length):
-                u_counted = u * (one - excluded / wp.max(length, tiny))
-                v_excluded = v * (excluded / wp.max(other_length, tiny))
-                found = between_segments(a, u_counted, b + v_excluded, v - v_excluded) - radii
-                search = looked(search, found, found, motion)
-            else:
-                search.t += 1
+            found = wp.length(b - a + half * (v - u)) - half * lengths - radii
+            distance = real(found)
+            if found < search.nearest:
+                distance = between_links(arms, arm, t, i, j, a, u, b, v, radii)
+                if distance < wp.inf:  # else less may be excluded at the next sample
+                    found = distance
+            search = looked(search, distance, found, motion)
         return search
 
-    @wp.func
+    @wp.func(inline=True)
     def from_arm(arms: Posed, reach: Reach, arm: int, search: Search):
         """Search for the least distance of two links, and of a link from the column.
 
@@ -102,7 +116,7 @@ def link_math(precision: Precision) -> SimpleNamespace:
                     if r > zero:
                         motion = moved(reach, i + 1, j + 1, zero)
                         if links_between > 0 and n_joints > 0 and i >= 0:
-                            search = to_link(arms, arm, i, j, motion, search)
+                            search = to_link(arms, reach, arm, i, j, motion, search)
                         elif links_between > 0 and n_joints > 0:
                             search.t = search.first
                             while search.t < search.end:
@@ -122,7 +136,7 @@ def link_math(precision: Precision) -> SimpleNamespace:
             return separation(-(p + h), wp.static(SEGMENT), h, unturned, shape, size, solids, o, enough)
         return along_segment(shape, p, v, size)
 
-    @wp.func
+    @wp.func(inline=True)
     def to_obstacle(arms: Posed, solids: Solids, arm: int, j: int, o: int, motion: real, search: Search):
         """Search for the least distance of link j from an obstacle."""
         r = arms.radius[arm, j]
@@ -139,21 +153,21 @@ def link_math(precision: Precision) -> SimpleNamespace:
                 p = base + foot * v
                 v = (one - foot) * v
                 enough = search.nearest + r
-                found = lower_bound(solids.shape[o], p, v, solids.half[o])
+                found = lower_bound(solids.shape[o], p, v, solids.half[o], enough)
                 if found < enough:
                     found = from_axis(p, v, solids, o, enough)
                 found -= r
                 distance = real(found)
-                if j == 0 and found >= zero:  # noqa: SIM102 (Warp evaluates all operands of `and`)
+                if j == 0 and found >= zero and found < search.nearest:  # noqa: SIM102 (Warp evaluates both anyway)
                     # The first link is always close to what the arm is mounted on: only overlaps count.
-                    if found < search.nearest and from_axis(base, Vector3(), solids, o, two * r) <= r:
+                    if from_axis(base, Vector3(), solids, o, two * r) <= r:
                         distance = search.nearest
                 search = looked(search, distance, found, motion)
             else:
                 search.t += 1
         return search
 
-    @wp.func
+    @wp.func(inline=True)
     def from_obstacles(arms: Posed, reach: Reach, solids: Solids, arm: int, search: Search):
         """Search for the least distance of a link from an obstacle."""
         for j in range(arms.motion.shape[1]):

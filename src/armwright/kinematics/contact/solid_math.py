@@ -94,13 +94,13 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         return signed_distance(shape, p + half * (low + high) * v, size)
 
     @wp.func
-    def lower_bound(shape: int, p: Vector3, v: Vector3, size: Vector3):
-        """Return a lower bound of the least signed distance on the segment from p to p + v.
+    def lower_bound(shape: int, p: Vector3, v: Vector3, size: Vector3, enough: real):
+        """Return a lower bound of the least signed distance on the segment from p to p + v; one of `enough` will do.
 
         Distance changes by no more than the path length, and rises with each coordinate, except from the ground.
         """
         bound = signed_distance(shape, p + half * v, size) - half * wp.length(v)
-        if shape == wp.static(GROUND):
+        if shape == wp.static(GROUND) or bound >= enough:
             return bound
         low, high = wp.min(p, p + v), wp.max(p, p + v)
         return wp.max(bound, signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size))
@@ -108,7 +108,7 @@ def solid_math(precision: Precision) -> SimpleNamespace:
     @wp.func
     def from_link(shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real, enough: real):
         """Return the distance of a solid from a link with the axis from p to p + v, or a lower bound above `enough`."""
-        bound = lower_bound(shape, p, v, size)
+        bound = lower_bound(shape, p, v, size, enough + radius)
         if bound < enough + radius:
             bound = along_segment(shape, p, v, size)
         return bound - radius

@@ -59,6 +59,7 @@ def span_math(precision: Precision) -> SimpleNamespace:
         """What joints move from one sample of a span to the next, at most; frame j is that before joint j."""
 
         turn: Joints  # of frame j [rad]
+        length: Joints  # of link j [m]
         far: Joints  # length of the arm up to frame j [m]
         shift: Joints  # of frame j by displacements, less the turns times the lengths up to their joints [m]
 
@@ -72,7 +73,7 @@ def span_math(precision: Precision) -> SimpleNamespace:
         nearest: real  # least distance so far [m]
         at: int  # its sample
 
-    @wp.func
+    @wp.func(inline=True)
     def reach_of(arms: Posed, arm: int, first: int, end: int):
         """Return the reach of an arm in samples from `first` to `end`."""
         reach = Reach()
@@ -89,12 +90,14 @@ def span_math(precision: Precision) -> SimpleNamespace:
             elif motion < wp.static(FIXED):
                 far += stroke
                 shift += two * step  # the parts of two links that do not count become shorter as well
+            length = wp.length(arms.offset[arm, j])
+            reach.length[j] = length
             reach.turn[j + 1] = turn
-            reach.far[j + 1] = far + wp.length(arms.offset[arm, j])
+            reach.far[j + 1] = far + length
             reach.shift[j + 1] = shift
         return reach
 
-    @wp.func
+    @wp.func(inline=True)
     def moved(reach: Reach, inner: int, outer: int, lever: real):
         """Return how far a point moves from a sample to the next, at most; it is within `lever` of its frame `outer`.
 
@@ -103,7 +106,7 @@ def span_math(precision: Precision) -> SimpleNamespace:
         turn = reach.turn[outer] - reach.turn[inner]
         return turn * (reach.far[outer] + lever) + reach.shift[outer] - reach.shift[inner]
 
-    @wp.func
+    @wp.func(inline=True)
     def looked(search: Search, distance: real, lower: real, motion: real):
         """Return the search at the next sample to look at.
 
