@@ -28,7 +28,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
     zero, half = real(0.0), real(0.5)
 
     @wp.func(inline=True)
-    def lever_of(arms: Posed, arm: int, i: int, t: int):
+    def lever_of(arms: wp.ref[Posed], arm: int, i: int, t: int):
         """Return how far the body reaches from the origin of its frame at most [m]."""
         origin = arms.base[arm]
         if i > 0:
@@ -36,7 +36,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
         return wp.length(arms.middle[arm, t, i] - origin) + wp.length(arms.half[arm, i])
 
     @wp.func(inline=True)
-    def is_at_rest(arms: Posed, arm: int, i: int):
+    def is_at_rest(arms: wp.ref[Posed], arm: int, i: int):
         """Return whether no joint moves the body."""
         for j in range(wp.min(i, arms.motion.shape[1])):  # noqa: SIM110 (Warp has no `all`)
             if arms.motion[arm, j] < wp.static(FIXED):
@@ -44,7 +44,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
         return True
 
     @wp.func(inline=True)
-    def to_link(arms: Posed, arm: int, i: int, k: int, length: real, motion: real, search: Search):
+    def to_link(arms: wp.ref[Posed], arm: int, i: int, k: int, length: real, motion: real, search: wp.ref[Search]):
         """Search for the least distance of the body from link k."""
         size, r = arms.half[arm, i], arms.radius[arm, k]
         reach = wp.length(size) + half * length + r
@@ -57,11 +57,10 @@ def body_math(precision: Precision) -> SimpleNamespace:
                 frame = arms.into[arm, t, i]
                 p, v = frame * (start - place), frame * (end - start)
                 found = from_link(arms.shape[arm, i], size, p, v, r, search.nearest)
-            search = looked(search, found, found, motion)
-        return search
+            looked(search, found, found, motion)
 
     @wp.func(inline=True)
-    def to_body(arms: Posed, arm: int, i: int, j: int, motion: real, search: Search):
+    def to_body(arms: wp.ref[Posed], arm: int, i: int, j: int, motion: real, search: wp.ref[Search]):
         """Search for the least distance of the body from another one."""
         size, other_size = arms.half[arm, i], arms.half[arm, j]
         reach = wp.length(size) + wp.length(other_size)
@@ -78,11 +77,10 @@ def body_math(precision: Precision) -> SimpleNamespace:
                     arms.shape[arm, j],
                 )
                 found = separation(frame * d, kind, size, between, other, other_size, Solids(), 0, search.nearest)
-            search = looked(search, found, found, motion)
-        return search
+            looked(search, found, found, motion)
 
     @wp.func(inline=True)
-    def to_column(arms: Posed, arm: int, i: int, motion: real, search: Search):
+    def to_column(arms: wp.ref[Posed], arm: int, i: int, motion: real, search: wp.ref[Search]):
         """Search for the least distance of the body from the column."""
         column, kind, size = arms.column[arm], arms.shape[arm, i], arms.half[arm, i]
         centre = arms.base[arm] - Vector3(zero, zero, column[2])
@@ -94,11 +92,10 @@ def body_math(precision: Precision) -> SimpleNamespace:
             if found < search.nearest:
                 frame = arms.into[arm, t, i]
                 found = separation(d, wp.static(CYLINDER), column, frame, kind, size, Solids(), 0, search.nearest)
-            search = looked(search, found, found, motion)
-        return search
+            looked(search, found, found, motion)
 
     @wp.func(inline=True)
-    def from_arm(arms: Posed, reach: Reach, arm: int, i: int, search: Search):
+    def from_arm(arms: wp.ref[Posed], reach: wp.ref[Reach], arm: int, i: int, search: wp.ref[Search]):
         """Search for the least distance of the body from bodies before it, links that it does not join, and the column.
 
         Tool and payload are parts of the last link: they count from what is not next to it, and not from each other.
@@ -109,7 +106,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
         for k in range(i, dof):
             if arms.radius[arm, k] > zero:
                 if links_between > 0:
-                    search = to_link(arms, arm, i, k, reach.length[k], moved(reach, frame, k + 1, zero), search)
+                    to_link(arms, arm, i, k, reach.length[k], moved(reach, frame, k + 1, zero), search)
                 links_between += 1
         links_before = int(0)  # noqa: RUF046, UP018
         n_joints = int(0)  # noqa: RUF046, UP018
@@ -120,19 +117,20 @@ def body_math(precision: Precision) -> SimpleNamespace:
             if r > zero:
                 # A link whose round end reaches up to the tool always touches it.
                 if links_before > 0 and n_joints > 0 and (i < dof or length > r):
-                    search = to_link(arms, arm, i, k, reach.length[k], moved(reach, k + 1, frame, lever), search)
+                    to_link(arms, arm, i, k, reach.length[k], moved(reach, k + 1, frame, lever), search)
                 length += wp.length(arms.ends[arm, search.first, k] - arms.starts[arm, search.first, k])
                 links_before += 1
             if arms.motion[arm, k] < wp.static(FIXED):
                 n_joints += 1
             if arms.shape[arm, k] >= 0 and (i < dof or links_before > 1):
-                search = to_body(arms, arm, k, i, moved(reach, k, frame, lever), search)
+                to_body(arms, arm, k, i, moved(reach, k, frame, lever), search)
         if arms.column[arm][2] > zero and not is_at_rest(arms, arm, i):
-            search = to_column(arms, arm, i, moved(reach, 0, frame, lever), search)
-        return search
+            to_column(arms, arm, i, moved(reach, 0, frame, lever), search)
 
     @wp.func(inline=True)
-    def from_obstacles(arms: Posed, reach: Reach, solids: Solids, arm: int, i: int, search: Search):
+    def from_obstacles(
+        arms: wp.ref[Posed], reach: wp.ref[Reach], solids: wp.ref[Solids], arm: int, i: int, search: wp.ref[Search]
+    ):
         """Search for the least distance of the body from an obstacle."""
         kind, size, dof, rests = arms.shape[arm, i], arms.half[arm, i], arms.motion.shape[1], is_at_rest(arms, arm, i)
         motion = moved(reach, 0, wp.min(i, dof), lever_of(arms, arm, i, search.first))
@@ -157,7 +155,6 @@ def body_math(precision: Precision) -> SimpleNamespace:
                 distance = search.nearest
                 if found < counts:
                     distance = found + allowed
-                search = looked(search, distance, found, motion)
-        return search
+                looked(search, distance, found, motion)
 
     return SimpleNamespace(from_arm=from_arm, from_obstacles=from_obstacles)

@@ -64,7 +64,7 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
             arms.into[arm, t, dof + k] = at_tip.into[k] * into
 
     @wp.func(inline=True)
-    def run_end(arms: Posed, i: int, t: int, end: int):
+    def run_end(arms: wp.ref[Posed], i: int, t: int, end: int):
         """Return the first sample from t to `end` at which body i is not there."""
         if i < arms.unloaded:
             return end
@@ -89,8 +89,9 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
         own.nearest = most
         own.at = start
         reach = reach_of(arms, arm, start, end)
-        free = links_from_obstacles(arms, reach, solids, arm, own)
-        own = links_from_arm(arms, reach, arm, own)
+        free = own
+        links_from_arm(arms, reach, arm, own)
+        links_from_obstacles(arms, reach, solids, arm, free)
         n_bodies = arms.shape.shape[1]
         for i in range(n_bodies + 1):
             for loaded in range(2):
@@ -106,8 +107,8 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
                     free.first = t
                     free.end = own.end
                     if own.end > t:
-                        own = body_from_arm(arms, reach, arm, i, own)
-                        free = body_from_obstacles(arms, reach, solids, arm, i, free)
+                        body_from_arm(arms, reach, arm, i, own)
+                        body_from_obstacles(arms, reach, solids, arm, i, free)
                     t = wp.max(own.end, t + 1)
 
     return SimpleNamespace(

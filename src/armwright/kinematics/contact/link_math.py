@@ -55,7 +55,8 @@ def link_math(precision: Precision) -> SimpleNamespace:
 
     @wp.func(inline=True)
     def between_links(
-        arms: Posed, arm: int, t: int, i: int, j: int, a: Vector3, u: Vector3, b: Vector3, v: Vector3, radii: real
+        arms: wp.ref[Posed], arm: int, t: int, i: int, j: int, a: Vector3, u: Vector3, b: Vector3, v: Vector3,
+        radii: real,
     ):  # fmt: skip
         """Return the distance of the parts that count of links i and j, from a to a + u and from b to b + v.
 
@@ -76,7 +77,9 @@ def link_math(precision: Precision) -> SimpleNamespace:
         return between_segments(a, u_counted, b + v_excluded, v - v_excluded) - radii
 
     @wp.func(inline=True)
-    def to_link(arms: Posed, reach: Reach, arm: int, i: int, j: int, motion: real, search: Search):
+    def to_link(
+        arms: wp.ref[Posed], reach: wp.ref[Reach], arm: int, i: int, j: int, motion: real, search: wp.ref[Search]
+    ):
         """Search for the least distance of link i from link j behind it."""
         radii = arms.radius[arm, i] + arms.radius[arm, j]
         lengths = reach.length[i] + reach.length[j]
@@ -91,11 +94,10 @@ def link_math(precision: Precision) -> SimpleNamespace:
                 distance = between_links(arms, arm, t, i, j, a, u, b, v, radii)
                 if distance < wp.inf:  # else less may be excluded at the next sample
                     found = distance
-            search = looked(search, distance, found, motion)
-        return search
+            looked(search, distance, found, motion)
 
     @wp.func(inline=True)
-    def from_arm(arms: Posed, reach: Reach, arm: int, search: Search):
+    def from_arm(arms: wp.ref[Posed], reach: wp.ref[Reach], arm: int, search: wp.ref[Search]):
         """Search for the least distance of two links, and of a link from the column.
 
         They are neither neighbours nor rigidly connected; the column counts from links that move, except the first one.
@@ -116,19 +118,18 @@ def link_math(precision: Precision) -> SimpleNamespace:
                     if r > zero:
                         motion = moved(reach, i + 1, j + 1, zero)
                         if links_between > 0 and n_joints > 0 and i >= 0:
-                            search = to_link(arms, reach, arm, i, j, motion, search)
+                            to_link(arms, reach, arm, i, j, motion, search)
                         elif links_between > 0 and n_joints > 0:
                             search.t = search.first
                             while search.t < search.end:
                                 a = arms.starts[arm, search.t, j]
                                 v = arms.ends[arm, search.t, j] - a
                                 found = from_link(wp.static(CYLINDER), column, a - middle, v, r, search.nearest)
-                                search = looked(search, found, found, motion)
+                                looked(search, found, found, motion)
                         links_between += 1
-        return search
 
     @wp.func
-    def from_axis(p: Vector3, v: Vector3, solids: Solids, o: int, enough: real):
+    def from_axis(p: Vector3, v: Vector3, solids: wp.ref[Solids], o: int, enough: real):
         """Return the distance of the segment from p to p + v from an obstacle, in the obstacle's frame."""
         h, shape, size = half * v, solids.shape[o], solids.half[o]
         if shape == wp.static(MESH):
@@ -137,7 +138,9 @@ def link_math(precision: Precision) -> SimpleNamespace:
         return along_segment(shape, p, v, size)
 
     @wp.func(inline=True)
-    def to_obstacle(arms: Posed, solids: Solids, arm: int, j: int, o: int, motion: real, search: Search):
+    def to_obstacle(
+        arms: wp.ref[Posed], solids: wp.ref[Solids], arm: int, j: int, o: int, motion: real, search: wp.ref[Search]
+    ):
         """Search for the least distance of link j from an obstacle."""
         r = arms.radius[arm, j]
         search.t = search.first
@@ -162,18 +165,18 @@ def link_math(precision: Precision) -> SimpleNamespace:
                     # The first link is always close to what the arm is mounted on: only overlaps count.
                     if from_axis(base, Vector3(), solids, o, two * r) <= r:
                         distance = search.nearest
-                search = looked(search, distance, found, motion)
+                looked(search, distance, found, motion)
             else:
                 search.t += 1
-        return search
 
     @wp.func(inline=True)
-    def from_obstacles(arms: Posed, reach: Reach, solids: Solids, arm: int, search: Search):
+    def from_obstacles(
+        arms: wp.ref[Posed], reach: wp.ref[Reach], solids: wp.ref[Solids], arm: int, search: wp.ref[Search]
+    ):
         """Search for the least distance of a link from an obstacle."""
         for j in range(arms.motion.shape[1]):
             if arms.radius[arm, j] > zero:
                 for o in range(solids.shape.shape[0]):
-                    search = to_obstacle(arms, solids, arm, j, o, moved(reach, 0, j + 1, zero), search)
-        return search
+                    to_obstacle(arms, solids, arm, j, o, moved(reach, 0, j + 1, zero), search)
 
     return SimpleNamespace(from_arm=from_arm, from_obstacles=from_obstacles)

@@ -74,7 +74,7 @@ def span_math(precision: Precision) -> SimpleNamespace:
         at: int  # its sample
 
     @wp.func(inline=True)
-    def reach_of(arms: Posed, arm: int, first: int, end: int):
+    def reach_of(arms: wp.ref[Posed], arm: int, first: int, end: int):
         """Return the reach of an arm in samples from `first` to `end`."""
         reach = Reach()
         for j in range(arms.motion.shape[1]):
@@ -98,7 +98,7 @@ def span_math(precision: Precision) -> SimpleNamespace:
         return reach
 
     @wp.func(inline=True)
-    def moved(reach: Reach, inner: int, outer: int, lever: real):
+    def moved(reach: wp.ref[Reach], inner: int, outer: int, lever: real):
         """Return how far a point moves from a sample to the next, at most; it is within `lever` of its frame `outer`.
 
         inner: frame that it moves relative to.
@@ -107,7 +107,7 @@ def span_math(precision: Precision) -> SimpleNamespace:
         return turn * (reach.far[outer] + lever) + reach.shift[outer] - reach.shift[inner]
 
     @wp.func(inline=True)
-    def looked(search: Search, distance: real, lower: real, motion: real):
+    def looked(search: wp.ref[Search], distance: real, lower: real, motion: real):
         """Return the search at the next sample to look at.
 
         distance: of a pair, which counts. lower: a lower bound of it whatever counts.  motion: as of `moved`. Depths
@@ -120,6 +120,5 @@ def span_math(precision: Precision) -> SimpleNamespace:
         skipped = (lower - wp.max(search.nearest, zero) - margin) / (motion + rounding)
         if skipped >= one:
             search.t += int(wp.min(skipped, most_samples))
-        return search
 
     return SimpleNamespace(Posed=Posed, Reach=Reach, Search=Search, reach_of=reach_of, moved=moved, looked=looked)
