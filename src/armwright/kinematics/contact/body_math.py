@@ -1,4 +1,4 @@
-"""Warp functions of clearance for the bodies of actuators, tool and payload: from each other and everything else.
+"""Warp functions of clearance for bodies: actuators, column, tool and payload, from each other and everything else.
 
 docs/method.md §13 defines the distances and which pairs count. Bounds exclude distant pairs.
 """
@@ -13,7 +13,7 @@ import warp as wp
 from armwright.kinematics.arms.arm_arrays import FIXED, Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.contact.convex_math import convex_math
-from armwright.kinematics.contact.solid_math import CYLINDER, solid_math
+from armwright.kinematics.contact.solid_math import solid_math
 from armwright.kinematics.contact.span_math import span_math
 
 
@@ -21,24 +21,30 @@ from armwright.kinematics.contact.span_math import span_math
 def body_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision; `arm` and `i` are an arm and its body."""
     base, solid, convex, spans = (make(precision) for make in (frame_math, solid_math, convex_math, span_math))
-    real, Vector3, Solids = base.real, base.Vector3, solid.Solids
+    real, Solids = base.real, solid.Solids
     Posed, Reach, Search, moved, looked = spans.Posed, spans.Reach, spans.Search, spans.moved, spans.looked
     signed_distance, from_link = solid.signed_distance, solid.from_link
     separation, from_obstacle = convex.separation, convex.from_obstacle
     zero, half = real(0.0), real(0.5)
 
     @wp.func(inline=True)
+    def frame_of(arms: wp.ref[Posed], i: int):
+        """Return the joint behind the link that the body is fixed to."""
+        dof = arms.motion.shape[1]
+        return wp.where(i == dof, 0, wp.min(i, dof))
+
+    @wp.func(inline=True)
     def lever_of(arms: wp.ref[Posed], arm: int, i: int, t: int):
         """Return how far the body reaches from the origin of its frame at most [m]."""
-        origin = arms.base[arm]
-        if i > 0:
-            origin = arms.ends[arm, t, wp.min(i, arms.motion.shape[1]) - 1]
+        origin, frame = real(1.0) * arms.base[arm], frame_of(arms, i)
+        if frame > 0:
+            origin = real(1.0) * arms.ends[arm, t, frame - 1]
         return wp.length(arms.middle[arm, t, i] - origin) + wp.length(arms.half[arm, i])
 
     @wp.func(inline=True)
     def is_at_rest(arms: wp.ref[Posed], arm: int, i: int):
         """Return whether no joint moves the body."""
-        for j in range(wp.min(i, arms.motion.shape[1])):  # noqa: SIM110 (Warp has no `all`)
+        for j in range(frame_of(arms, i)):  # noqa: SIM110 (Warp has no `all`)
             if arms.motion[arm, j] < wp.static(FIXED):
                 return False
         return True
@@ -80,52 +86,40 @@ def body_math(precision: Precision) -> SimpleNamespace:
             looked(search, found, found, motion)
 
     @wp.func(inline=True)
-    def to_column(arms: wp.ref[Posed], arm: int, i: int, motion: real, search: wp.ref[Search]):
-        """Search for the least distance of the body from the column."""
-        column, kind, size = arms.column[arm], arms.shape[arm, i], arms.half[arm, i]
-        centre = arms.base[arm] - Vector3(zero, zero, column[2])
-        search.t = search.first
-        while search.t < search.end:
-            t = search.t
-            d = arms.middle[arm, t, i] - centre
-            found = signed_distance(wp.static(CYLINDER), d, column) - wp.length(size)
-            if found < search.nearest:
-                frame = arms.into[arm, t, i]
-                found = separation(d, wp.static(CYLINDER), column, frame, kind, size, Solids(), 0, search.nearest)
-            looked(search, found, found, motion)
-
-    @wp.func(inline=True)
     def from_arm(arms: wp.ref[Posed], reach: wp.ref[Reach], arm: int, i: int, search: wp.ref[Search]):
-        """Search for the least distance of the body from bodies before it, links that it does not join, and the column.
+        """Search for the least distance of the body from links that it does not join, bodies before it and the column.
 
         Tool and payload are parts of the last link: they count from what is not next to it, and not from each other.
         """
         dof = arms.motion.shape[1]
-        frame, lever = wp.min(i, dof), lever_of(arms, arm, i, search.first)
+        frame, lever = frame_of(arms, i), lever_of(arms, arm, i, search.first)
         links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-        for k in range(i, dof):
+        joints_between = int(0)  # noqa: RUF046, UP018
+        for k in range(frame, dof):
+            if arms.motion[arm, k] < wp.static(FIXED):
+                joints_between += 1
             if arms.radius[arm, k] > zero:
-                if links_between > 0:
+                if links_between > 0 and joints_between > 0:
                     to_link(arms, arm, i, k, reach.length[k], moved(reach, frame, k + 1, zero), search)
                 links_between += 1
         links_before = int(0)  # noqa: RUF046, UP018
-        n_joints = int(0)  # noqa: RUF046, UP018
+        joints_before = int(0)  # noqa: RUF046, UP018
         length = real(0.0)  # [m] along the arm, from the end of link k to tool and payload
         for back in range(frame):
             k = frame - 1 - back
             r = arms.radius[arm, k]
             if r > zero:
                 # A link whose round end reaches up to the tool always touches it.
-                if links_before > 0 and n_joints > 0 and (i < dof or length > r):
+                if links_before > 0 and joints_before > 0 and (i < dof or length > r):
                     to_link(arms, arm, i, k, reach.length[k], moved(reach, k + 1, frame, lever), search)
                 length += wp.length(arms.ends[arm, search.first, k] - arms.starts[arm, search.first, k])
                 links_before += 1
             if arms.motion[arm, k] < wp.static(FIXED):
-                n_joints += 1
+                joints_before += 1
             if arms.shape[arm, k] >= 0 and (i < dof or links_before > 1):
                 to_body(arms, arm, k, i, moved(reach, k, frame, lever), search)
-        if arms.column[arm][2] > zero and not is_at_rest(arms, arm, i):
-            to_column(arms, arm, i, moved(reach, 0, frame, lever), search)
+        if arms.shape[arm, dof] >= 0 and not is_at_rest(arms, arm, i):
+            to_body(arms, arm, dof, i, moved(reach, 0, frame, lever), search)
 
     @wp.func(inline=True)
     def from_obstacles(
@@ -133,7 +127,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
     ):
         """Search for the least distance of the body from an obstacle."""
         kind, size, dof, rests = arms.shape[arm, i], arms.half[arm, i], arms.motion.shape[1], is_at_rest(arms, arm, i)
-        motion = moved(reach, 0, wp.min(i, dof), lever_of(arms, arm, i, search.first))
+        motion = moved(reach, 0, frame_of(arms, i), lever_of(arms, arm, i, search.first))
         for o in range(solids.shape.shape[0]):
             search.t = search.first
             while search.t < search.end:

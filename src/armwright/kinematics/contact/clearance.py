@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
-from armwright.kinematics.arms.motor_bodies import bodies_in, without_bodies
+from armwright.kinematics.arms.motor_bodies import NO_BODY, bodies_in, without_bodies
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.devices import Device, cores, load_kernels
 from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
@@ -89,14 +89,15 @@ def _distances(
     offset[np.arange(n), arms.n_joints - 1] -= tool.tip.astype(arms.precision)
     bodies = arms.motor_bodies or bodies_in(without_bodies(n, dof), arms.precision)
     at_tip: Solids = {} if rules is None else rules.solids
-    tip, n_bodies = _stacked(tuple(at_tip.values())), dof + len(at_tip)
+    tip, n_bodies = _stacked(tuple(at_tip.values())), dof + 1 + len(at_tip)
+    column = np.zeros((n, 1, 3)) if arms.columns is None else arms.columns[:, None]
+    stands = np.where(column[..., 2] > 0.0, SHAPES.index("cylinder"), NO_BODY)
     values = {name: getattr(arms, name) for name in ("base", "motion", "axis", "radius")} | {"offset": offset, "q": q}
     values |= {
-        "column": np.zeros((n, 3)) if arms.columns is None else arms.columns,
         "tip": tool.tip,
         "tip_into": np.stack([tool.side, np.cross(tool.axis, tool.side), tool.axis], axis=1),
-        "shape": np.hstack([bodies.shape, np.tile(tip["shape"], (n, 1))]),
-        "half": np.hstack([bodies.half, np.tile(tip["half"], (n, 1, 1))]),
+        "shape": np.hstack([bodies.shape, stands, np.tile(tip["shape"], (n, 1))]),
+        "half": np.hstack([bodies.half, column, np.tile(tip["half"], (n, 1, 1))]),
         "body_axis": bodies.axis,
         "centre": bodies.centre,
         "unloaded": n_bodies - ("payload" in at_tip),

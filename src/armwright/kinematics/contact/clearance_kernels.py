@@ -56,12 +56,14 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
             )
             arms.starts[arm, t, j] = place
             arms.ends[arm, t, j] = p
+        arms.middle[arm, t, dof] = arms.base[arm] - Vector3(zero, zero, arms.half[arm, dof][2])
+        arms.into[arm, t, dof] = wp.identity(n=3, dtype=real)
         tip = arms.tip[arm]
         p += tip[0] * x + tip[1] * y + tip[2] * z
         into = arms.tip_into[arm] * wp.matrix_from_rows(x, y, z)
         for k in range(at_tip.shape.shape[0]):
-            arms.middle[arm, t, dof + k] = p + wp.transpose(into) * at_tip.centre[k]
-            arms.into[arm, t, dof + k] = at_tip.into[k] * into
+            arms.middle[arm, t, dof + 1 + k] = p + wp.transpose(into) * at_tip.centre[k]
+            arms.into[arm, t, dof + 1 + k] = at_tip.into[k] * into
 
     @wp.func(inline=True)
     def run_end(arms: wp.ref[Posed], i: int, t: int, end: int):
@@ -108,7 +110,8 @@ def clearance_kernels(precision: Precision) -> SimpleNamespace:
                     free.end = own.end
                     if own.end > t:
                         body_from_arm(arms, reach, arm, i, own)
-                        body_from_obstacles(arms, reach, solids, arm, i, free)
+                        if i != arms.motion.shape[1]:  # the column stands where it may
+                            body_from_obstacles(arms, reach, solids, arm, i, free)
                     t = wp.max(own.end, t + 1)
 
     return SimpleNamespace(

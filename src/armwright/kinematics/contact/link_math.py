@@ -1,4 +1,4 @@
-"""Warp functions of clearance for links: from each other, from the column and from obstacles.
+"""Warp functions of clearance for links: from each other and from obstacles.
 
 docs/method.md §13 defines the distances and which pairs count.
 """
@@ -13,7 +13,7 @@ import warp as wp
 from armwright.kinematics.arms.arm_arrays import FIXED, Precision
 from armwright.kinematics.arms.frame_math import frame_math
 from armwright.kinematics.contact.convex_math import SEGMENT, convex_math
-from armwright.kinematics.contact.solid_math import CYLINDER, MESH, solid_math
+from armwright.kinematics.contact.solid_math import MESH, solid_math
 from armwright.kinematics.contact.span_math import span_math
 
 
@@ -23,7 +23,7 @@ def link_math(precision: Precision) -> SimpleNamespace:
     base, solid, spans = frame_math(precision), solid_math(precision), span_math(precision)
     real, Vector3, Solids, separation = base.real, base.Vector3, solid.Solids, convex_math(precision).separation
     Posed, Reach, Search, moved, looked = spans.Posed, spans.Reach, spans.Search, spans.moved, spans.looked
-    along_segment, lower_bound, from_link = solid.along_segment, solid.lower_bound, solid.from_link
+    along_segment, lower_bound = solid.along_segment, solid.lower_bound
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
     tiny, parallel = real(1e-30), real(1e-12)  # the latter is the square of the sine of an angle that is 0 in float32
 
@@ -98,34 +98,17 @@ def link_math(precision: Precision) -> SimpleNamespace:
 
     @wp.func(inline=True)
     def from_arm(arms: wp.ref[Posed], reach: wp.ref[Reach], arm: int, search: wp.ref[Search]):
-        """Search for the least distance of two links, and of a link from the column.
-
-        They are neither neighbours nor rigidly connected; the column counts from links that move, except the first one.
-        """
-        column = arms.column[arm]
-        middle = arms.base[arm] - Vector3(zero, zero, column[2])
-        for i in range(-1, arms.motion.shape[1]):  # -1: the column
-            inner = real(column[2])
-            if i >= 0:
-                inner = arms.radius[arm, i]
-            if inner > zero:
+        """Search for the least distance of two links that are neither neighbours nor rigidly connected."""
+        for i in range(arms.motion.shape[1]):
+            if arms.radius[arm, i] > zero:
                 links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
                 n_joints = int(0)  # noqa: RUF046, UP018
                 for j in range(i + 1, arms.motion.shape[1]):
                     if arms.motion[arm, j] < wp.static(FIXED):
                         n_joints += 1
-                    r = arms.radius[arm, j]
-                    if r > zero:
-                        motion = moved(reach, i + 1, j + 1, zero)
-                        if links_between > 0 and n_joints > 0 and i >= 0:
-                            to_link(arms, reach, arm, i, j, motion, search)
-                        elif links_between > 0 and n_joints > 0:
-                            search.t = search.first
-                            while search.t < search.end:
-                                a = arms.starts[arm, search.t, j]
-                                v = arms.ends[arm, search.t, j] - a
-                                found = from_link(wp.static(CYLINDER), column, a - middle, v, r, search.nearest)
-                                looked(search, found, found, motion)
+                    if arms.radius[arm, j] > zero:
+                        if links_between > 0 and n_joints > 0:
+                            to_link(arms, reach, arm, i, j, moved(reach, i + 1, j + 1, zero), search)
                         links_between += 1
 
     @wp.func

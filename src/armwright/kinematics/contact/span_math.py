@@ -31,7 +31,10 @@ def span_math(precision: Precision) -> SimpleNamespace:
 
     @wp.struct
     class Posed:
-        """The links of N arms of up to D joints at T samples, and K bodies: those of D actuators, tool and payload."""
+        """The links of N arms of up to D joints at T samples, and K bodies.
+
+        These are the actuators of D joints, the column (body D), tool and payload.
+        """
 
         base: wp.array(dtype=Vector3)  # (N,) [m]
         motion: wp.array2d(dtype=int)  # (N, D)
@@ -39,10 +42,9 @@ def span_math(precision: Precision) -> SimpleNamespace:
         offset: wp.array2d(dtype=Vector3)  # (N, D) [m]
         q: wp.array3d(dtype=real)  # (N, T, D) [rad] or [m]
         radius: wp.array2d(dtype=real)  # (N, D) [m], 0 for links to ignore
-        column: wp.array(dtype=Vector3)  # (N,) radius, radius, half the length [m], 0 without one
         tip: wp.array(dtype=Vector3)  # (N,) of the tool in the last link's frame [m]
         tip_into: wp.array(dtype=Matrix3)  # (N,) rotation from that frame into the tip frame
-        shape: wp.array2d(dtype=int)  # (N, K)
+        shape: wp.array2d(dtype=int)  # (N, K), below 0 if there is none
         half: wp.array2d(dtype=Vector3)  # (N, K) [m]
         body_axis: wp.array2d(dtype=int)  # (N, D) as of `MotorBodies`
         centre: wp.array2d(dtype=Vector3)  # (N, D) likewise [m]

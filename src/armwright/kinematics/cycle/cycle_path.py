@@ -210,7 +210,7 @@ def _measure(
         errors = _line_errors(group, plan, device, between)
         q = np.concatenate([path.q for path in group.paths], axis=1)
         rules = joined_rules([plan.rules(path.motion, path.share) for path in group.paths])
-        first = np.concatenate([[0], np.cumsum(group.counts)])
+        first = np.cumsum([0, *group.counts])
         clearance, nearest = path_clearances(group.arms, q, first, obstacles, device, rules)
         values[2:4, group.index], worst[group.index, :, 2] = clearance[:, 1], nearest[1] - first[:-1]
         margin = group.arms.limit_distance(q)
