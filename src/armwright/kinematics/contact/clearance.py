@@ -35,7 +35,7 @@ def clearances(
         neither counts.
     most: largest clearance of interest, which greater ones count as; 0 is fast for those who ask for overlaps alone.
     """
-    (_, own), (_, free) = path_clearances(arms, q, np.arange(q.shape[1] + 1), obstacles, device, rules, most)[0]
+    (_, own), (_, free) = path_clearances(arms, q, range(q.shape[1] + 1), obstacles, device, rules, most)[0]
     return own, free
 
 

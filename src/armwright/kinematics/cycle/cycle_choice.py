@@ -186,7 +186,7 @@ def _avoid_collisions(
         change = chosen[:, [samples.first[(b + 1) % n_blocks] for b in range(n_edges)]] - start
         between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)
         q = np.concatenate([chosen, between.reshape(len(index), -1, arms.dof)], axis=1)
-        first = np.concatenate([samples.first, samples.first[-1] + len(share) * np.arange(1, n_edges + 1)])
+        first = [*samples.first, *(samples.first[-1] + len(share) * (edge + 1) for edge in range(n_edges))]
         depth = -path_clearances(part, q, first, obstacles, device, rules, most=0.0)[0][:, 1].min(axis=0)  # (n, B + E)
         in_blocks, in_edges = depth[:, :n_blocks], depth[:, n_blocks:]
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)
