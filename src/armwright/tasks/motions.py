@@ -230,23 +230,20 @@ class CyclePlan:
         return joined_rules([found, *(self.rules(self.motions[index], share) for index in self.joint_motions)])
 
     @cached_property
-    def coarse_spans(self) -> tuple[NDArray[np.intp], NDArray[np.bool_], NDArray[np.intp]]:
-        """Spans of `coarse_rules` that carry the payload or not, each of one block or one joint motion.
-
-        The index of the first sample of each, and their number; whether each carries; and the first of each block and
-        joint motion.
-        """
-        n_edges, lengths = len(self.joint_motions), np.diff(self.sample().first)
-        of = np.repeat(np.arange(len(self.blocks) + n_edges), [*lengths, *[JOINT_STEPS - 1] * n_edges])
-        carries = self.coarse_rules.carries
-        first = np.flatnonzero(np.diff(2 * of + carries, prepend=-1))
-        return np.append(first, len(of)), carries[first], np.flatnonzero(np.diff(of[first], prepend=-1))
+    def coarse_first(self) -> NDArray[np.intp]:
+        """Index of the first sample of each block and of each joint motion in `coarse_rules`, and their number."""
+        first = self.sample().first
+        return np.append(first, first[-1] + (JOINT_STEPS - 1) * np.arange(1, len(self.joint_motions) + 1))
 
     def path_rules(self, counts: tuple[int, ...]) -> TipRules:
-        """Return what holds along all motions, one after another, at so many equally spaced samples of each."""
+        """Return what holds along all motions, one after another, at so many equally spaced samples of each.
+
+        The payload counts as carried everywhere.
+        """
         if counts not in self._path_rules:
             pairs = zip(self.motions, counts, strict=True)
-            self._path_rules[counts] = joined_rules([self.rules(one, np.linspace(0.0, 1.0, n)) for one, n in pairs])
+            rules = joined_rules([self.rules(one, np.linspace(0.0, 1.0, n)) for one, n in pairs])
+            self._path_rules[counts] = replace(rules, carries=np.ones_like(rules.carries))
         return self._path_rules[counts]
 
     @cached_property

@@ -1,7 +1,7 @@
 """Clearance of posed arms from themselves and from obstacles: numpy in, numpy out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -10,35 +10,14 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
-from armwright.kinematics.arms.motor_bodies import bodies_in, without_bodies
+from armwright.kinematics.arms.motor_bodies import NO_BODY, bodies_in, without_bodies
 from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.devices import Device, Loaded, cores, load_kernels
+from armwright.kinematics.devices import Device, cores, load_kernels
 from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
 from armwright.tasks.tip_rules import Solids, TipRules
 
 MAX_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
 SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than they save
-
-
-@dataclass(frozen=True)
-class SpanClearances:
-    """Least clearances of N arms in G spans of postures."""
-
-    least: Array  # (2, 2, N, G) from the arm itself and from obstacles, each without and with the payload [m]
-    at: NDArray[np.int32]  # (2, 2, N, G) index of the posture where it is
-
-    def of(self, source: NDArray[np.intp]) -> "SpanClearances":
-        """Return the clearances of spans that are the same as others; source: (N, G) which ones."""
-        return SpanClearances(*(np.take_along_axis(each, source[None, None], axis=3) for each in (self.least, self.at)))
-
-    def carrying(self, carries: NDArray[np.bool_]) -> tuple[Array, Array, NDArray[np.int32]]:
-        """Return (N, G) self-clearance, obstacle clearance, and the posture of the smaller one.
-
-        carries: (G,) whether the payload is carried.
-        """
-        own, free = np.where(carries, self.least[:, 1], self.least[:, 0])
-        own_at, free_at = np.where(carries, self.at[:, 1], self.at[:, 0])
-        return own, free, np.where(free < own, free_at, own_at)
 
 
 def clearances(
@@ -56,39 +35,38 @@ def clearances(
         neither counts.
     most: largest clearance of interest, which greater ones count as; 0 is fast for those who ask for overlaps alone.
     """
-    each = span_clearances(arms, q, np.arange(q.shape[1] + 1), obstacles, device, rules, most)
-    own, free, _ = each.carrying(np.zeros(q.shape[1], dtype=np.bool_) if rules is None else rules.carries)
+    (_, own), (_, free) = path_clearances(arms, q, range(q.shape[1] + 1), obstacles, device, rules, most)[0]
     return own, free
 
 
-def span_clearances(
-    arms: ArmArrays, q: Array, first: NDArray[np.intp], obstacles: Sequence[Obstacle] = (), device: Device = "cpu",
-    rules: TipRules | None = None, most: float = np.inf, left_out: NDArray[np.bool_] | None = None,
-) -> SpanClearances:  # fmt: skip
-    """Return the least `clearances` in spans of postures, which are steps along a path.
+def path_clearances(
+    arms: ArmArrays, q: Array, first: Sequence[int] | NDArray[np.intp], obstacles: Sequence[Obstacle] = (),
+    device: Device = "cpu", rules: TipRules | None = None, most: float = np.inf,
+    omitted: NDArray[np.bool_] | None = None,
+) -> tuple[Array, NDArray[np.intp]]:  # fmt: skip
+    """Return the smallest `clearances` in G spans of samples q (N, T, D), and the samples where they are.
 
-    first: (G + 1,) index of the first of the T postures of each span, and T.
-    rules: what may be touched at each of the T postures.
-    left_out: (N, G) True for spans that are not measured, whose clearances are `most`.
+    They are (2, 2, N, G): self-clearance and obstacle clearance, without the payload and with it where it is carried.
+    The samples are (2, N, G), of the smaller of both.
+
+    first: (G + 1,) first sample of each span, and T.
+    omitted: (N, G) True for spans that are not measured.
     """
-    n, t, _ = q.shape
-    solids = _solids(tuple(obstacles), arms.precision, device)
-    mask = np.zeros((n, len(first) - 1), dtype=np.bool_) if left_out is None else left_out
-    least, at = np.empty((*mask.shape, 4), dtype=arms.precision), np.empty((*mask.shape, 4), dtype=np.int32)
+    (n, t, _), spans = q.shape, len(first) - 1
+    distances, worst = np.empty((2, 2, n, spans)), np.empty((2, n, spans), dtype=np.intp)
+    solids, at = _solids(tuple(obstacles), arms.precision, device), np.asarray(first, dtype=np.int32)
+    left_out = np.zeros((n, spans), dtype=np.int32) if omitted is None else omitted.astype(np.int32)
 
     def measure(chunk: slice) -> None:
-        part, links = arms[chunk], load_kernels("contact.clearance_kernels", device, arms.precision)
-        posed, motors, at_tip = _bodies(part, q[chunk], first, mask[chunk], rules, links)
-        columns = np.empty((0, 3)) if part.columns is None else part.columns
-        given = (posed, motors, at_tip, solids, columns, links.kernels.real(most))
-        links.launch("measure", mask[chunk].shape, *given, outputs=[least[chunk], at[chunk]])
+        distances[:, :, chunk], worst[:, chunk] = _distances(
+            arms[chunk], q[chunk], at, left_out[chunk], solids, device, rules, most
+        )
 
     size = MAX_CHUNK[device] // t
     if device == "cpu":
         size = min(size, max(-(-n // cores()), SMALLEST_CHUNK // t))
     in_chunks(measure, n, max(1, size), device)
-    found, posture = (np.moveaxis(each, 2, 0).reshape(2, 2, *mask.shape) for each in (least, at))
-    return SpanClearances(found.astype(np.float64), posture)
+    return distances, worst
 
 
 def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
@@ -101,37 +79,41 @@ def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
     return clearances(motors, straight, device=device)[0][:, 0]
 
 
-def _bodies(
-    arms: ArmArrays, q: Array, first: NDArray[np.intp], left_out: NDArray[np.bool_], rules: TipRules | None,
-    links: Loaded,
-) -> tuple[Any, Any, Any]:  # fmt: skip
-    """Return the links of a chunk of arms, their bodies, and tool and payload, as the kernel takes them."""
+def _distances(
+    arms: ArmArrays, q: Array, first: NDArray[np.int32], omitted: NDArray[np.int32], solids: Any, device: Device,
+    rules: TipRules | None, most: float,
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.int32]]:  # fmt: skip
+    """Return what `path_clearances` does of a chunk of arms."""
+    loaded, (n, t, dof), tool = load_kernels("contact.clearance_kernels", device, arms.precision), q.shape, arms.tool
     offset = arms.offset.copy()
-    offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
-    stroke = np.where(arms.prismatic, np.maximum(np.abs(arms.lower), np.abs(arms.upper)), 0.0)
-    values = {name: getattr(arms, name) for name in ("base", "motion", "axis", "radius")} | {"offset": offset, "q": q}
-    values |= {name: links.empty(q.shape, links.kernels.Vector3) for name in ("starts", "ends")}
-    values |= {"reach": np.linalg.norm(offset, axis=2) + stroke, "first": first, "left_out": left_out}
+    offset[np.arange(n), arms.n_joints - 1] -= tool.tip.astype(arms.precision)
+    bodies = arms.motor_bodies or bodies_in(without_bodies(n, dof), arms.precision)
     at_tip: Solids = {} if rules is None else rules.solids
-    bodies = arms.motor_bodies
-    if bodies is None:
-        bodies = bodies_in(without_bodies(len(arms), arms.dof if at_tip else 0), arms.precision)
-    tip, tool = _stacked(tuple(at_tip.values())), arms.tool
-    shape = np.hstack([bodies.shape, np.tile(tip["shape"], (len(arms), 1))])
-    size = (*q.shape[:2], shape.shape[1])
-    body = {
-        "shape": shape,
-        "half": np.hstack([bodies.half, np.tile(tip["half"], (len(arms), 1, 1))]),
-        "axis": bodies.axis,
-        "centre": bodies.centre,
+    tip, n_bodies = _stacked(tuple(at_tip.values())), dof + 1 + len(at_tip)
+    column = np.zeros((n, 1, 3)) if arms.columns is None else arms.columns[:, None]
+    stands = np.where(column[..., 2] > 0.0, SHAPES.index("cylinder"), NO_BODY)
+    values = {name: getattr(arms, name) for name in ("base", "motion", "axis", "radius")} | {"offset": offset, "q": q}
+    values |= {
         "tip": tool.tip,
         "tip_into": np.stack([tool.side, np.cross(tool.axis, tool.side), tool.axis], axis=1),
-        "middle": links.empty(size, links.kernels.Vector3),
-        "into": links.empty(size, links.kernels.Matrix3),
-        "n_lasting": size[2] - ("payload" in at_tip),
+        "shape": np.hstack([bodies.shape, stands, np.tile(tip["shape"], (n, 1))]),
+        "half": np.hstack([bodies.half, column, np.tile(tip["half"], (n, 1, 1))]),
+        "body_axis": bodies.axis,
+        "centre": bodies.centre,
+        "unloaded": n_bodies - ("payload" in at_tip),
+        "carries": np.zeros(t, dtype=np.int32) if rules is None else rules.carries,
         "allowed": np.empty((0, 0)) if rules is None else rules.allowed,
     }
-    return links.struct("Posed", values), links.struct("Motors", body), links.struct("Solids", tip)
+    kernels = loaded.kernels
+    values |= {name: loaded.empty((n, t, dof), kernels.Vector3) for name in ("starts", "ends")}
+    values |= {"middle": loaded.empty((n, t, n_bodies), kernels.Vector3)}
+    values |= {"into": loaded.empty((n, t, n_bodies), kernels.Matrix3)}
+    posed = loaded.struct("Posed", values)
+    loaded.launch("pose", (n, t), posed, loaded.struct("Solids", tip))
+    clearance = np.empty((2, 2, *omitted.shape), dtype=arms.precision)
+    worst = np.empty((2, *omitted.shape), dtype=np.int32)
+    loaded.launch("measure", omitted.shape, posed, solids, first, omitted, most, outputs=(clearance, worst))
+    return clearance, worst
 
 
 @cache

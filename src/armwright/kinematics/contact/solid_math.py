@@ -1,4 +1,4 @@
-"""Warp functions of the signed distance of points and segments from solids, in the frame of the solid; and what moves.
+"""Warp functions of the signed distance of points and segments from solids, in the frame of the solid.
 
 docs/method.md §13 defines the distances.
 """
@@ -26,37 +26,6 @@ def solid_math(precision: Precision) -> SimpleNamespace:
     Vector4 = wp.types.vector(length=4, dtype=real)
     zero, half = real(0.0), real(0.5)
     tiny = real(1e-30)
-
-    @wp.struct
-    class Posed:
-        """The links of N arms of up to D joints in T postures, which G spans divide."""
-
-        base: wp.array(dtype=Vector3)  # (N,) [m]
-        motion: wp.array2d(dtype=int)  # (N, D)
-        axis: wp.array2d(dtype=Vector3)  # (N, D) of the joints
-        offset: wp.array2d(dtype=Vector3)  # (N, D) [m]
-        q: wp.array3d(dtype=real)  # (N, T, D) [rad] or [m]
-        radius: wp.array2d(dtype=real)  # (N, D) [m], 0 for links to ignore
-        starts: wp.array3d(dtype=Vector3)  # (N, T, D) of their axes [m]
-        ends: wp.array3d(dtype=Vector3)  # (N, T, D) [m]
-        reach: wp.array2d(dtype=real)  # (N, D) of a link and the stroke of its joint [m]
-        first: wp.array(dtype=int)  # (G + 1,) index of the first posture of each span, and T
-        left_out: wp.array2d(dtype=wp.bool)  # (N, G) spans that are not measured
-
-    @wp.struct
-    class Motors:
-        """K bodies: those of their D actuators, and behind these tool and payload if they count, the payload last."""
-
-        shape: wp.array2d(dtype=int)  # (N, K)
-        half: wp.array2d(dtype=Vector3)  # (N, K) [m]
-        axis: wp.array2d(dtype=int)  # (N, D) and the two below, as of `MotorBodies`
-        centre: wp.array2d(dtype=Vector3)  # (N, D) [m]
-        tip: wp.array(dtype=Vector3)  # (N,) of the tip frame in that of the last link [m]
-        tip_into: wp.array(dtype=Matrix3)  # (N,) rotation from there into the tip frame
-        middle: wp.array3d(dtype=Vector3)  # (N, T, K) [m]
-        into: wp.array3d(dtype=Matrix3)  # (N, T, K) rotation into the body's frame
-        n_lasting: int  # number of bodies without the payload
-        allowed: wp.array2d(dtype=real)  # (T, O) depth of tool and payload that does not count [m], as of `TipRules`
 
     @wp.struct
     class Solids:
@@ -125,26 +94,26 @@ def solid_math(precision: Precision) -> SimpleNamespace:
         return signed_distance(shape, p + half * (low + high) * v, size)
 
     @wp.func
-    def segment_bound(shape: int, size: Vector3, p: Vector3, v: Vector3):
-        """Return a lower bound of the signed distance of the segment from p to p + v.
+    def lower_bound(shape: int, p: Vector3, v: Vector3, size: Vector3, enough: real):
+        """Return a lower bound of the least signed distance on the segment from p to p + v; one of `enough` will do.
 
         Distance changes by no more than the path length, and rises with each coordinate, except from the ground.
         """
         bound = signed_distance(shape, p + half * v, size) - half * wp.length(v)
-        if shape == wp.static(GROUND):
+        if shape == wp.static(GROUND) or bound >= enough:
             return bound
         low, high = wp.min(p, p + v), wp.max(p, p + v)
         return wp.max(bound, signed_distance(shape, wp.max(low, wp.min(high, Vector3(zero, zero, zero))), size))
 
     @wp.func
     def from_link(shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real, enough: real):
-        """Return the signed distance from a link with the axis from p to p + v, or a lower bound that is enough."""
-        bound = segment_bound(shape, size, p, v) - radius
-        if bound >= enough:
-            return bound
-        return along_segment(shape, p, v, size) - radius
+        """Return the distance of a solid from a link with the axis from p to p + v, or a lower bound above `enough`."""
+        bound = lower_bound(shape, p, v, size, enough + radius)
+        if bound < enough + radius:
+            bound = along_segment(shape, p, v, size)
+        return bound - radius
 
     return SimpleNamespace(
-        real=real, Posed=Posed, Motors=Motors, Solids=Solids, signed_distance=signed_distance,
-        along_segment=along_segment, segment_bound=segment_bound, from_link=from_link,
+        Solids=Solids, signed_distance=signed_distance, along_segment=along_segment, lower_bound=lower_bound,
+        from_link=from_link,
     )  # fmt: skip

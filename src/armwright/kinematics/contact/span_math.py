@@ -1,9 +1,9 @@
-"""Warp functions of how far parts of an arm move from posture to posture of a path: how soon they may be nearer.
+"""Warp functions of searches for the sample of a path at which a pair is nearest.
 
-Relative to an earlier part, no point of a later one moves by more than δ, the sum over the joints between them of a
-joint's largest step times its lever, the length of the arm from there to that point. A pair that is farther apart than
-the least clearance found so far, by g, cannot be nearer within g / δ postures, which are left out (conservative
-advancement: Mirtich, Impulse-based dynamic simulation of rigid body systems, 1996).
+From one sample to the next, no point of the outer part of a pair moves farther, relative to the inner one, than the sum
+of the steps of the joints between them, each times its lever. So a pair whose distance d exceeds the least one found is
+not nearer within (d - least) / motion samples, which are skipped (conservative advancement: Mirtich, Impulse-based
+Dynamic Simulation, 1996).
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -14,55 +14,113 @@ from types import SimpleNamespace
 import warp as wp
 
 from armwright.kinematics.arms.arm_arrays import FIXED, MAX_JOINTS, PRISMATIC, Precision
-from armwright.kinematics.contact.solid_math import solid_math
+from armwright.kinematics.arms.frame_math import frame_math
 
-MARGIN = 1e-5  # [m] for rounding
-MOST = 1e6  # postures at once
+MARGIN = 3e-5  # [m] of distances, for their accuracy and rounding
+ROUNDING = 1e-6  # [m] of motions
 
 
 @cache
 def span_math(precision: Precision) -> SimpleNamespace:
     """Return the functions in this precision."""
-    solid = solid_math(precision)
-    real, Posed, Motors = solid.real, solid.Posed, solid.Motors
-    Steps = wp.types.vector(length=MAX_JOINTS, dtype=real)
-    margin, most, tiny = real(MARGIN), real(MOST), real(1e-12)
+    base = frame_math(precision)
+    real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
+    Joints = wp.types.vector(length=MAX_JOINTS + 1, dtype=real)
+    zero, one, two = real(0.0), real(1.0), real(2.0)
+    margin, rounding, most_samples = real(MARGIN), real(ROUNDING), real(1e6)
 
-    @wp.func
-    def largest_steps(arms: Posed, arm: int, first: int, end: int):
-        """Return the largest step of each joint from one posture of a span to the next."""
-        steps = Steps()
-        for t in range(first + 1, end):
-            for j in range(arms.motion.shape[1]):
-                steps[j] = wp.max(steps[j], wp.abs(arms.q[arm, t, j] - arms.q[arm, t - 1, j]))
-        return steps
+    @wp.struct
+    class Posed:
+        """The links of N arms of up to D joints at T samples, and K bodies.
 
-    @wp.func
-    def travel(arms: Posed, arm: int, steps: Steps, before: int, after: int, extent: real):
-        """Return δ of points within `extent` of the end of the link `after` - 1, relative to the link `before` - 1."""
-        lever, total = extent, real(0.0)
-        for back in range(after - before):
-            j = after - 1 - back
-            lever += arms.reach[arm, j]
-            if arms.motion[arm, j] < wp.static(PRISMATIC):
-                total += steps[j] * lever
-            elif arms.motion[arm, j] < wp.static(FIXED):
-                total += steps[j]
-        return total
+        These are the actuators of D joints, the column (body D), tool and payload.
+        """
 
-    @wp.func
-    def ahead(gap: real, way: real):
-        """Return how many postures ahead a pair may be nearer than now known, which is nearer by a gap [m]."""
-        if gap <= margin:
-            return 1
-        return 1 + int(wp.min((gap - margin) / wp.max(way, tiny), most))
+        base: wp.array(dtype=Vector3)  # (N,) [m]
+        motion: wp.array2d(dtype=int)  # (N, D)
+        axis: wp.array2d(dtype=Vector3)  # (N, D) of the joints
+        offset: wp.array2d(dtype=Vector3)  # (N, D) [m]
+        q: wp.array3d(dtype=real)  # (N, T, D) [rad] or [m]
+        radius: wp.array2d(dtype=real)  # (N, D) [m], 0 for links to ignore
+        tip: wp.array(dtype=Vector3)  # (N,) of the tool in the last link's frame [m]
+        tip_into: wp.array(dtype=Matrix3)  # (N,) rotation from that frame into the tip frame
+        shape: wp.array2d(dtype=int)  # (N, K), below 0 if there is none
+        half: wp.array2d(dtype=Vector3)  # (N, K) [m]
+        body_axis: wp.array2d(dtype=int)  # (N, D) as of `MotorBodies`
+        centre: wp.array2d(dtype=Vector3)  # (N, D) likewise [m]
+        unloaded: int  # number of bodies without the payload, which is the last one
+        carries: wp.array(dtype=int)  # (T,) whether the payload is there
+        allowed: wp.array2d(dtype=real)  # (T, O) depth of tool and payload that does not count [m], as of `TipRules`
+        starts: wp.array3d(dtype=Vector3)  # (N, T, D) of the links' axes [m]
+        ends: wp.array3d(dtype=Vector3)  # (N, T, D) [m]
+        middle: wp.array3d(dtype=Vector3)  # (N, T, K) of the bodies [m]
+        into: wp.array3d(dtype=Matrix3)  # (N, T, K) rotation into the body's frame
 
-    @wp.func
-    def extent(arms: Posed, motors: Motors, arm: int, t: int, i: int):
-        """Return the largest distance of a point of a body from the end of the last link before it [m]."""
-        before, away = wp.min(i, arms.motion.shape[1]), motors.middle[arm, t, i] - arms.base[arm]
-        if before > 0:
-            away = motors.middle[arm, t, i] - arms.ends[arm, t, before - 1]
-        return wp.length(away) + wp.length(motors.half[arm, i])
+    @wp.struct
+    class Reach:
+        """What joints move from one sample of a span to the next, at most; frame j is that before joint j."""
 
-    return SimpleNamespace(Steps=Steps, largest_steps=largest_steps, travel=travel, ahead=ahead, extent=extent)
+        turn: Joints  # of frame j [rad]
+        length: Joints  # of link j [m]
+        far: Joints  # length of the arm up to frame j [m]
+        shift: Joints  # of frame j by displacements, less the turns times the lengths up to their joints [m]
+
+    @wp.struct
+    class Search:
+        """A search over the samples of a span."""
+
+        first: int
+        end: int
+        t: int  # sample to look at
+        nearest: real  # least distance so far [m]
+        at: int  # its sample
+
+    @wp.func(inline=True)
+    def reach_of(arms: wp.ref[Posed], arm: int, first: int, end: int):
+        """Return the reach of an arm in samples from `first` to `end`."""
+        reach = Reach()
+        for j in range(arms.motion.shape[1]):
+            step, stroke, motion = real(0.0), real(0.0), arms.motion[arm, j]
+            for t in range(first, end):
+                stroke = wp.max(stroke, wp.abs(arms.q[arm, t, j]))
+                if t > first:
+                    step = wp.max(step, wp.abs(arms.q[arm, t, j] - arms.q[arm, t - 1, j]))
+            turn, far, shift = reach.turn[j], reach.far[j], reach.shift[j]
+            if motion < wp.static(PRISMATIC):
+                turn += step
+                shift -= step * far
+            elif motion < wp.static(FIXED):
+                far += stroke
+                shift += two * step  # the parts of two links that do not count become shorter as well
+            length = wp.length(arms.offset[arm, j])
+            reach.length[j] = length
+            reach.turn[j + 1] = turn
+            reach.far[j + 1] = far + length
+            reach.shift[j + 1] = shift
+        return reach
+
+    @wp.func(inline=True)
+    def moved(reach: wp.ref[Reach], inner: int, outer: int, lever: real):
+        """Return how far a point moves from a sample to the next, at most; it is within `lever` of its frame `outer`.
+
+        inner: frame that it moves relative to.
+        """
+        turn = reach.turn[outer] - reach.turn[inner]
+        return turn * (reach.far[outer] + lever) + reach.shift[outer] - reach.shift[inner]
+
+    @wp.func(inline=True)
+    def looked(search: wp.ref[Search], distance: real, lower: real, motion: real):
+        """Return the search at the next sample to look at.
+
+        distance: of a pair, which counts. lower: a lower bound of it whatever counts.  motion: as of `moved`. Depths
+        of bodies that overlap may change faster than bodies move, so they are not skipped.
+        """
+        if distance < search.nearest:
+            search.nearest = distance
+            search.at = search.t
+        search.t += 1
+        skipped = (lower - wp.max(search.nearest, zero) - margin) / (motion + rounding)
+        if skipped >= one:
+            search.t += int(wp.min(skipped, most_samples))
+
+    return SimpleNamespace(Posed=Posed, Reach=Reach, Search=Search, reach_of=reach_of, moved=moved, looked=looked)

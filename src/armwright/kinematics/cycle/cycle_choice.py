@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.contact.clearance import span_clearances
+from armwright.kinematics.contact.clearance import path_clearances
 from armwright.kinematics.cycle.costs import BLOCKED, cost_of, joint_speeds
 from armwright.kinematics.cycle.line_following import BlockPaths, IndexArray, follow_lines
 from armwright.kinematics.devices import Device, load_kernels
@@ -143,7 +143,6 @@ def _avoid_collisions(
     share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
     edge, block = np.arange(edges.shape[1]), np.arange(blocks.shape[1])
     following = (edge + 1) % len(block)
-    first, carries, first_of_each = plan.coarse_spans
     best, least = choice.copy(), np.full(len(arms), np.inf)
     free_blocks, free_edges = blocks.copy(), edges.copy()
     for _ in range(ROUNDS if blocks.shape[2] > 1 else 0):
@@ -152,8 +151,8 @@ def _avoid_collisions(
         change = chosen[:, samples.first[following]] - start
         between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)
         q = np.concatenate([chosen, between.reshape(len(index), -1, arms.dof)], axis=1)
-        found = span_clearances(arms[index], q, first, obstacles, device, plan.coarse_rules, most=0.0)
-        depth = np.maximum.reduceat(-np.minimum(*found.carrying(carries)[:2]), first_of_each, axis=1)
+        found, _ = path_clearances(arms[index], q, plan.coarse_first, obstacles, device, plan.coarse_rules, most=0.0)
+        depth = -found[:, 1].min(axis=0)  # (n, B + E)
         in_blocks, in_edges = depth[:, : len(block)], depth[:, len(block) :]
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)
         arm, taken = index[:, None], choice[index]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
-from armwright.kinematics.contact.clearance import span_clearances
+from armwright.kinematics.contact.clearance import path_clearances
 from armwright.kinematics.cycle.costs import ON_LIMIT
 from armwright.kinematics.cycle.cycle_choice import CLOSED, MAX_SLIDE, MAX_STEP, choose_postures
 from armwright.kinematics.cycle.entry_postures import CANDIDATES, entry_postures
@@ -242,17 +242,14 @@ def _measure(
             jumps[index, -1] |= gap > CLOSED
         first = np.concatenate([[0], np.cumsum(counts)])
         q = np.concatenate([path.q for path in group.paths], axis=1)
-        found = span_clearances(
-            group.arms,
-            q,
-            first,
-            obstacles,
-            device,
-            plan.path_rules(group.counts),
-            left_out=group.source != np.arange(m),
-        ).of(group.source)
-        *values[2:4, index], at = found.carrying(carries)
-        worst[2, index] = (at - first[group.source]) / (counts[group.source] - 1)
+        omitted, rules = group.source != np.arange(m), plan.path_rules(group.counts)
+        least, at = path_clearances(group.arms, q, first, obstacles, device, rules, omitted=omitted)
+        least, at = (
+            np.take_along_axis(least, group.source[None, None], 3),
+            np.take_along_axis(at, group.source[None], 2),
+        )
+        values[2:4, index] = np.where(carries, least[:, 1], least[:, 0])
+        worst[2, index] = (np.where(carries, at[1], at[0]) - first[group.source]) / (counts[group.source] - 1)
         for i, errors in _line_errors(group, plan, device, between).items():
             values[:2, index, i] = errors.max(axis=1).T
             worst[:2, index, i] = errors.argmax(axis=1).T / (errors.shape[1] - 1)
@@ -283,19 +280,21 @@ def _look_between(
     ends: (N, M, 2, D) first and last posture of joint motions.  step: (N, M) from one sample to the next, as a share.
     """
     least = clearance.min(axis=0)
-    is_joint, span = [motion.by == "joint" for motion in plan.motions], np.array([0, len(BETWEEN)])
+    is_joint = [motion.by == "joint" for motion in plan.motions]
     place = np.nonzero(is_joint & (least < NEAR) & (least.min(axis=1, keepdims=True) > 0.0))  # P of N, of M
     if not len(place[0]):
         return
     part, (start, end), size = arms[place[0]], ends[place].swapaxes(0, 1)[:, :, None], step[place][:, None]
-    carries = np.array([motion.carries for motion in plan.motions])[place[1], None]
+    carries = np.array([motion.carries for motion in plan.motions])[place[1]]
     rules = plan.rules(plan.motions[int(place[1][0])], np.full(len(BETWEEN), 0.5))
+    rules = replace(rules, carries=np.ones_like(rules.carries))
     for _ in range(ZOOMS):
         size = size / 4.0
         share = np.clip(worst[place][:, None] + size * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (P, S)
         q = start + share[..., None] * (end - start)
-        own, free, at = span_clearances(part, q, span, obstacles, device, rules).carrying(carries)
-        best, found = np.take_along_axis(share, at, axis=1)[:, 0], np.stack([own[:, 0], free[:, 0]])
+        least, at = path_clearances(part, q, (0, len(BETWEEN)), obstacles, device, rules)
+        found, nearest = np.where(carries, least[:, 1, :, 0], least[:, 0, :, 0]), np.where(carries, *at[::-1, :, 0])
+        best = np.take_along_axis(share, nearest[:, None], axis=1)[:, 0]
         worst[place] = np.where(found.min(axis=0) < clearance[:, *place].min(axis=0), best, worst[place])
         clearance[:, *place] = np.minimum(clearance[:, *place], found)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
-from armwright.kinematics.contact.clearance import span_clearances
+from armwright.kinematics.contact.clearance import path_clearances
 from armwright.kinematics.cycle.costs import FAR, cost_of
 from armwright.kinematics.cycle.cycle_choice import DEPTH
 from armwright.kinematics.cycle.line_following import follow_lines
@@ -117,8 +117,8 @@ def _clearance(
     rules = plan.coarse_rules[np.repeat(plan.sample().first[plan.alike[0]], q.shape[2])]
     q, mask = np.where(unfit[..., None], 0.0, q).reshape(len(arms), -1, arms.dof), unfit.reshape(len(arms), -1)
     each = np.arange(q.shape[1] + 1)
-    least = span_clearances(arms, q, each, obstacles, device, rules, most=0.0, left_out=mask)
-    found = np.minimum(*least.carrying(rules.carries)[:2])
+    least, _ = path_clearances(arms, q, each, obstacles, device, rules, most=0.0, omitted=mask)
+    found = least[:, 1].min(axis=0)
     return np.where(unfit, -np.inf, found.reshape(unfit.shape))
 
 
