@@ -94,23 +94,25 @@ def _static_loads(arms: ArmArrays, plan: CyclePlan, q: Array, payload: float, de
     q: (2, N, B, K, D) first and last postures.
     """
     _, n, b, k, dof = q.shape
-    if arms.actuation is None:
-        return np.zeros((n, b, k))
+    loads, drives = np.zeros((n, b, k)), arms.actuation
+    if drives is None:
+        return loads
     motions = [(*block.lines, *plan.joint_motions[max(at - 1, 0) : at + 1]) for at, block in enumerate(plan.blocks)]
     carries = [float(any(plan.motions[index].carries for index in each)) for each in motions]
+    arm, candidate = np.nonzero(~np.isnan(q[0, ..., 0]).all(axis=1))
     torque = solve_postures(
-        arms,
-        np.zeros((2 * b * k, 3)),
+        arms[arm],
+        np.zeros((2 * b, 3)),
         0,
-        initial_q=np.nan_to_num(q.swapaxes(0, 1).reshape(n, -1, dof)),
-        payload=payload * np.tile(np.repeat(carries, k), 2),
+        initial_q=np.nan_to_num(q[:, arm, :, candidate].reshape(len(arm), -1, dof)),
+        payload=payload * np.tile(carries, 2),
         precision=arms.precision,
         device=device,
-    ).torque.reshape(n, 2, b, k, dof)
-    drives = arms.actuation
+    ).torque.reshape(-1, 2, b, dof)
     limit = np.nan_to_num(np.fmin(drives.continuous, drives.peak), nan=np.inf) / drives.safety_factor[:, None]
-    share = (np.abs(torque) / limit[:, None, None, None]).max(axis=-1)
-    return (np.minimum(share, OVERLOAD) ** 4).mean(axis=1)
+    share = (np.abs(torque) / limit[arm, None, None]).max(axis=-1)
+    loads[arm, :, candidate] = (np.minimum(share, OVERLOAD) ** 4).mean(axis=1)
+    return loads
 
 
 def _joint_motions(arms: ArmArrays, plan: CyclePlan, samples: LineSamples, q: Array, device: Device) -> Array:
