@@ -54,7 +54,7 @@ def choose_postures(
     payload: its mass when carried [kg].
     """
     samples, begin = plan.sample(), entry
-    lines = follow_lines(arms, samples, begin, device)
+    lines = _follow_once(arms, plan, samples, begin, device)
     starts, ends = lines.ends(samples)
     for _ in range(LOOPS if plan.is_loop else 0):
         begin = ends
@@ -86,6 +86,20 @@ def choose_postures(
         branches,
         blocked=np.any(costs >= BLOCKED, axis=1),
     )
+
+
+def _follow_once(arms: ArmArrays, plan: CyclePlan, samples: LineSamples, entry: Array, device: Device) -> BlockPaths:
+    """Return what `follow_lines` does; blocks that are alike are followed once, if their candidates are the same."""
+    own, alike = plan.alike
+    pairs = [(block, own[i]) for block, i in enumerate(alike) if block != own[i]]
+    pairs = [pair for pair in pairs if np.array_equal(*entry[:, pair].swapaxes(0, 1), equal_nan=True)]
+    entry = entry.copy()
+    entry[:, [block for block, _ in pairs]] = np.nan
+    lines = follow_lines(arms, samples, entry, device)
+    for block, other in pairs:
+        to, of = (slice(samples.first[b], samples.first[b + 1]) for b in (block, other))
+        lines.q[:, :, to], lines.cost[:, block] = lines.q[:, :, of], lines.cost[:, other]
+    return lines
 
 
 def _static_loads(arms: ArmArrays, plan: CyclePlan, q: Array, payload: float, device: Device) -> Array:
