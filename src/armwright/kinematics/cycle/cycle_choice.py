@@ -55,11 +55,10 @@ def choose_postures(
     """
     samples, begin = plan.sample(), entry
     lines = _follow_once(arms, plan, samples, begin, device)
-    starts, ends = lines.ends(samples)
     for _ in range(LOOPS if plan.is_loop else 0):
-        begin = ends
+        begin = lines.ends(samples)[1]
         lines = follow_lines(arms, samples, begin, device)
-        starts, ends = lines.ends(samples)
+    starts, ends = lines.ends(samples)
     blocks = lines.cost
     if plan.is_loop:
         blocks = blocks + cost_of(np.abs(ends - starts).max(axis=-1) / CLOSED - 1.0)
@@ -91,7 +90,7 @@ def choose_postures(
 def _follow_once(arms: ArmArrays, plan: CyclePlan, samples: LineSamples, entry: Array, device: Device) -> BlockPaths:
     """Return what `follow_lines` does; blocks that are alike are followed once, if their candidates are the same."""
     own, alike = plan.alike
-    pairs = [(block, own[i]) for block, i in enumerate(alike) if block != own[i]]
+    pairs = [(block, own[i]) for block, i in enumerate(alike) if own[i] < block]
     pairs = [pair for pair in pairs if np.array_equal(*entry[:, pair].swapaxes(0, 1), equal_nan=True)]
     entry = entry.copy()
     entry[:, [block for block, _ in pairs]] = np.nan
@@ -154,7 +153,7 @@ def _avoid_collisions(
     index = np.arange(len(arms), dtype=np.intp)
     choice = choose_candidates(blocks, edges, index, device)
     share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
-    edge, block = np.arange(edges.shape[1]), np.arange(blocks.shape[1])
+    edge, block = (np.arange(costs.shape[1], dtype=np.intp) for costs in (edges, blocks))
     following = (edge + 1) % len(block)
     best, least = choice.copy(), np.full(len(arms), np.inf)
     free_blocks, free_edges = blocks.copy(), edges.copy()
