@@ -54,12 +54,11 @@ def choose_postures(
     payload: its mass when carried [kg].
     """
     samples, begin = plan.sample(), entry
-    lines = follow_lines(arms, samples, begin, device)
-    starts, ends = lines.ends(samples)
+    lines = _follow_once(arms, plan, samples, begin, device)
     for _ in range(LOOPS if plan.is_loop else 0):
-        begin = ends
+        begin = lines.ends(samples)[1]
         lines = follow_lines(arms, samples, begin, device)
-        starts, ends = lines.ends(samples)
+    starts, ends = lines.ends(samples)
     blocks = lines.cost
     if plan.is_loop:
         blocks = blocks + cost_of(np.abs(ends - starts).max(axis=-1) / CLOSED - 1.0)
@@ -88,32 +87,48 @@ def choose_postures(
     )
 
 
+def _follow_once(arms: ArmArrays, plan: CyclePlan, samples: LineSamples, entry: Array, device: Device) -> BlockPaths:
+    """Return what `follow_lines` does; blocks that are alike are followed once, if their candidates are the same."""
+    own, alike = plan.alike
+    pairs = [(block, own[i]) for block, i in enumerate(alike) if own[i] < block]
+    pairs = [pair for pair in pairs if np.array_equal(*entry[:, pair].swapaxes(0, 1), equal_nan=True)]
+    entry = entry.copy()
+    entry[:, [block for block, _ in pairs]] = np.nan
+    lines = follow_lines(arms, samples, entry, device)
+    for block, other in pairs:
+        to, of = (slice(samples.first[b], samples.first[b + 1]) for b in (block, other))
+        lines.q[:, :, to], lines.cost[:, block] = lines.q[:, :, of], lines.cost[:, other]
+    return lines
+
+
 def _static_loads(arms: ArmArrays, plan: CyclePlan, q: Array, payload: float, device: Device) -> Array:
     """Return (N, B, K) fourth powers of the largest share of a continuous torque at rest, the mean of a block's ends.
 
     q: (2, N, B, K, D) first and last postures.
     """
     _, n, b, k, dof = q.shape
-    if arms.actuation is None:
-        return np.zeros((n, b, k))
+    loads, drives = np.zeros((n, b, k)), arms.actuation
+    if drives is None:
+        return loads
     motions = [(*block.lines, *plan.joint_motions[max(at - 1, 0) : at + 1]) for at, block in enumerate(plan.blocks)]
     carries = [float(any(plan.motions[index].carries for index in each)) for each in motions]
-    anywhere = plan.poses[[0] * (2 * b * k)]
+    arm, candidate = np.nonzero(~np.isnan(q[0, ..., 0]).all(axis=1))
+    anywhere = plan.poses[[0] * (2 * b)]
     torque = solve_postures(
-        arms,
+        arms[arm],
         anywhere.position,
         0,
-        initial_q=np.nan_to_num(q.swapaxes(0, 1).reshape(n, -1, dof)),
-        payload=payload * np.tile(np.repeat(carries, k), 2),
+        initial_q=np.nan_to_num(q[:, arm, :, candidate].reshape(len(arm), -1, dof)),
+        payload=payload * np.tile(carries, 2),
         target_arrays=anywhere.arrays,
         precision=arms.precision,
         device=device,
         motions=arms.general_motions,
-    ).torque.reshape(n, 2, b, k, dof)
-    drives = arms.actuation
+    ).torque.reshape(-1, 2, b, dof)
     limit = np.nan_to_num(np.fmin(drives.continuous, drives.peak), nan=np.inf) / drives.safety_factor[:, None]
-    share = (np.abs(torque) / limit[:, None, None, None]).max(axis=-1)
-    return (np.minimum(share, OVERLOAD) ** 4).mean(axis=1)
+    share = (np.abs(torque) / limit[arm, None, None]).max(axis=-1)
+    loads[arm, :, candidate] = (np.minimum(share, OVERLOAD) ** 4).mean(axis=1)
+    return loads
 
 
 def _joint_motions(arms: ArmArrays, plan: CyclePlan, samples: LineSamples, q: Array, device: Device) -> Array:
@@ -141,7 +156,7 @@ def _avoid_collisions(
     index = np.arange(len(arms), dtype=np.intp)
     choice = choose_candidates(blocks, edges, index, device)
     share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
-    edge, block = np.arange(edges.shape[1]), np.arange(blocks.shape[1])
+    edge, block = (np.arange(costs.shape[1], dtype=np.intp) for costs in (edges, blocks))
     following = (edge + 1) % len(block)
     best, least = choice.copy(), np.full(len(arms), np.inf)
     free_blocks, free_edges = blocks.copy(), edges.copy()

@@ -63,9 +63,6 @@ def entry_postures(
     q = np.take_along_axis(q, nearest[..., :REFINED, None], axis=2)
     q, off = _solve(arms, poses, q, IMAGE_UPDATES, device)
     unfit = (off > NEARLY) & (off > off.min(axis=2, keepdims=True))
-    fit_first = np.argsort(unfit, axis=2, kind="stable")[..., : (~unfit).sum(axis=2).max()]
-    q = np.take_along_axis(q, fit_first[..., None], axis=2)
-    off, unfit = np.take_along_axis(off, fit_first, axis=2), np.take_along_axis(unfit, fit_first, axis=2)
     clearance = _clearance(arms, plan, obstacles, q, unfit, device)
     start = _colliding_branches(arms, poses, q, clearance, device)
     if start.shape[2]:

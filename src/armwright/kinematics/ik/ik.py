@@ -36,7 +36,7 @@ LANES: dict[Device, int] = {"cpu": 8, "cuda": 1}  # targets that a thread solves
 FEW_LANES = 2  # for so few remaining targets of many arms: half the time of 8 lanes, and the same bits
 MANY_ARMS = 1000  # for fewer arms compiling that variant costs more than it saves
 BUFFERED_ARMS = 256  # chunks up to this size reuse buffers: allocating them takes as long as solving a hundred arms
-MAX_BUFFERS = 32  # per thread; the number of candidates of a cycle differs from chunk to chunk
+MAX_BUFFERS = 8  # per thread
 SMALLEST_CHUNK = 32  # groups of targets; smaller chunks cost a thread more time than they save
 MAX_CHUNK: dict[Device, int] = {"cpu": 2**22, "cuda": 2**30}  # [bytes]: the cache of a core; memory of any GPU
 
