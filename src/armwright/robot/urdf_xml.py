@@ -176,7 +176,7 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
         raise ArmError(f"{of} has an axis of no length: {direction.tolist()}")
     limit, mimic = element.find("limit"), element.find("mimic")
     values = [_number(limit, key, of) for key in _LIMITS]
-    law = (_number(mimic, key, of, default) for key, default in (("multiplier", 1.0), ("offset", 0.0)))
+    law = {key: _number(mimic, key, of, default) for key, default in (("multiplier", 1.0), ("offset", 0.0))}
     ends = [element.find(end) for end in ("parent", "child")]
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
     return UrdfJoint(
@@ -188,8 +188,8 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
         tuple(_angles(element.find("origin"), of)),
         direction / (length if length > 0.0 else 1.0),
         *values,
-        None if mimic is None else mimic.get("joint", ""),
-        *law,
+        mimics=None if mimic is None else mimic.get("joint", ""),
+        **law,
     )
 
 

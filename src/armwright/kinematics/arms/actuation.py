@@ -110,10 +110,9 @@ def actuation_of(arms: Sequence[Arm], travel: Array) -> Actuation | None:
     prices = np.zeros(len(arms))
     for i, arm in enumerate(arms):
         for j, joint in enumerate(arm.joints):
-            if joint.kind == "fixed":
-                continue
             if joint.coupling is not None:
                 ratings[i, j, -3:] = np.nan  # what its bearings carry is not known
+            if joint.kind == "fixed" or joint.coupling is not None:
                 continue
             if joint.actuator is None:
                 return None
