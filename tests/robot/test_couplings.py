@@ -13,7 +13,9 @@ from armwright.exceptions import ArmError
 from armwright.existing.base_placement import placed
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.kinematics.arms.forward import forward_kinematics, jacobian_of
+from armwright.kinematics.cycle.torque_terms import inertia_matrices
 from armwright.kinematics.ik.solve import solve
+from armwright.kinematics.reach.compliance import Stiffness, tip_displacements, unit_payload
 from armwright.kinematics.reach.payload_limits import torques_by_payload
 from armwright.kinematics.reach.reach_map import reach_map
 from armwright.problem.evaluation import evaluate
@@ -28,8 +30,8 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.sheet.urdf_sheet import urdf_sheet
 from armwright.spaces.design_space import default_space
 from armwright.tasks.catalogue import load_task
-from tests.support.robots import any_arm, with_frames_anyhow
-from tests.support.urdf_peers import seen_by_kernels
+from tests.support.robots import any_arm, robot, with_frames_anyhow
+from tests.support.urdf_peers import differences, random_states, seen_by_kernels, seen_by_pinocchio
 
 Array = np.ndarray
 N = 7  # joints of the chain
@@ -82,6 +84,16 @@ def path(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
 
 def read(path: Path) -> UrdfArm:
     return read_urdf(path, tip=f"l{N}")
+
+
+@pytest.mark.parametrize(("name", "tip"), [("romeo", "LFinger13Link"), ("pr2", "r_gripper_l_finger_tip_link")])
+def test_fingers_of_real_robots_agree_with_pinocchio(name: str, tip: str) -> None:
+    file = robot(name)
+    arm = read_urdf(file, tip)
+    assert arm.arm.couplings
+    states = random_states(arm.arm, 20, 0)
+    off = differences(seen_by_kernels(arm.arm, states), seen_by_pinocchio(file, arm, states))
+    assert max(off.values()) < 1e-9
 
 
 class Reduced:
@@ -217,7 +229,7 @@ def test_limits_speeds_and_drive_are_those_of_both(tmp_path: Path) -> None:
     assert (leader.lower, leader.upper) == pytest.approx((-2.0, 1.4))
     assert leader.speed == pytest.approx(1.2)
     assert (leader.effort, follower.effort, follower.actuator) == (90.0, None, None)
-    assert "joint_2 = 0.5 joint_4 + 0.2, so the drive of joint_4 moves both" in arm.notes
+    assert "joint_2 = 0.5 joint_4 +0.2, so the drive of joint_4 moves both" in arm.notes
     drives = stack_arms([arm.arm]).actuation
     assert drives is not None
     assert drives.peak.tolist() == [[90.0, np.inf, *[90.0] * 5]]
@@ -228,7 +240,7 @@ def test_limits_speeds_and_drive_are_those_of_both(tmp_path: Path) -> None:
 REFUSED = {
     "another chain": (
         {"joint_4": ("finger", 1.0, 0.0)},
-        '"joint_4" mimics "finger" and moves 1 times "finger"; expected',
+        '"joint_4" mimics "finger", moving 1 times as far; expected',
     ),
     "a cycle": (
         {"joint_4": ("joint_2", 1.0, 0.0), "joint_2": ("joint_4", 1.0, 0.0)},
@@ -238,9 +250,9 @@ REFUSED = {
     "nothing": ({"joint_4": ("joint_44", 1.0, 0.0)}, "expected an independent joint of the chain"),
     "no motion": (
         {"joint_4": ("joint_2", 0.0, 0.4)},
-        "moves 0 times .*not 0 times; for the part before it, try --tip l3",
+        "moving 0 times as far; .*not 0 times; for the part before it, try --tip l3",
     ),
-    "a fixed joint": ({"joint_4": ("plate", 2.0, 0.4)}, 'moves 2 times "plate"'),
+    "a fixed joint": ({"joint_4": ("plate", 2.0, 0.4)}, 'mimics "plate", moving 2 times'),
     "far limits": (
         {"joint_4": ("joint_2", 1.0, 9.0)},
         'limits of "joint_2" and "joint_4", which mimics it, exclude',
@@ -345,18 +357,35 @@ def test_coupled_arm_on_a_task(path: Path) -> None:
     moved[:, one.leader] += 1e-6
     rises = 1e6 * (forward_kinematics(evaluation.arms, moved[None]).tip - evaluation.frames.tip)[0]
     assert evaluation.jacobian[0, :, :, one.leader] == pytest.approx(rises, abs=1e-4)
+    c = evaluation.arms.by_independent(np.eye(N)[None])[0]
+    masses = inertia_matrices(evaluation.arms, evaluation.q, np.zeros(len(q)), 0.0)[0]
+    assert evaluation.motor_inertia[0] == pytest.approx(c.T @ masses @ c, abs=1e-6)
     sheet = urdf_sheet(arm)
     line = sheet.joints[j]
     assert (line.actuator, line.torque, line.peak_torque) == (f"that of {arm.joints[one.leader]}", None, None)
     assert sheet.over_reach[-1].distance > 0.3
     assert any(each.payload for each in sheet.over_reach)
     cycle = load_task("desk-sorting")
-    with pytest.raises(ArmError, match=f'coupled: joint "{arm.joints[j]}" follows another; paths of cycles'):
+    with pytest.raises(ArmError, match=f'coupled: "{arm.joints[j]}" mimics a joint; paths of cycles'):
         placed(Problem(cycle, default_space(cycle.name)), arm, 0)
     with pytest.raises(ArmError, match="joints that follow others; paths of cycles"):
         evaluate(arm.arm, cycle)
     with pytest.raises(ArmError, match="servos are not modelled"):
         task_mjcf(arm.arm, task)
+
+
+def test_drives_that_yield_move_the_tip_by_the_joints_that_they_hold(path: Path) -> None:
+    """A payload of 1 kg lowers the tip by J K⁻¹ Jᵀ F."""
+    arm = read(path)
+    theirs, (q, v, a) = Reduced(path, arm), states_of(arm, 5, 6)
+    arrays, keep = stack_arms([arm.arm], "float64"), theirs.columns
+    frames, soft = forward_kinematics(arrays, q[None]), np.full((1, N), np.inf)
+    soft[0, keep] = np.random.default_rng(0).uniform(10.0, 50.0, len(keep))
+    rigid = np.full((1, N), np.inf)
+    moved = tip_displacements(arrays, frames, unit_payload(arrays, frames), Stiffness(rigid, rigid, soft))[0]
+    for row, s, sd, sdd in zip(moved, q[:, keep], v[:, keep], a[:, keep], strict=True):
+        jacobian = theirs.seen(s, sd, sdd)[-1]
+        assert row == pytest.approx(jacobian @ (jacobian.T @ [0.0, 0.0, -9.81] / soft[0, keep]), abs=1e-9)
 
 
 def test_reach_of_a_coupled_arm_is_that_of_its_postures(path: Path) -> None:

@@ -145,7 +145,7 @@ def _couple(joints: list[Joint], moving: Sequence[UrdfJoint], tree: "_LinkTree")
             drive = replace(drive, speed=min(drive.speed or math.inf, joint.speed / abs(factor)))
         joints[k] = replace(joints[k], lower=low, upper=high, actuator=drive)
         joints[i] = replace(joints[i], actuator=None, coupling=coupling)
-        yield f"{joint.name} = {factor:g} {name} + {coupling.offset:g}, so the drive of {name} moves both"
+        yield f"{joint.name} = {factor:g} {name} {coupling.offset:+g}, so the drive of {name} moves both"
 
 
 def _coupling(joint: UrdfJoint, moving: Sequence[UrdfJoint], tree: "_LinkTree") -> Coupling:
@@ -158,8 +158,8 @@ def _coupling(joint: UrdfJoint, moving: Sequence[UrdfJoint], tree: "_LinkTree") 
         leader = by_name.get(leader.mimics, leader)
     if leader.name in passed or leader.name not in names or factor == 0.0:
         raise ArmError(
-            f'{tree.where}: joint "{joint.name}" mimics "{joint.mimics}" and moves {factor:g} times "{leader.name}"; '
-            f"expected an independent joint of the chain, not 0 times; for the part before it, try --tip {joint.parent}"
+            f'{tree.where}: joint "{joint.name}" mimics "{joint.mimics}", moving {factor:g} times as far; expected an '
+            f"independent joint of the chain, and not 0 times; for the part before it, try --tip {joint.parent}"
         )
     return Coupling(names.index(leader.name), factor, offset)
 

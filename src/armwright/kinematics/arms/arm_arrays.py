@@ -189,12 +189,16 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
     lower *= -1.0
     mass, radius = np.zeros((2, n, dof))
     stiffness = np.full((2, n, dof), np.inf)  # bending and torsional
-    offset, com, axis = np.zeros((3, n, dof, 3))
+    offset, com, axis, couplings = np.zeros((4, n, dof, 3))
+    followers = [arm.couplings for arm in arms]
+    if any(followers):
+        couplings[..., 0], couplings[..., 1] = np.arange(dof), 1.0
     bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,), (3, 3))))
     for i, arm in enumerate(arms):
         own = slice(len(arm.joints))
-        is_coupled = bool(arm.couplings)
-        motion[i, own] = [_motion(joint, is_coupled) for joint in arm.joints]
+        for j, one in followers[i]:
+            couplings[i, j] = one.leader, one.factor, one.offset
+        motion[i, own] = [_motion(joint, bool(followers[i])) for joint in arm.joints]
         axis[i, own] = [joint.direction for joint in arm.joints]
         lower[i, own] = [-1.0 if joint.kind == "fixed" else joint.lower for joint in arm.joints]
         upper[i, own] = [1.0 if joint.kind == "fixed" else joint.upper for joint in arm.joints]
@@ -227,7 +231,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         base_mass=np.array([arm.standing_mass for arm in arms]),
         structure_price=np.array([arm.structure_price for arm in arms]),
         bodies=bodies,
-        couplings=_couplings(arms, dof, precision),
+        couplings=couplings.astype(precision) if any(followers) else None,
         no_mass=np.array(no_mass) if any(no_mass) else None,
         actuation=actuation_of(arms, travel),
         motor_bodies=stack_bodies(arms, dof, precision),
@@ -306,17 +310,6 @@ def _check(arm: Arm) -> None:
             raise ArmError(
                 f"joint {number}: limits [{joint.lower:g}, {joint.upper:g}] rad are outside [-2π, 2π]; narrow them"
             )
-
-
-def _couplings(arms: Sequence[Arm], dof: int, precision: Precision) -> Floats | None:
-    """Return `ArmArrays.couplings`."""
-    if not any(arm.couplings for arm in arms):
-        return None
-    found = np.stack(np.broadcast_arrays(np.arange(dof), 1.0, np.zeros((len(arms), dof))), axis=-1)
-    for i, arm in enumerate(arms):
-        for j, coupling in arm.couplings:
-            found[i, j] = coupling.leader, coupling.factor, coupling.offset
-    return found.astype(precision)
 
 
 def _stiffness(link: Link) -> tuple[float, float]:
