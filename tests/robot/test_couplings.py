@@ -237,6 +237,18 @@ def test_limits_speeds_and_drive_are_those_of_both(tmp_path: Path) -> None:
     assert (read(file).arm.joints[2].lower, read(file).arm.joints[2].upper) == pytest.approx((-0.3, 1.0))
 
 
+def test_bar_that_follows_the_arm_beside_it_is_stated(tmp_path: Path) -> None:
+    bar = (
+        '<link name="bar"/><joint name="rocker" type="revolute"><parent link="l2"/><child link="bar"/><limit '
+        'lower="-1" upper="1"/><mimic joint="joint_3" multiplier="-1"/></joint>'
+    )
+    file = tmp_path / "arm.urdf"
+    file.write_text(urdf_of(PARALLELOGRAM).replace("</robot>", f"{bar}</robot>"), encoding="utf-8")
+    arm = read(file)
+    assert arm.notes[0].endswith("left out, at 0: rocker")
+    assert "joints that mimic those of the chain, but stay at 0 with their masses: rocker" in arm.notes
+
+
 REFUSED = {
     "another chain": (
         {"joint_4": ("finger", 1.0, 0.0)},
@@ -265,7 +277,7 @@ REFUSED = {
 def test_couplings_that_cannot_be_computed_are_refused(tmp_path: Path, name: str) -> None:
     mimics, words = REFUSED[name]
     more = (  # a finger and a plate at the end
-        '<link name="f"/><joint name="finger" type="revolute"><parent link="l7"/><child link="f"/><limit lower="-1" '
+        '<link name="f"/><joint name="finger" type="revolute"><parent link="l7"/><child link="f"/><limit '
         'upper="1"/></joint><link name="p"/><joint name="plate" type="fixed"><parent link="l7"/><child link="p"/>'
         "</joint>"
     )

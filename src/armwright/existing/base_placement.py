@@ -69,10 +69,8 @@ def placed(problem: Problem, described: UrdfArm, seed: int, mounting: Mounting |
     """
     if seed < 0:
         raise SettingsError(f"seed: expected a whole number of at least 0, got {seed}")
-    if described.arm.couplings and problem.task.cycle is not None:
-        raise ArmError(
-            f'{described.name}: "{described.joints[described.arm.couplings[0][0]]}" mimics a joint; {NO_CYCLE}'
-        )
+    if (coupled := described.arm.couplings) and problem.task.cycle is not None:
+        raise ArmError(f'{described.name}: "{described.joints[coupled[0][0]]}" mimics a joint; {NO_CYCLE}')
     arm = with_tool(with_travel(described.arm, problem.space.travel), problem.task.tool)
     equipped = replace(described, arm=replace(arm, safety_factor=problem.space.safety_factor))
     if mounting is not None:

@@ -176,6 +176,8 @@ def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, chain
         f'the axes of the world are those of "{tree.root}"; gravity points along ({down}) in the frame of "{base}"',
     ]
     short = [f"{angle:g} at {joint.name}" for joint in chain for angle in joint.rpy if _is_cut_off(angle)]
+    if beside := [joint.name for joint in tree.below(base) if joint.name in others and joint.mimics in moving]:
+        notes.append(f"joints that mimic those of the chain, but stay at 0 with their masses: {', '.join(beside)}")
     if short:
         notes.append(f"right angles or π with too few digits are used as written: {', '.join(short)}")
     return notes
