@@ -132,5 +132,10 @@ def test_doubtful_ends_are_not_guessed(tmp_path: Path, joints: tuple[tuple, ...]
 
 
 def test_last_joint_that_is_coupled_to_the_arm_belongs_to_it(tmp_path: Path) -> None:
-    with pytest.raises(ArmError, match='"j4" mimics "j3"; between base and tip each joint must move independently'):
-        read(tmp_path, *ARM, ("j4", "l3", "l4", Y, TURN, "j3"))
+    found = read(tmp_path, *ARM, ("j4", "l3", "l4", Y, TURN, "j3"))
+    assert (found.tip, found.joints[-1]) == ("l4", "j4")
+    assert "j4 = 1 j3 +0, so the drive of j3 moves both" in found.notes
+    further = read(
+        tmp_path, *ARM, ("gripper", "l3", "l4", Y, TURN, "j2"), ("j5", "l4", "l5", Z, TURN), ("t", "l5", "tool0")
+    )
+    assert further.joints[-2:] == ("gripper", "j5")

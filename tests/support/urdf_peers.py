@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio
@@ -36,17 +37,24 @@ def random_states(arm: Arm, n: int, seed: int) -> Array:
 
 def seen_by_kernels(arm: Arm, states: Array, payload: float = 0.0, precision: Precision = "float64") -> Seen:
     arrays, (q, v, a) = stack_arms([arm], precision), states[:, None]
-    n = q.shape[1]
+    n, all_by_independent = q.shape[1], arrays.by_independent(np.eye(len(arm.joints))[None])[0]
+    q, v, a = arrays.coupled(q), v @ all_by_independent.T, a @ all_by_independent.T
     held = solve_postures(arrays, np.zeros((n, 3)), 0, initial_q=q, payload=np.full(n, payload), precision=precision)
     frames, loads = forward_kinematics(arrays, q).rotation[0, :, -1], np.full(n, payload)
     z, x = arrays.tool_axis[0], arrays.tool_side[0]
-    torque = inverse_dynamics(arrays, q, v, a, loads)[0]
-    inertia = inertia_matrices(arrays, q, loads, 1.0)[0]
+    torque = arrays.by_independent(inverse_dynamics(arrays, q, v, a, loads))[0]
+    inertia = arrays.by_independent(inertia_matrices(arrays, q, loads, 1.0))
+    inertia = arrays.by_independent(inertia.swapaxes(-1, -2))[0]
     return Seen(held.reached[0], frames @ np.column_stack([x, np.cross(z, x), z]), held.torque[0], torque, inertia)
 
 
 def seen_by_pinocchio(path: Path, read: UrdfArm, states: Array, payload: float = 0.0) -> Seen:
-    """The whole file, with other joints at 0; the payload is a point at the tip."""
+    """The whole file, with other joints at 0; the payload is a point at the tip.
+
+    Joints that mimic others have the values that those give them; torques and inertia are by the independent ones, 0
+    for others.
+    """
+    c, o = _mimicry(path, read)
     model = pinocchio.buildModelFromUrdf(str(path))
     frame = model.getFrameId(read.tip, pinocchio.FrameType.BODY)
     at_tip = model.frames[frame]
@@ -55,7 +63,7 @@ def seen_by_pinocchio(path: Path, read: UrdfArm, states: Array, payload: float =
     )
     data, joints = model.createData(), [model.joints[model.getJointId(name)] for name in read.joints]
     places, found = [joint.idx_v for joint in joints], []
-    for row in states.swapaxes(0, 1):
+    for row in states.swapaxes(0, 1) @ c.T + np.stack([o, 0.0 * o, 0.0 * o]):
         q, v, a = pinocchio.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
         for joint, value in zip(joints, row[0], strict=True):
             q[joint.idx_q : joint.idx_q + joint.nq] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
@@ -67,8 +75,23 @@ def seen_by_pinocchio(path: Path, read: UrdfArm, states: Array, payload: float =
         torque = pinocchio.rnea(model, data, q, v, a)[places]
         upper = np.triu(pinocchio.crba(model, data, q))
         inertia = (upper + np.triu(upper, 1).T)[np.ix_(places, places)]
-        found.append((tip, rotation, gravity, torque, inertia))
+        found.append((tip, rotation, gravity @ c, torque @ c, c.T @ inertia @ c))
     return Seen(*map(np.array, zip(*found, strict=True)))
+
+
+def _mimicry(path: Path, read: UrdfArm) -> tuple[Array, Array]:
+    """(J, J) factors and (J,) offsets that give joint values from those of the joints that mimic none."""
+    elements = {joint.get("name"): joint for joint in ElementTree.parse(path).iter("joint")}
+
+    def law(name: str) -> tuple[Array, float]:
+        mimic = elements[name].find("mimic")
+        if mimic is None:
+            return np.eye(len(read.joints))[read.joints.index(name)], 0.0
+        factor, (row, offset) = float(mimic.get("multiplier", 1.0)), law(mimic.get("joint", ""))
+        return factor * row, factor * offset + float(mimic.get("offset", 0.0))
+
+    rows, offsets = zip(*map(law, read.joints), strict=True)
+    return np.array(rows), np.array(offsets)
 
 
 def differences(ours: Seen, theirs: Seen) -> dict[str, float]:

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.optimize import differential_evolution  # pyright: ignore[reportUnknownVariableType]
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError
+from armwright.exceptions import ArmError, SettingsError
 from armwright.existing.existing_arm import known_values
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem import arm_quantities
-from armwright.problem.evaluation import Evaluation
+from armwright.problem.evaluation import NO_CYCLE, Evaluation
 from armwright.problem.problem import POSTURES_AT_ONCE, Problem
 from armwright.robot.arm import Arm, Joint
 from armwright.robot.mounting import Mounting, mounted, needs_turning
@@ -65,9 +65,12 @@ def placed(problem: Problem, described: UrdfArm, seed: int, mounting: Mounting |
 
     Raises:
         SettingsError: If the seed is negative, or the arm cannot be turned as the mounting demands.
+        ArmError: If the task has a cycle and a joint of the arm follows another.
     """
     if seed < 0:
         raise SettingsError(f"seed: expected a whole number of at least 0, got {seed}")
+    if (coupled := described.arm.couplings) and problem.task.cycle is not None:
+        raise ArmError(f'{described.name}: "{described.joints[coupled[0][0]]}" mimics a joint; {NO_CYCLE}')
     arm = with_tool(with_travel(described.arm, problem.space.travel), problem.task.tool)
     equipped = replace(described, arm=replace(arm, safety_factor=problem.space.safety_factor))
     if mounting is not None:

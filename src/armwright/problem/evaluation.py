@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
-from armwright.exceptions import SettingsError, TaskError
+from armwright.exceptions import ArmError, SettingsError, TaskError
 from armwright.kinematics.arms.actuation import Actuation
 from armwright.kinematics.arms.arm_arrays import FIXED, ArmArrays, carrying, stack_arms
 from armwright.kinematics.arms.bearings import across_axis, bearing_limits, bearing_loads
@@ -31,6 +31,7 @@ from armwright.tasks.targets import position_targets
 from armwright.tasks.task import Task
 from armwright.tasks.workspace import sample_regions
 
+NO_CYCLE = "paths of cycles do not support such arms yet; try a task without a cycle"
 CYCLE_GAP = 1e-4  # [m] that bodies keep along a cycle, because drives and samples are a little off its path
 
 
@@ -205,6 +206,7 @@ class Evaluation(Scene):
             rotors = np.nan_to_num(self.arms.actuation.rotor_inertia)
             inertia = inertia + (rotors[:, :, None] * np.eye(self.arms.dof))[:, None]
         travel = self.arms.travel[:, None]
+        inertia = self.arms.by_independent(self.arms.by_independent(inertia).swapaxes(-1, -2))
         return inertia * travel[..., None] * travel[..., None, :]
 
     @property
@@ -387,6 +389,8 @@ def evaluate_arrays(
         )
 
     restarts = scene.target_arrays.restarts
+    if scene.plan is not None and arrays.couplings is not None:
+        raise ArmError(f"an arm has joints that follow others; {NO_CYCLE}")
 
     if scene.plan is None:
         paths, postures = None, solve(initial_q, restarts=restarts)

@@ -12,6 +12,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.exceptions import ArmError
 from armwright.problem.scene import Scene
 from armwright.robot.arm import GRAVITY, Arm, Joint
 from armwright.robot.collision_pairs import joined_by_column, joined_by_motors, joined_by_tip
@@ -72,6 +73,8 @@ def to_simulation_mjcf(
     postures: (T, J) values of the joints at the targets [rad] or [m].
     peak_torques: (D,) largest torques of the moving joints, for the gains of joints without actuators.
     """
+    if arm.couplings:
+        raise ArmError("an arm has joints that follow others, whose servos are not modelled; try to_mjcf(arm) alone")
     root = Element("mujoco", model=name)
     SubElement(root, "compiler", COMPILER)
     gravity = numbers((0.0, 0.0, -GRAVITY))

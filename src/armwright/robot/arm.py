@@ -57,6 +57,22 @@ class Actuator:
 
 
 @dataclass(frozen=True, slots=True)
+class Coupling:
+    """How a joint follows another one of its arm, such as by a parallelogram, a belt or gears.
+
+    Its value is q = factor q_leader + offset. The leader's drive moves both; the coupled joint has none of its own.
+    """
+
+    leader: int  # index of the joint that it follows, which follows none
+    factor: float  # travel for each unit of the leader's travel [rad/rad], [m/m], [m/rad] or [rad/m]
+    offset: float = 0.0  # value at which the leader is at 0 [rad] or [m]
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.factor) and math.isfinite(self.offset)) or self.factor == 0.0:
+            raise ArmError(f"a coupling needs a finite factor other than 0 and a finite offset, not {self}")
+
+
+@dataclass(frozen=True, slots=True)
 class Joint:
     """A joint about (revolute) or along (prismatic) a local axis."""
 
@@ -67,6 +83,7 @@ class Joint:
     actuator: Actuator | None = None  # actuator; None if not chosen
     travel: float = 1.0  # travel of a prismatic joint per radian of its actuator [m/rad]; 1 for other joints
     body: MotorBody | None = None  # body of its actuator, if it counts
+    coupling: Coupling | None = None  # how it follows another joint; None if it moves independently
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(JointKind):
@@ -75,6 +92,8 @@ class Joint:
             raise ArmError(f'joint axis "{self.axis}" is not one of {", ".join(AXES)}, nor a vector of length 1')
         if self.kind == "fixed" and self.body is not None:
             raise ArmError("a fixed joint has no actuator, so no body of one")
+        if self.coupling is not None and (self.kind == "fixed" or self.actuator is not None or self.body is not None):
+            raise ArmError("a coupled joint moves and has no actuator: that of the joint that it follows moves both")
         if self.body is not None and self.body.axis != self.axis:
             raise ArmError(f"motor body: expected its shaft along the joint's axis {self.axis}, got {self.body.axis}")
         unit = "m" if self.kind == "prismatic" else "rad"
@@ -259,6 +278,14 @@ class Arm:
             )
         if not all(math.isfinite(v) for v in self.base):
             raise ArmError(f"the base position must be finite: {self.base} m")
+        independent = {i for i, joint in enumerate(self.joints) if joint.kind != "fixed" and joint.coupling is None}
+        if not {coupling.leader for _, coupling in self.couplings} <= independent:
+            raise ArmError("a coupled joint follows a joint of its arm that moves and follows none")
+
+    @property
+    def couplings(self) -> list[tuple[int, Coupling]]:
+        """The index of each joint that follows another, and how."""
+        return [(i, joint.coupling) for i, joint in enumerate(self.joints) if joint.coupling is not None]
 
     @property
     def mass(self) -> float:

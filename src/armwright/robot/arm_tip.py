@@ -84,7 +84,8 @@ class _Tree:
 
     def is_gripper(self, joint: UrdfJoint, before: Sequence[UrdfJoint], axis: Array) -> bool:
         """Return True if a joint moves a gripper; axis: (3,) of the joint before it, in the frame of its child."""
-        if self._beyond(joint) > 1 or joint.kind == "fixed":
+        is_coupled = joint.mimics in [one.name for one in before]
+        if self._beyond(joint) > 1 or joint.kind == "fixed" or is_coupled:
             return False
         beside, beyond = self.frames[joint.parent], self.frames[joint.child]
         lower, upper, slides = joint.lower or 0.0, joint.upper or 0.0, joint.kind == "prismatic"

@@ -75,9 +75,12 @@ def joint_limits(joint: Joint) -> dict[str, float]:
     return {"lower": joint.lower, "upper": joint.upper, "effort": effort, "velocity": velocity}
 
 
-def home_position(joint: Joint) -> float:
-    """Return 0, or the limit closest to it [rad] or [m]."""
-    return min(max(0.0, joint.lower), joint.upper)
+def home_posture(arm: Arm) -> list[float]:
+    """Return for each joint 0, or the limit closest to it [rad] or [m]; coupled joints follow theirs."""
+    q = [min(max(0.0, joint.lower), joint.upper) for joint in arm.joints]
+    for i, coupling in arm.couplings:
+        q[i] = coupling.factor * q[coupling.leader] + coupling.offset
+    return q
 
 
 def inertia_tensor(link: Link) -> Array:

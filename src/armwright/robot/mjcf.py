@@ -28,6 +28,7 @@ TYPES = {"revolute": "hinge", "prismatic": "slide"}  # a fixed joint is a body w
 # XYZ: roll, pitch and yaw about fixed axes, as in a URDF.
 COMPILER = {"angle": "radian", "autolimits": "true", "eulerseq": "XYZ", "inertiafromgeom": "false", **MIN_INERTIA}
 SKY = {"builtin": "gradient", "rgb1": "0.97 0.97 0.98", "rgb2": "0.84 0.86 0.90", "width": "64", "height": "384"}
+STIFF = {"solref": "0.004 1", "solimp": "0.999 0.9999 0.001"}  # of a coupling: two time steps, the least that is stable
 TIP_COLOUR = "0.07 0.07 0.07 1"
 
 
@@ -38,7 +39,7 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     joints at 0 they are parallel to the world frame. A tool with mass is a body `tool` at the end of the last link. The
     body of an actuator is a body motor_1, … on the link before its joint, a column a body `column` on the base.
     Each moving joint has a motor with gear 1, limited to the torque of its actuator if it has one. `ctrl` is the torque
-    [N m] or force [N] on that joint.
+    [N m] or force [N] on that joint. A joint that follows another has an equality constraint instead.
 
     Geometry is for display only. It has no mass, since the mass of each link is stated, and no contacts: links overlap
     at their joints, so contacts would push them apart.
@@ -63,6 +64,13 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     add_tool(body, arm)
     actuators = SubElement(root, "actuator")
     for n, joint in moving_joints(arm):
+        if (coupling := joint.coupling) is not None:
+            law = {
+                "joint2": f"joint_{coupling.leader + 1}",
+                "polycoef": numbers((coupling.offset, coupling.factor, 0, 0, 0)),
+            }
+            SubElement(SubElement(root, "equality"), "joint", {"joint1": f"joint_{n}", **law, **STIFF})
+            continue
         motor = {"name": f"motor_{n}", "joint": f"joint_{n}", "gear": "1"}
         if joint.effort is not None:
             motor["ctrlrange"] = f"{number(-joint.effort)} {number(joint.effort)}"

@@ -20,7 +20,7 @@ HOUSING, OUTLINE = 0.1, 2.0  # the outline of a link: around it [m], and relativ
 
 def implausible(arm: Arm, bodies: Sequence[Sequence[UrdfLink]]) -> Iterator[str]:
     """Yield notes on efforts, masses and inertias of an arm; bodies: the links that move with each joint."""
-    efforts = {joint.effort for joint in arm.joints}
+    efforts = {joint.effort for joint in arm.joints if joint.coupling is None}
     if len(efforts) == 1 < len(arm.joints) and (effort := efforts.pop() or 0.0) >= SAME_EFFORT:
         yield f"every joint states the same effort, {effort:g}, which is probably made up"
     heaviest = HEAVIEST if arm.length <= DESK else np.inf

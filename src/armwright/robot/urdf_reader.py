@@ -3,6 +3,9 @@
 Links that are fixed to a link of the chain add to its mass, and so do fingers, which stay at 0. Local frames of an
 `Arm` are parallel to the world frame with all joints at 0, so axes, links and tensors are those of the file in this
 posture.
+
+A joint that mimics another one of the chain has no drive: that of the other moves both, as far and as fast as the
+limits of both allow. The effort that the file states of it is not used, since its coupling carries it.
 """
 
 import math
@@ -14,7 +17,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
-from armwright.robot.arm import Actuator, Arm, Joint, Link, MountedTool, Tensor
+from armwright.robot.arm import Actuator, Arm, Coupling, Joint, Link, MountedTool, Tensor
 from armwright.robot.arm_tip import find_tip
 from armwright.robot.axes import Axis, Vector, axis_along
 from armwright.robot.link_inertia import point_inertia
@@ -24,6 +27,7 @@ from armwright.text import listed
 
 CUT_OFF = 4e-3  # [rad]; an angle of three digits as near to a right angle, such as 3.14, may stand for it
 MAX_ANGLE = 2 * math.pi  # [rad]
+NEGLIGIBLE = 1e-4  # of the moving mass: so light a link has no inertia to speak of, whatever its shape
 NOWHERE = (0.0, 0.0, 0.0)
 RADIUS = 0.04  # [m], for drawings, if the file has no cylinder
 
@@ -82,10 +86,12 @@ def _arm(tree: "_LinkTree", base: str, tip: str, moving: Sequence[UrdfJoint], no
         # A file states nothing of a tube, so all mass is what the link carries.
         shift = _vector(centre - positions[i + 1])
         links.append(replace(link, end_mass=mass, end_shift=shift, end_inertia=_tensor(inertia)))
+    notes += _couple(joints, moving, tree)
     beyond = [tree.document.links[name] for body in bodies[1:] for name in body]
-    if points := [link.name for link in beyond if link.mass and not link.inertia.any()]:
+    least = NEGLIGIBLE * sum(link.mass for link in beyond)
+    if points := [link.name for link in beyond if link.mass > least and not link.inertia.any()]:
         notes.append(f"links without inertia count as points: {', '.join(points)}")
-    if any(joint.actuator is None for joint in joints):
+    if any(joint.actuator is None for joint in joints if joint.coupling is None):
         notes.append("not every joint states an effort, so how much of it is used is not known")
     rotation = poses[tip].rotation
     arm = Arm(
@@ -98,8 +104,7 @@ def _arm(tree: "_LinkTree", base: str, tip: str, moving: Sequence[UrdfJoint], no
     if arm.no_mass:
         notes.append(f"{arm.no_mass}, so masses, torques and payloads are not known")
     notes += implausible(arm, [[tree.document.links[name] for name in body] for body in bodies[1:]])
-    names = tuple(joint.name for joint in moving)
-    return UrdfArm(tree.document.name, arm, base, tip, names, tuple(notes))
+    return UrdfArm(tree.document.name, arm, base, tip, tuple(joint.name for joint in moving), tuple(notes))
 
 
 def _merged(links: Sequence[UrdfLink], poses: Mapping[str, Pose]) -> tuple[float, Array, Array]:
@@ -118,13 +123,45 @@ def _check_joint(joint: UrdfJoint, where: str) -> None:
     of = f'{where}: joint "{joint.name}"'
     if joint.kind in ("floating", "planar"):
         raise ArmError(f"{of} is {joint.kind}; between base and tip only revolute and prismatic joints can be computed")
-    if joint.mimics is not None:
-        raise ArmError(
-            f'{of} mimics "{joint.mimics}"; between base and tip each joint must move independently; for the part '
-            f"before it, try --tip {joint.parent}"
-        )
     if joint.kind != "continuous" and not (joint.lower or 0.0) < (joint.upper or 0.0):
         raise ArmError(f"{of}: expected limits lower < upper, got {joint.lower or 0.0:g} and {joint.upper or 0.0:g}")
+
+
+def _couple(joints: list[Joint], moving: Sequence[UrdfJoint], tree: "_LinkTree") -> Iterator[str]:
+    """Let joints follow those that they mimic, in place, within the limits and speeds of both; yield notes."""
+    for i, joint in enumerate(moving):
+        if joint.mimics is None:
+            continue
+        coupling = _coupling(joint, moving, tree)
+        k, factor = coupling.leader, coupling.factor
+        name, drive = moving[k].name, joints[k].actuator
+        low, high = sorted((limit - coupling.offset) / factor for limit in (joints[i].lower, joints[i].upper))
+        low, high = max(low, joints[k].lower), min(high, joints[k].upper)
+        if not low < high:
+            raise ArmError(
+                f'{tree.where}: the limits of "{name}" and "{joint.name}", which mimics it, exclude each other'
+            )
+        if drive is not None and joint.speed:
+            drive = replace(drive, speed=min(drive.speed or math.inf, joint.speed / abs(factor)))
+        joints[k] = replace(joints[k], lower=low, upper=high, actuator=drive)
+        joints[i] = replace(joints[i], actuator=None, coupling=coupling)
+        yield f"{joint.name} = {factor:g} {name} {coupling.offset:+g}, so the drive of {name} moves both"
+
+
+def _coupling(joint: UrdfJoint, moving: Sequence[UrdfJoint], tree: "_LinkTree") -> Coupling:
+    """Return how a joint of the chain follows an independent one of it, perhaps through others."""
+    by_name, names = {one.name: one for one in tree.document.joints}, [one.name for one in moving]
+    leader, factor, offset, passed = joint, 1.0, 0.0, list[str]()
+    while leader.mimics is not None and leader.name not in passed:
+        passed.append(leader.name)
+        factor, offset = factor * leader.multiplier, offset + factor * leader.offset
+        leader = by_name.get(leader.mimics, leader)
+    if leader.name in passed or leader.name not in names or factor == 0.0:
+        raise ArmError(
+            f'{tree.where}: joint "{joint.name}" mimics "{joint.mimics}", moving {factor:g} times as far; expected an '
+            f"independent joint of the chain, and not 0 times; for the part before it, try --tip {joint.parent}"
+        )
+    return Coupling(names.index(leader.name), factor, offset)
 
 
 def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, chain: Sequence[UrdfJoint]) -> list[str]:
@@ -139,6 +176,8 @@ def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, chain
         f'the axes of the world are those of "{tree.root}"; gravity points along ({down}) in the frame of "{base}"',
     ]
     short = [f"{angle:g} at {joint.name}" for joint in chain for angle in joint.rpy if _is_cut_off(angle)]
+    if beside := [joint.name for joint in tree.below(base) if joint.name in others and joint.mimics in moving]:
+        notes.append(f"joints that mimic those of the chain, but stay at 0 with their masses: {', '.join(beside)}")
     if short:
         notes.append(f"right angles or π with too few digits are used as written: {', '.join(short)}")
     return notes
@@ -181,7 +220,7 @@ class _LinkTree:
     """The links of a URDF as a tree."""
 
     def __init__(self, document: UrdfDocument, where: str) -> None:
-        self.document, self._where = document, where
+        self.document, self.where = document, where
         self.joints: dict[str, list[UrdfJoint]] = {name: [] for name in document.links}  # on each link, in its order
         self._parent: dict[str, UrdfJoint] = {}
         for joint in document.joints:
@@ -210,7 +249,7 @@ class _LinkTree:
         if link not in self.document.links:
             names = ", ".join(list(self.document.links)[:40])
             raise ArmError(
-                f'{self._where} has no link "{link}" ({kind}).{did_you_mean(link, self.document.links)} Links: {names}'
+                f'{self.where} has no link "{link}" ({kind}).{did_you_mean(link, self.document.links)} Links: {names}'
             )
         return link
 
@@ -220,7 +259,7 @@ class _LinkTree:
         link = tip
         while link != base:
             if link not in self._parent:
-                raise ArmError(f'{self._where}: the link "{tip}" is not beyond "{base}"')
+                raise ArmError(f'{self.where}: the link "{tip}" is not beyond "{base}"')
             chain.append(self._parent[link])
             link = self._parent[link].parent
         return chain[::-1]

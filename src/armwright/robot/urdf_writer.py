@@ -92,6 +92,9 @@ def _add_joint(
     if joint.kind != "fixed":
         SubElement(element, "axis", xyz=numbers(joint.direction))
         SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
+    if (coupling := joint.coupling) is not None:
+        law = {"multiplier": number(coupling.factor), "offset": number(coupling.offset)}
+        SubElement(element, "mimic", {"joint": f"joint_{coupling.leader + 1}", **law})
 
 
 def _add_origin(element: Element, xyz: Vector, rpy: Vector) -> None:

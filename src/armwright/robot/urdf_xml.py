@@ -63,7 +63,9 @@ class UrdfJoint:
     upper: float | None
     effort: float | None  # largest torque [N m] or force [N]
     speed: float | None  # largest speed [rad/s] or [m/s]
-    mimics: str | None  # name of the joint that it mimics
+    mimics: str | None = None  # name of the joint that it mimics: its value is multiplier times that joint's + offset
+    multiplier: float = 1.0
+    offset: float = 0.0  # [rad] or [m]
 
     @property
     def moves(self) -> bool:
@@ -173,7 +175,8 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
     if length < 1e-9 and kind in ("revolute", "continuous", "prismatic"):
         raise ArmError(f"{of} has an axis of no length: {direction.tolist()}")
     limit, mimic = element.find("limit"), element.find("mimic")
-    values = [None if limit is None or limit.get(key) is None else _numbers(limit, key, 1, of)[0] for key in _LIMITS]
+    values = [_number(limit, key, of) for key in _LIMITS]
+    law = {key: _number(mimic, key, of, default) for key, default in (("multiplier", 1.0), ("offset", 0.0))}
     ends = [element.find(end) for end in ("parent", "child")]
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
     return UrdfJoint(
@@ -186,10 +189,15 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
         direction / (length if length > 0.0 else 1.0),
         *values,
         mimics=None if mimic is None else mimic.get("joint", ""),
+        **law,
     )
 
 
 _LIMITS = ("lower", "upper", "effort", "velocity")
+
+
+def _number(element: ElementTree.Element | None, key: str, of: str, missing: Any = None) -> Any:
+    return missing if element is None or element.get(key) is None else _numbers(element, key, 1, of)[0]
 
 
 def _name(element: ElementTree.Element, kind: str, where: str) -> str:

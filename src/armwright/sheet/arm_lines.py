@@ -7,7 +7,7 @@ from armwright.kinematics.arms.forward import link_lines
 from armwright.kinematics.reach.reach_outline import reach_outline
 from armwright.problem.over_reach import reach_lines
 from armwright.robot.arm import Arm, Vector
-from armwright.robot.link_geometry import home_position
+from armwright.robot.link_geometry import home_posture
 from armwright.sheet.record import Drawing, LinkLine
 
 SIDE, TOP = (0, 2), (0, 1)  # axes of the views
@@ -37,7 +37,7 @@ def _link_line(arm: Arm, number: int) -> LinkLine:
 
 
 def _drawing(arm: Arm, targets: Array) -> Drawing:
-    q = [home_position(joint) for joint in arm.joints]
+    q = home_posture(arm)
     numbers = [*range(1, len(arm.links) + 1), 0]
     return Drawing(
         base=arm.base,

@@ -16,6 +16,8 @@ from armwright.robot.axes import axis_name
 from armwright.robot.motor_body import MotorBody
 from armwright.sheet.record import JointLine
 
+ACROSS = ("tilting_moment", "bearing_utilisation")  # of any joint, whatever drives it
+
 
 def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[str] = ()) -> tuple[JointLine, ...]:
     """Return a line for each moving joint, named joint_1, joint_2 and so on by default.
@@ -25,24 +27,28 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
     lines: list[JointLine] = []
     moving = [j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"]
     need = {} if evaluation is None else _needs(evaluation)
+    labels = names or [f"joint_{j + 1}" for j in moving]
     if arm.no_mass:
         need = {name: values for name, values in need.items() if name == "speed_utilisation"}
     for k, j in enumerate(moving):
         joint = arm.joints[j]
         used = None if evaluation is None else _used(evaluation, j)
+        drive = "" if joint.actuator is None else joint.actuator.name
+        if joint.coupling is not None:
+            drive = f"that of {labels[moving.index(joint.coupling.leader)]}"
         line = JointLine(
             number=j + 1,
-            name=names[k] if names else f"joint_{j + 1}",
+            name=labels[k],
             kind=joint.kind,
             axis=axis_name(joint.axis),
-            actuator="" if joint.actuator is None else joint.actuator.name,
+            actuator=drive,
             lower=joint.lower,
             upper=joint.upper,
             peak_torque=joint.effort,
             used=used,
             unused=None if used is None else (max(0.0, used[0] - joint.lower), max(0.0, joint.upper - used[1])),
             body="" if joint.body is None else _describe_body(joint.body),
-            **{name: finite_or_none(values[j]) for name, values in need.items()},
+            **{key: finite_or_none(values[j]) for key, values in need.items() if not joint.coupling or key in ACROSS},
         )
         lines.append(line)
     return tuple(lines)

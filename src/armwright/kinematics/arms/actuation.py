@@ -40,7 +40,8 @@ FIXED_RATINGS = tuple(value for _, _, value in RATINGS.values())
 class Actuation(PerArm):
     """Actuators of N arms of up to D joints, by the motion of their joints: of a slide in m, N and kg.
 
-    NaN where a value is unknown. A fixed joint has infinite torques, speeds and stiffness; its other values are 0.
+    NaN where a value is unknown. A fixed joint, or one that follows another, has infinite torques, speeds and
+    stiffness; its other values are 0. Limits of the bearings of the latter are unknown.
     """
 
     peak: Array  # (N, D) largest torque, at rest and up to the corner speed [N m] or [N]
@@ -103,13 +104,15 @@ def ratings_of(actuator: Actuator) -> tuple[float, ...]:
 
 
 def actuation_of(arms: Sequence[Arm], travel: Array) -> Actuation | None:
-    """Return the actuation of N arms, None if a moving joint has no actuator; travel: (N, D) as above."""
+    """Return the actuation of N arms, None if an independent joint has no actuator; travel: (N, D) as above."""
     ratings = np.empty((*travel.shape, len(FIXED_RATINGS)))
     ratings[:] = FIXED_RATINGS
     prices = np.zeros(len(arms))
     for i, arm in enumerate(arms):
         for j, joint in enumerate(arm.joints):
-            if joint.kind == "fixed":
+            if joint.coupling is not None:
+                ratings[i, j, -3:] = np.nan  # what its bearings carry is not known
+            if joint.kind == "fixed" or joint.coupling is not None:
                 continue
             if joint.actuator is None:
                 return None

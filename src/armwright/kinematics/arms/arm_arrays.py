@@ -1,4 +1,10 @@
-"""Arms stacked into arrays, the input of the kernels."""
+"""Arms stacked into arrays, the input of the kernels.
+
+Arrays hold all joints. If some follow others, q = C s + o with the values s of the independent joints, and C has one
+entry in each row: 1 for an independent joint, its factor for one that follows. Then J C is the Jacobian by s, Cᵀ τ are
+the torques of the drives and Cᵀ M C is their mass matrix (R. Featherstone: Rigid Body Dynamics Algorithms, 2008,
+chapter 3, explicit constraints). Values by s are those of all joints, 0 for those that follow.
+"""
 
 import math
 from collections.abc import Sequence
@@ -24,13 +30,13 @@ OBLIQUE, PRISMATIC, FIXED = 3, 4, 8
 MOTION_AXES = np.vstack([np.eye(4, 3), np.eye(4, 3), np.zeros((1, 3))])  # of designs, by motion
 
 Precision = Literal["float32", "float64"]
-Motions = Literal["revolute", "any", "oblique"]  # of all joints of some arms: about x, y, z; others too; or oblique too
+# Of all joints of some arms: about x, y, z; others too; oblique ones too; or coupled ones too.
+Motions = Literal["revolute", "any", "oblique", "coupled"]
 TargetKind = Literal["position", "pose"]  # points alone, or some with an axis or orientation of the tool
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
 
 FLOATS = ("base", "axis", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_side", "payload_center")
-ARRAYS = ("motion", *FLOATS)  # fields of `ArmArrays` that the kernels of inverse kinematics read
 
 
 @dataclass(frozen=True)
@@ -63,7 +69,10 @@ class ArmArrays(PerArm):
     structure_price: Array  # (N,) of all links and of the column [USD]
     bodies: Bodies  # without tools; for dynamics alone
     no_mass: NDArray[np.str_] | None = None  # (N,) why a mass is not known and counts as 0; None if all are known
-    actuation: Actuation | None = None  # None unless all moving joints have actuators
+    couplings: Floats | None = None
+    """(N, D, 3) of each joint the index of the joint that it follows, factor and offset [rad] or [m]: itself, 1 and 0
+    of independent joints. None if all are independent."""
+    actuation: Actuation | None = None  # None unless all independent joints have actuators
     motor_bodies: MotorBodies | None = None  # None if the bodies of actuators do not count
     columns: Floats | None = None
     """(N, 3) radius, radius, half the length of the upright cylinder below each base [m], length 0 without one; None
@@ -90,11 +99,14 @@ class ArmArrays(PerArm):
     @property
     def motions(self) -> Motions:
         """The kernel variant that all arms need."""
-        return "revolute" if np.all(self.motion < OBLIQUE) else self.general_motions
+        is_simple = self.couplings is None and np.all(self.motion < OBLIQUE)
+        return "revolute" if is_simple else self.general_motions
 
     @property
     def general_motions(self) -> Motions:
         """The variant that these arms and others of their space need, whatever joints a batch happens to have."""
+        if self.couplings is not None:
+            return "coupled"
         return "oblique" if np.any(self.motion % PRISMATIC == OBLIQUE) else "any"
 
     @property
@@ -111,6 +123,27 @@ class ArmArrays(PerArm):
     def ranges_include_zero(self) -> bool:
         """True if every joint can be at 0."""
         return bool(np.all(self.lower <= 0.0) and np.all(self.upper >= 0.0))
+
+    @property
+    def read_by_ik(self) -> dict[str, Any]:
+        """The arrays that the kernels of inverse kinematics read."""
+        own = ("motion", *FLOATS) if self.couplings is None else ("motion", "couplings", *FLOATS)
+        return {name: getattr(self, name) for name in own}
+
+    def coupled(self, q: Array) -> Array:
+        """Return q (N, K, D) in which joints that follow others have the values C s + o [rad] or [m]."""
+        if self.couplings is None:
+            return q
+        leader, factor, offset = np.moveaxis(self.couplings[:, None].astype(np.float64), -1, 0)
+        return factor * np.take_along_axis(q, leader.astype(np.intp), axis=-1) + offset
+
+    def by_independent(self, values: Array) -> Array:
+        """Return derivatives by all joints (N, ..., D) as those by the independent ones: values C, 0 for others."""
+        if self.couplings is None:
+            return values
+        leader, factor = self.couplings[..., 0, None], self.couplings[..., 1, None]
+        matrix = np.where(leader == np.arange(self.dof), factor, 0.0)  # (N, D, D)
+        return (values @ matrix.reshape(-1, *(1,) * (values.ndim - 3), *matrix.shape[1:])).astype(values.dtype)
 
     def limit_distance(self, q: Array) -> Array:
         """Return the (N, ...) smallest distance of a joint from its limits [rad] or [m]; q: (N, ..., D)."""
@@ -160,11 +193,16 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
     lower *= -1.0
     mass, radius = np.zeros((2, n, dof))
     stiffness = np.full((2, n, dof), np.inf)  # bending and torsional
-    offset, com, axis = np.zeros((3, n, dof, 3))
+    offset, com, axis, couplings = np.zeros((4, n, dof, 3))
+    followers = [arm.couplings for arm in arms]
+    if any(followers):
+        couplings[..., 0], couplings[..., 1] = np.arange(dof), 1.0
     bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,), (3, 3))))
     for i, arm in enumerate(arms):
         own = slice(len(arm.joints))
-        motion[i, own] = [_motion(joint) for joint in arm.joints]
+        for j, one in followers[i]:
+            couplings[i, j] = one.leader, one.factor, one.offset
+        motion[i, own] = [_motion(joint, bool(followers[i])) for joint in arm.joints]
         axis[i, own] = [joint.direction for joint in arm.joints]
         lower[i, own] = [-1.0 if joint.kind == "fixed" else joint.lower for joint in arm.joints]
         upper[i, own] = [1.0 if joint.kind == "fixed" else joint.upper for joint in arm.joints]
@@ -197,6 +235,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         base_mass=np.array([arm.standing_mass for arm in arms]),
         structure_price=np.array([arm.structure_price for arm in arms]),
         bodies=bodies,
+        couplings=couplings.astype(precision) if any(followers) else None,
         no_mass=np.array(no_mass) if any(no_mass) else None,
         actuation=actuation_of(arms, travel),
         motor_bodies=stack_bodies(arms, dof, precision),
@@ -285,8 +324,10 @@ def _stiffness(link: Link) -> tuple[float, float]:
     return math.nan if bending is None else bending, math.nan if torsional is None else torsional
 
 
-def _motion(joint: Joint) -> int:
+def _motion(joint: Joint, is_coupled: bool) -> int:
+    """Return the motion of a joint; is_coupled: whether joints of its arm follow others, so none is `opposed`."""
     if joint.kind == "fixed":
         return FIXED
-    axis = AXES.index(joint.nearest_axis) if sum(map(bool, joint.direction)) == 1 else OBLIQUE
+    is_along = sum(map(bool, joint.direction)) == 1 and not (is_coupled and min(joint.direction) < 0.0)
+    axis = AXES.index(joint.nearest_axis) if is_along else OBLIQUE
     return axis + (PRISMATIC if joint.kind == "prismatic" else 0)

@@ -30,7 +30,7 @@ class Frames:
 
 def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
     """Return the joint frames of N arms in postures; q: (N, K, D) joint angles [rad] or displacements [m]."""
-    n, k, dof = q.shape
+    (n, k, dof), q = q.shape, arms.coupled(q)
     revolute, prismatic = arms.motion < PRISMATIC, arms.prismatic  # (N, D)
     local = arms.axis.astype(np.float64)  # (N, D, 3)
     rotated = rotation_about(local[:, None], np.where(revolute[:, None], q, 0.0))
@@ -48,10 +48,10 @@ def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
 
 
 def jacobian_of(arms: ArmArrays, frames: Frames) -> Array:
-    """Return the (N, K, 3, D) derivative of the tip position by the joints [m/rad] or [m/m]."""
+    """Return the (N, K, 3, D) derivative of the tip position by the independent joints [m/rad] or [m/m]."""
     rotational = np.cross(frames.axis, frames.tip[:, :, None] - frames.position)
     translates = (arms.motion >= PRISMATIC)[:, None, :, None]  # or is fixed, whose axis is 0
-    return np.where(translates, frames.axis, rotational).swapaxes(-1, -2)
+    return arms.by_independent(np.where(translates, frames.axis, rotational).swapaxes(-1, -2))
 
 
 def joint_positions(arm: Arm, q: Sequence[float] | Array) -> Array:

@@ -1,7 +1,8 @@
 """Warp functions that all kernels of inverse kinematics share.
 
 The joints of an arm are the same in all lanes, so they may branch, in functions that return at once. Prismatic joints
-cost an eighth of the time, so arms of revolute joints alone have a variant, and those with other axes than x, y and z.
+cost an eighth of the time, so arms of revolute joints alone have a variant, those with other axes than x, y and z, and
+those with joints that follow others.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -29,7 +30,7 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
     real, Vector3, Lane, Vector = base.real, base.Vector3, base.Lane, base.Vector
     at_least, sine_cosine, scaled = base.at_least, base.sine_cosine, base.scaled
     dot, cross, in_frame = base.dot, base.cross, base.in_frame
-    any_motion, oblique = motions != "revolute", motions == "oblique"
+    any_motion, oblique = motions != "revolute", motions in ("oblique", "coupled")
 
     zero, one, two = real(0.0), real(1.0), real(2.0)
     angle_margin = real(math.radians(1.0))  # from the limits, keeps the limit gradient finite
@@ -50,6 +51,7 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> SimpleNamespa
         tool_axis: wp.array(dtype=Vector3)  # (N,)
         tool_side: wp.array(dtype=Vector3)  # (N,)
         payload_center: wp.array(dtype=Vector3)  # (N,)
+        couplings: wp.array2d(dtype=Vector3)  # (N, D), empty unless motions are coupled
 
     @wp.func
     def rotate(motion: int, axis: Vector3, x: Vector, y: Vector, z: Vector, s: Lane, c: Lane):

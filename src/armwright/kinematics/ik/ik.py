@@ -16,9 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError
 from armwright.kinematics.arms.arm_arrays import (
-    ARRAYS,
     FIXED,
-    FLOATS,
     ArmArrays,
     Floats,
     Motions,
@@ -100,7 +98,7 @@ def solve_postures(
     device = resolve_device(device, many=True)
     kind = _kind_of(target_arrays)
     columns = _target_columns(points, np.zeros(len(points)) if payload is None else payload, target_arrays)
-    if initial_q is None and not arms.ranges_include_zero:
+    if initial_q is None and (arms.couplings is not None or not arms.ranges_include_zero):
         initial_q = 0.0
     variant = (motions or arms.motions, kind)
     best = _solve_all(arms, columns, updates, initial_q, variant, device)
@@ -143,7 +141,7 @@ def _solve_all(
         size = min(size, max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups)))
     in_chunks(solve, n, size, device)
     q, reached, torque, angle = whole
-    return Postures(q, reached, torque, angle[..., 0])
+    return Postures(q, reached, arms.by_independent(torque), angle[..., 0])
 
 
 def _kind_of(target_arrays: TargetArrays | None) -> TargetKind:
@@ -175,7 +173,8 @@ def _solve(
     """Return joint angles, tip positions, torques and angle errors of a chunk of arms, (N, T, ...)."""
     grouped = _in_lanes(columns[None], lanes)[0]
     if initial_q is not None:
-        initial_q = _in_lanes(np.clip(initial_q, arms.lower[:, None], arms.upper[:, None]), lanes)
+        initial_q = np.clip(initial_q, arms.lower[:, None], arms.upper[:, None])
+        initial_q = _in_lanes(arms.coupled(initial_q), lanes)
     loaded = load_kernels("ik.ik_kernels", device, arms.precision, lanes, *variant)
     if device == "cpu" and len(arms) <= _buffered_arms(arms, len(grouped), lanes):
         results = _thread_buffers(arms, grouped, updates, loaded).solve(arms, grouped, initial_q)
@@ -204,8 +203,8 @@ class _Buffers:
     def __init__(self, arms: ArmArrays, columns: NDArray[Any], updates: int, loaded: Loaded) -> None:
         (groups, _, lanes), dof = columns.shape, arms.dof
         n = _buffered_arms(arms, groups, lanes)
-        read = {name: getattr(arms, name) for name in ARRAYS}
-        self._arms = {name: np.zeros((n, *values.shape[1:]), dtype=values.dtype) for name, values in read.items()}
+        read = arms.read_by_ik.items()
+        self._arms = {name: np.zeros((n, *values.shape[1:]), dtype=values.dtype) for name, values in read}
         self._columns = np.zeros(columns.shape, dtype=arms.precision)
         self._q_last, self._h_last, *self._results = (
             np.zeros((n, groups, size, lanes), dtype=arms.precision) for size in (dof, dof, *_result_sizes(dof))
@@ -267,7 +266,7 @@ def _steps(
     columns: (G, C) targets in lanes.  q_last, h_last: (N, G, D) in lanes, updated in place.  results: of the sizes
     `_result_sizes`.
     """
-    on_device = loaded.struct("Arms", {name: getattr(arms, name) for name in ("dof", *ARRAYS)})
+    on_device = loaded.struct("Arms", {"dof": arms.dof, **arms.read_by_ik})
     return (
         (loaded.kernels.solve_ik, [on_device, columns, updates, q_last, h_last, results[0]]),
         (loaded.kernels.static_torque, [on_device, columns, q_last, *results]),
@@ -280,7 +279,8 @@ def _in_precision(arms: ArmArrays, precision: Precision) -> ArmArrays:
         return arms
     if precision == "float32":
         raise ArmError('the arms are stacked in float64; use precision="float64", or stack them in float32')
-    return replace(arms, **{name: getattr(arms, name).astype(np.float64) for name in FLOATS})
+    wide = {name: values.astype(np.float64) for name, values in arms.read_by_ik.items() if name != "motion"}
+    return replace(arms, **wide)
 
 
 def _broadcast(initial_q: ArrayLike, shape: tuple[int, int, int]) -> Array:

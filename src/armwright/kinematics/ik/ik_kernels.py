@@ -71,7 +71,7 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
     shortened, point_step = equations.shortened, equations.point_step
     Joints = wp.types.matrix(shape=(MAX_JOINTS, lanes), dtype=real)  # row j is joint j
     Vectors = wp.types.matrix(shape=(3 * MAX_JOINTS, lanes), dtype=real)  # three rows for each joint
-    pose, one, infinity = kind == "pose", real(1.0), real(1e30)
+    pose, coupled, one, infinity = kind == "pose", motions == "coupled", real(1.0), real(1e30)
 
     @kernel
     def solve_ik(
@@ -132,6 +132,19 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
             if wp.static(pose):
                 turn = wp.cw_mul(counted, rotation)
                 jjt, jwjt, column, weighted = Square(), Square(), Rows(), Rows()
+            if wp.static(coupled):  # J C; columns of joints that follow others stay 0
+                shared, shared_turn = Vectors(), Vectors()
+                for j in range(arms.dof):
+                    leader, factor = int(arms.couplings[arm, j][0]), arms.couplings[arm, j][1]
+                    axis = wp.matrix_from_rows(linear[3 * j], linear[3 * j + 1], linear[3 * j + 2])
+                    place = wp.matrix_from_rows(angular[3 * j], angular[3 * j + 1], angular[3 * j + 2])
+                    moved = linear_column(arms.motion[arm, j], axis, p - place)
+                    for i in range(3):
+                        shared[3 * leader + i] += factor * moved[i]
+                    if wp.static(pose):
+                        turned = wp.cw_mul(counted, angular_column(arms.motion[arm, j], axis, s, t, f))
+                        for i in range(3):
+                            shared_turn[3 * leader + i] += factor * turned[i]
             # The same of points alone, for which separate variables take a tenth less time.
             a11, a21, a22, a31, a32, a33 = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
             b11, b21, b22, b31, b32, b33 = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
@@ -145,11 +158,15 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                 axis = wp.matrix_from_rows(linear[3 * j], linear[3 * j + 1], linear[3 * j + 2])
                 place = wp.matrix_from_rows(angular[3 * j], angular[3 * j + 1], angular[3 * j + 2])
                 moved = linear_column(motion, axis, p - place)
+                if wp.static(coupled):
+                    moved = wp.matrix_from_rows(shared[3 * j], shared[3 * j + 1], shared[3 * j + 2])
                 dx -= scaled(y_j, moved)
                 for i in range(3):
                     linear[3 * j + i] = moved[i]
                 if wp.static(pose):
                     turned = wp.cw_mul(counted, angular_column(motion, axis, s, t, f))
+                    if wp.static(coupled):
+                        turned = wp.matrix_from_rows(shared_turn[3 * j], shared_turn[3 * j + 1], shared_turn[3 * j + 2])
                     turn -= scaled(y_j, turned)
                     for i in range(3):
                         angular[3 * j + i] = turned[i]
@@ -186,6 +203,10 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                     step += dot(wp.matrix_from_rows(angular[3 * j], angular[3 * j + 1], angular[3 * j + 2]), about)
                 to = q[j] + pull[j] + wp.cw_mul(weight[j], step)
                 q[j] = wp.min(wp.max(to, Lane(arms.lower[arm, j])), Lane(arms.upper[arm, j]))
+            if wp.static(coupled):
+                for j in range(arms.dof):
+                    follow = arms.couplings[arm, j]
+                    q[j] = follow[1] * q[int(follow[0])] + Lane(follow[2])
 
         for j in range(arms.dof):
             q_last[arm, group, j] = q[j]

@@ -149,7 +149,7 @@ def _of_joints(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Array) 
     """Return the (N, K, 3) displacements of the tips by the motion of the joints [m]; stiffness: (N, D)."""
     force, moment = joint_loads(frames, loads)
     acting = np.where(arms.prismatic[:, None, :, None], force, moment)
-    motion = (acting * frames.axis).sum(axis=-1) / stiffness[:, None]  # (N, K, D); 0 for fixed joints
+    motion = arms.by_independent((acting * frames.axis).sum(axis=-1)) / stiffness[:, None]  # (N, K, D)
     return np.cumsum(jacobian_of(arms, frames) * motion[:, :, None], axis=-1)[..., -1]
 
 

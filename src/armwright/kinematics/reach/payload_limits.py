@@ -47,7 +47,7 @@ def _carried_by_bearings(arms: ArmArrays, frames: Frames, peak: Array) -> Array:
     """
     drives = arms.actuation
     assert drives is not None, "expected arms with actuators"
-    strongest = np.where(arms.motion < PRISMATIC, peak, 0.0).max(axis=1, keepdims=True)
+    strongest = np.where((arms.motion < PRISMATIC) & (peak < np.inf), peak, 0.0).max(axis=1, keepdims=True)
     limits = bearing_limits(drives)
     limits[..., 0] = np.where(np.isnan(limits[..., 0]), strongest, limits[..., 0])
     limits = np.where(np.isnan(limits), np.inf, limits)[:, None, :, [0, 0, 1, 2]]  # (N, 1, D, 4)
@@ -67,7 +67,7 @@ def torques_by_payload(arms: ArmArrays, frames: Frames) -> Array:
     """Return the (N, K, D) torques that hold a payload, by its mass [N m/kg], or forces [N/kg]."""
     center = frames.from_tip(arms.payload_center)
     rises = np.cross(frames.axis, center[:, :, None] - frames.position)[..., 2]
-    return GRAVITY * np.where(arms.prismatic[:, None], frames.axis[..., 2], rises)
+    return GRAVITY * arms.by_independent(np.where(arms.prismatic[:, None], frames.axis[..., 2], rises))
 
 
 def held_payloads(postures: ReachPostures) -> ReachPayloads:
