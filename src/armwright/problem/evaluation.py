@@ -283,7 +283,8 @@ class Evaluation(Scene):
     @cached_property
     def _clearances(self) -> tuple[Array, Array]:
         own, clear = np.full((2, *self.q.shape[:2]), np.inf)
-        elsewhere = np.setdiff1d(np.arange(self.q.shape[1]), [] if self.plan is None else self.plan.targets)
+        visited = () if self.plan is None else self.plan.targets
+        elsewhere = np.array([t for t in range(self.q.shape[1]) if t not in visited], dtype=np.intp)
         if len(elsewhere):  # of the others, their motions tell
             rules = None if self.tip_rules is None else self.tip_rules[elsewhere]
             at_targets = clearances(self.arms, self.q[:, elsewhere], self.obstacles, self.device, rules)

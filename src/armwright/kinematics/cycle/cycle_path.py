@@ -242,7 +242,7 @@ def _measure(
             jumps[index, -1] |= gap > CLOSED
         first = np.concatenate([[0], np.cumsum(counts)])
         q = np.concatenate([path.q for path in group.paths], axis=1)
-        omitted, rules = group.source != np.arange(m), plan.path_rules(group.counts)
+        omitted, rules = group.source != np.arange(m, dtype=np.intp), plan.path_rules(group.counts)
         least, at = path_clearances(group.arms, q, first, obstacles, device, rules, omitted=omitted)
         least, at = (
             np.take_along_axis(least, group.source[None, None], 3),
@@ -293,7 +293,8 @@ def _look_between(
         share = np.clip(worst[place][:, None] + size * BETWEEN, NEAR_END, 1.0 - NEAR_END)  # (P, S)
         q = start + share[..., None] * (end - start)
         least, at = path_clearances(part, q, (0, len(BETWEEN)), obstacles, device, rules)
-        found, nearest = np.where(carries, least[:, 1, :, 0], least[:, 0, :, 0]), np.where(carries, *at[::-1, :, 0])
+        found = np.where(carries, least[:, 1, :, 0], least[:, 0, :, 0])
+        nearest: IndexArray = np.where(carries, at[1, :, 0], at[0, :, 0])
         best = np.take_along_axis(share, nearest[:, None], axis=1)[:, 0]
         worst[place] = np.where(found.min(axis=0) < clearance[:, *place].min(axis=0), best, worst[place])
         clearance[:, *place] = np.minimum(clearance[:, *place], found)

@@ -113,7 +113,7 @@ def _clearance(
     """Return the (N, B, S) clearance of postures at the first poses [m], at most 0; -inf for those that are unfit."""
     rules = plan.coarse_rules[np.repeat(plan.sample().first[plan.alike[0]], q.shape[2])]
     q, mask = np.where(unfit[..., None], 0.0, q).reshape(len(arms), -1, arms.dof), unfit.reshape(len(arms), -1)
-    each = np.arange(q.shape[1] + 1)
+    each = np.arange(q.shape[1] + 1, dtype=np.intp)
     least, _ = path_clearances(arms, q, each, obstacles, device, rules, most=0.0, omitted=mask)
     found = least[:, 1].min(axis=0)
     return np.where(unfit, -np.inf, found.reshape(unfit.shape))

@@ -81,23 +81,23 @@ def picks(counts: tuple[int, ...], source: tuple[int, ...], instants: Instants) 
         wanted[index] = np.unique(np.concatenate([of_motion, n - of_motion]))
     sizes = [len(wanted[index]) for index in own]
     start = dict(zip(own, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
-    low, high, share = [], [], []
+    low, high = np.empty((2, len(source), len(s)), dtype=np.intp)
+    share = np.empty(low.shape)
     for index, other in enumerate(source):
         n = counts[index] - 1
         before = np.minimum((s * n).astype(np.intp), n - 1)
         ends = (before, before + 1) if index == other else (n - before, n - before - 1)
-        low.append(np.searchsorted(wanted[other], ends[0]))
-        high.append(np.searchsorted(wanted[other], ends[1]))
-        share.append(s * n - before)
+        low[index], high[index] = (np.searchsorted(wanted[other], end) for end in ends)
+        share[index] = s * n - before
     way = np.array([1.0 if index == other else -1.0 for index, other in enumerate(source)])
     final = np.array([len(wanted[other]) - 1 for other in source])
     return Picks(
         sample=np.concatenate([begin[index] + wanted[index] for index in own]),
         motion_of=np.repeat(own, sizes),
         start=np.array([start[other] for other in source]),
-        low=np.array(low),
-        high=np.array(high),
-        share=np.array(share),
+        low=low,
+        high=high,
+        share=share,
         rate=rate,
         change=change,
         way=way,
