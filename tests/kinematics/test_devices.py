@@ -117,7 +117,7 @@ def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, encoding="utf-8")
     assert done.returncode == 0, done.stderr
     written = [path.read_text(encoding="utf-8") for path in tmp_path.glob("*.ptx")]
-    assert len(written) == int((tmp_path / "count").read_text(encoding="utf-8")) >= 17
+    assert len(written) == int((tmp_path / "count").read_text(encoding="utf-8")) >= 14
     assert all(".entry" in text and "sm_90" in text for text in written)
 
 

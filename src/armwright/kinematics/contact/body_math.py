@@ -42,14 +42,6 @@ def body_math(precision: Precision) -> SimpleNamespace:
         return wp.length(arms.middle[arm, t, i] - origin) + wp.length(arms.half[arm, i])
 
     @wp.func(inline=True)
-    def is_at_rest(arms: wp.ref[Posed], arm: int, i: int):
-        """Return whether no joint moves the body."""
-        for j in range(frame_of(arms, i)):  # noqa: SIM110 (Warp has no `all`)
-            if arms.motion[arm, j] < wp.static(FIXED):
-                return False
-        return True
-
-    @wp.func(inline=True)
     def to_link(arms: wp.ref[Posed], arm: int, i: int, k: int, length: real, motion: real, search: wp.ref[Search]):
         """Search for the least distance of the body from link k."""
         size, r = arms.half[arm, i], arms.radius[arm, k]
@@ -118,7 +110,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
                 joints_before += 1
             if arms.shape[arm, k] >= 0 and (i < dof or links_before > 1):
                 to_body(arms, arm, k, i, moved(reach, k, frame, lever), search)
-        if arms.shape[arm, dof] >= 0 and not is_at_rest(arms, arm, i):
+        if arms.shape[arm, dof] >= 0 and joints_before > 0:
             to_body(arms, arm, dof, i, moved(reach, 0, frame, lever), search)
 
     @wp.func(inline=True)
@@ -126,7 +118,11 @@ def body_math(precision: Precision) -> SimpleNamespace:
         arms: wp.ref[Posed], reach: wp.ref[Reach], solids: wp.ref[Solids], arm: int, i: int, search: wp.ref[Search]
     ):
         """Search for the least distance of the body from an obstacle."""
-        kind, size, dof, rests = arms.shape[arm, i], arms.half[arm, i], arms.motion.shape[1], is_at_rest(arms, arm, i)
+        kind, size, dof = arms.shape[arm, i], arms.half[arm, i], arms.motion.shape[1]
+        n_joints = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
+        for j in range(frame_of(arms, i)):
+            if arms.motion[arm, j] < wp.static(FIXED):
+                n_joints += 1
         motion = moved(reach, 0, frame_of(arms, i), lever_of(arms, arm, i, search.first))
         for o in range(solids.shape.shape[0]):
             search.t = search.first
@@ -138,7 +134,7 @@ def body_math(precision: Precision) -> SimpleNamespace:
                 if i >= dof and arms.allowed[t, o] >= zero:
                     allowed = arms.allowed[t, o]
                     counts = wp.min(counts, zero)
-                if rests:
+                if n_joints == 0:
                     counts = wp.min(counts, zero)
                 counts -= allowed
                 place = arms.middle[arm, t, i]
