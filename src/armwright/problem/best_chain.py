@@ -37,17 +37,21 @@ def best_chain(
     first = evaluate_arrays(arms, scene, device)
     best = judge(first, np.arange(len(arms)))
     paths = first.cycle_paths
-    if paths is None or paths.candidates is None:
+    if paths is None or paths.candidates is None or paths.blocked is None:
         return first, best
+    few = paths.candidates[:, :, :FEWER]
+    # Without other candidates the choice is the same, and a chain that is not blocked is the cheapest of fewer as well.
+    is_same = (few == paths.entry[:, :, None]).all(axis=3).any(axis=2).all(axis=1) & ~paths.blocked
+    is_same |= np.isnan(paths.candidates[:, :, FEWER:]).all(axis=(1, 2, 3))
     own = ((), ("masses",))  # needs of quantities that are fixed by the design alone
     is_fixed = [one.quantity.over == "arm" and one.quantity.needs in own for one in constraints]
     is_open = np.ones(len(arms), dtype=bool) if paths.branches is None else (paths.branches > 0).all(axis=1)
     violated = best.violations > 0.0
-    rows = np.flatnonzero(is_open & violated.any(axis=1) & ~violated[:, is_fixed].any(axis=1))
+    rows = np.flatnonzero(is_open & violated.any(axis=1) & ~violated[:, is_fixed].any(axis=1) & ~is_same)
     if not len(rows):
         return first, best
-    few, payload = paths.candidates[rows, :, :FEWER], float(scene.payload.max())
-    chosen = choose_postures(first.arms[rows], paths.plan, few, scene.obstacles, device, payload)
+    payload = float(scene.payload.max())
+    chosen = choose_postures(first.arms[rows], paths.plan, few[rows], scene.obstacles, device, payload)
     is_new = (np.abs(chosen.candidate - paths.entry[rows]).max(axis=(1, 2)) > SAME) & ~chosen.blocked
     if not is_new.any():
         return first, best

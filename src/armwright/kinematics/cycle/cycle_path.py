@@ -79,6 +79,7 @@ class CyclePaths:
     worst: Array  # (N, M, 3) share of the motion at which path error, angle and clearance are worst
     branches: IndexArray | None = None  # (N, B) as in `ChosenPostures`; None for rough paths
     candidates: Array | None = None  # (N, B, K, D) postures at the first pose of each block that were to choose from
+    blocked: NDArray[np.bool_] | None = None  # (N,) as in `ChosenPostures`; None for rough paths
     instants: Instants = EQUAL  # of each motion, at which its loads are evaluated
 
     def of_arm(self, row: int) -> tuple[ArmArrays, tuple[MotionPath, ...]]:
@@ -145,7 +146,7 @@ def find_paths(
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
     found = _measure(arms, plan, chosen.candidate, groups, jumps, obstacles, device)
-    return replace(found, branches=chosen.branches, candidates=postures)
+    return replace(found, branches=chosen.branches, candidates=postures, blocked=chosen.blocked)
 
 
 def rough_paths(
