@@ -88,11 +88,8 @@ def _terms(
     loaded = load_kernels("cycle.dynamics_kernels", device)
     terms = np.empty((*q.shape[:2], 6, q.shape[2]))
     full = np.empty((len(q), 0, 6, q.shape[2], 6)) if wrenches is None else wrenches
-    all_samples: tuple[IndexArray, IndexArray] = (
-        np.zeros(q.shape[1], dtype=np.intp),
-        np.zeros((len(q), 1), dtype=np.intp),
-    )
-    motion_of, source = motions or all_samples
+    zeros: IndexArray = np.zeros((len(q), q.shape[1]), dtype=np.intp)
+    motion_of, source = motions or (zeros[0], zeros[:, :1])
 
     def solve(chunk: slice) -> None:
         part = arms[chunk]
