@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from armwright.exceptions import TaskError
 from armwright.rotations import rotation_from_rpy
-from armwright.tasks.motions import Block, CyclePlan, Motion, along_line
+from armwright.tasks.motions import Block, CyclePlan, Motion
+from armwright.tasks.poses import along_line
 from armwright.tasks.targets import AXIS, ORIENTATION, REACHED
 from armwright.tasks.task import Task
 from armwright.tasks.tip_rules import APART

@@ -1,6 +1,6 @@
 """Per-target kinematics and statics of arms, not aggregated."""
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, cast
@@ -21,7 +21,7 @@ from armwright.kinematics.cycle.reserves import Reserves, bearing_reserves, hold
 from armwright.kinematics.cycle.supply_currents import SupplyCurrents, supply_currents
 from armwright.kinematics.cycle.torque_terms import TorqueTerms, inertia_matrices, torque_terms
 from armwright.kinematics.devices import Device
-from armwright.kinematics.ik.ik import LANES, UPDATES, Postures, solve_postures
+from armwright.kinematics.ik.ik import UPDATES, Postures, solve_postures
 from armwright.kinematics.reach.compliance import joint_loads, own_loads, unit_payload
 from armwright.problem.dexterous_volume import dexterous_volumes
 from armwright.problem.scene import Scene, task_scene
@@ -282,11 +282,11 @@ class Evaluation(Scene):
 
     @cached_property
     def _clearances(self) -> tuple[Array, Array]:
-        own, clear = np.full((2, *self.q.shape[:2]), np.inf)
-        visited = () if self.plan is None else self.plan.targets
+        visited = () if self.plan is None else self.plan.targets  # whose clearances the motions tell
         elsewhere = np.array([t for t in range(self.q.shape[1]) if t not in visited], dtype=np.intp)
-        if len(elsewhere):  # of the others, their motions tell
-            rules = None if self.tip_rules is None else self.tip_rules[elsewhere]
+        rules = None if self.tip_rules is None else self.tip_rules[elsewhere]
+        own, clear = np.full((2, *self.q.shape[:2]), np.inf)
+        if len(elsewhere):
             at_targets = clearances(self.arms, self.q[:, elsewhere], self.obstacles, self.device, rules)
             own[:, elsewhere], clear[:, elsewhere] = at_targets
         if self.cycle_paths is not None:
@@ -338,28 +338,10 @@ def evaluate(
     return evaluate_arrays(stack_arms(arms), scene, device)
 
 
-def cycle_kernels(oriented: bool, device: Device) -> list[tuple[str, *tuple[Hashable, ...]]]:
-    """Return the variants of kernels that `evaluate_arrays` needs for arms of a space along a cycle.
-
-    oriented: whether targets have an axis or an orientation.
-    """
-    ik = ("ik.ik_kernels", "float32", LANES[device], "any", "pose" if oriented else "position")
-    contact = ("contact.clearance_kernels", "float32")
-    return [
-        ik,
-        contact,
-        *((f"cycle.{name}_kernels",) for name in ("branch", "choice", "drive", "dynamics", "load", "path")),
-    ]
-
-
 def evaluate_arrays(
-    arrays: ArmArrays,
-    scene: Scene,
-    device: Device = "cpu",
-    initial_q: ArrayLike | None = None,
-    candidates: Array | None = None,
-    roughly_near: Array | None = None,
-) -> Evaluation:
+    arrays: ArmArrays, scene: Scene, device: Device = "cpu", initial_q: ArrayLike | None = None,
+    candidates: Array | None = None, roughly_near: Array | None = None,
+) -> Evaluation:  # fmt: skip
     """Evaluate stacked arms at every target of a scene, in their precision.
 
     Args:
@@ -392,15 +374,12 @@ def evaluate_arrays(
     restarts = scene.target_arrays.restarts
     if scene.plan is not None and arrays.couplings is not None:
         raise ArmError(f"an arm has joints that follow others; {NO_CYCLE}")
-
     if scene.plan is None:
         paths, postures = None, solve(initial_q, restarts=restarts)
     else:
         if roughly_near is None:
             heaviest = float(scene.payload.max())
-            paths = find_paths(
-                arrays, scene.plan, scene.obstacles, device=device, postures=candidates, payload=heaviest
-            )
+            paths = find_paths(arrays, scene.plan, scene.obstacles, None, device, candidates, heaviest)
         else:
             paths = rough_paths(arrays, scene.plan, roughly_near, scene.obstacles, device)
         q = paths.postures(len(targets))

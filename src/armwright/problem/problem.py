@@ -13,10 +13,11 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.cycle.line_following import IndexArray
 from armwright.kinematics.devices import Device, cores, load_all_kernels, resolve_device
+from armwright.kinematics.ik.ik import LANES
 from armwright.problem.arm_quantities import orientation_error
 from armwright.problem.best_chain import best_chain
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
-from armwright.problem.evaluation import Evaluation, cycle_kernels, evaluate_arrays
+from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.evaluators import Evaluator, Measurement
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Need, Objective
@@ -33,6 +34,10 @@ from armwright.tasks.task import Task
 
 POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
 SMALLEST_CHUNK = 8  # arms with a cycle; smaller chunks cost a thread more time than they save
+CYCLE_KERNELS = (
+    ("contact.clearance_kernels", "float32"),
+    *((f"cycle.{name}_kernels",) for name in ("branch", "choice", "drive", "dynamics", "load", "path")),
+)
 NO_MEASUREMENTS: Mapping[str, Array] = {}
 
 
@@ -162,7 +167,9 @@ class Problem:
     def load_kernels(self) -> None:
         """Load all kernels that evaluations along a cycle need, so that none is compiled in the middle of a search."""
         if self.task.cycle is not None:
-            load_all_kernels(cycle_kernels(self.task.target_arrays.oriented, self.device), self.device)
+            kind = "pose" if self.task.target_arrays.oriented else "position"
+            ik = ("ik.ik_kernels", "float32", LANES[self.device], "any", kind)
+            load_all_kernels([ik, *CYCLE_KERNELS], self.device)
 
     @property
     def max_reach(self) -> float:

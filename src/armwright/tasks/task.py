@@ -20,9 +20,10 @@ from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.files import check_name
 from armwright.tasks.cycle import IN_ORDER, Cycle, target_indices
 from armwright.tasks.moments import Mass
-from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
+from armwright.tasks.motions import CyclePlan, plan_cycle
 from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, Solid
 from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload
+from armwright.tasks.poses import along_line
 from armwright.tasks.targets import MAX_COORDINATE, Point, Target, TargetArrays, TargetPoint, stack_targets
 from armwright.tasks.tip_rules import Solids, TipRules, allowed_depths, placed, tip_solids
 from armwright.tasks.tool import NO_TOOL, Tool

@@ -18,8 +18,9 @@ from armwright.kinematics.cycle.cycle_choice import DEPTH
 from armwright.kinematics.cycle.line_following import follow_lines
 from armwright.kinematics.devices import Device, load_kernels
 from armwright.kinematics.ik.ik import solve_postures
-from armwright.tasks.motions import CyclePlan, Poses, single_samples
+from armwright.tasks.motions import CyclePlan, single_samples
 from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.poses import Poses
 
 STARTS, START_UPDATES = 32, 30  # of the inverse kinematics at each block's first pose
 KNOWN = 16  # of the postures found there that are mirrored, those that miss the pose included

@@ -11,7 +11,8 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays
 from armwright.kinematics.chunks import SAMPLES, in_chunks
 from armwright.kinematics.cycle.costs import joint_speeds
 from armwright.kinematics.devices import Device, Loaded, load_kernels
-from armwright.tasks.motions import LineSamples, Poses, single_samples
+from armwright.tasks.motions import LineSamples, single_samples
+from armwright.tasks.poses import Poses
 
 IndexArray = NDArray[np.intp]
 

@@ -48,13 +48,9 @@ def path_kernels() -> SimpleNamespace:
 
     @kernel
     def follow(
-        path: Path,
-        entry: wp.array3d(dtype=real),
-        aside_by: real,
-        q_path: wp.array4d(dtype=real),
-        worst_off: wp.array3d(dtype=real),
-        block_cost: wp.array3d(dtype=real),
-    ):
+        path: Path, entry: wp.array3d(dtype=real), aside_by: real, q_path: wp.array4d(dtype=real),
+        worst_off: wp.array3d(dtype=real), block_cost: wp.array3d(dtype=real),
+    ):  # fmt: skip
         """Follow the samples of a block.
 
         entry: (N, B K, D) postures at the first sample of each block.  aside_by: standard deviation of w, as a share

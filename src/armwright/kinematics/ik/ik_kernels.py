@@ -62,8 +62,7 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
     base, chain = lane_math(precision, lanes), ik_math(precision, lanes, motions)
     rotations, equations = pose_math(precision, lanes), normal_equations(precision, lanes)
     real, Lane, Wide, Arms = base.real, base.Lane, base.Wide, chain.Arms
-    at_least, select, scaled = base.at_least, base.select, base.scaled
-    dot, vector_of = base.dot, base.vector_of
+    at_least, select, scaled, dot, vector_of = base.at_least, base.select, base.scaled, base.dot, base.vector_of
     at_base, advance, limit = chain.at_base, chain.advance, chain.limit
     linear_column, angular_column = chain.linear_column, chain.angular_column
     tool_frame, error_rotation = rotations.tool_frame, rotations.error_rotation
@@ -75,13 +74,9 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
 
     @kernel
     def solve_ik(
-        arms: Arms,
-        targets: wp.array2d(dtype=Lane),
-        updates: int,
-        q_last: wp.array3d(dtype=Lane),
-        h_last: wp.array3d(dtype=Lane),
-        q_kept: wp.array3d(dtype=Lane),
-    ):
+        arms: Arms, targets: wp.array2d(dtype=Lane), updates: int, q_last: wp.array3d(dtype=Lane),
+        h_last: wp.array3d(dtype=Lane), q_kept: wp.array3d(dtype=Lane),
+    ):  # fmt: skip
         """Inverse kinematics of an arm at a group of targets.
 
         The arrays over joints live in its registers and stack. Passing them to functions copies them, which made a
@@ -92,9 +87,8 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
             has_axis, has_frame, metres_per_radian = targets[group, 13], targets[group, 14], targets[group, 15]
             counted = wp.matrix_from_rows(has_axis, has_axis, has_frame)  # angles of the tool
             unused = wp.matrix_from_rows(Lane(one) - has_axis, Lane(one) - has_axis, Lane(one) - has_frame)
-        q, kept = Joints(), Joints()
+        q, kept, weight, pull = Joints(), Joints(), Joints(), Joints()
         limit_n, limit_d = Joints(), Joints()  # H of the update before, n / d: fractions compare without division
-        weight, pull = Joints(), Joints()
         linear = Vectors()  # joint axes, then the position's columns of J
         angular = Vectors()  # joint positions, then the angles' columns of J
         for j in range(arms.dof):
@@ -126,7 +120,6 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
             nearest = wp.min(nearest, far)
             for j in range(arms.dof):
                 kept[j] = select(nearer, q[j], kept[j])
-
             # dx, shortened; the pull y is taken out of dx, because J# dx + (I - J# J) y = y + J# (dx - J y).
             dx = shortened(error, square)
             if wp.static(pose):
@@ -139,11 +132,11 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                     axis = wp.matrix_from_rows(linear[3 * j], linear[3 * j + 1], linear[3 * j + 2])
                     place = wp.matrix_from_rows(angular[3 * j], angular[3 * j + 1], angular[3 * j + 2])
                     moved = linear_column(arms.motion[arm, j], axis, p - place)
-                    for i in range(3):
-                        shared[3 * leader + i] += factor * moved[i]
                     if wp.static(pose):
                         turned = wp.cw_mul(counted, angular_column(arms.motion[arm, j], axis, s, t, f))
-                        for i in range(3):
+                    for i in range(3):
+                        shared[3 * leader + i] += factor * moved[i]
+                        if wp.static(pose):
                             shared_turn[3 * leader + i] += factor * turned[i]
             # The same of points alone, for which separate variables take a tenth less time.
             a11, a21, a22, a31, a32, a33 = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
@@ -158,15 +151,15 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                 axis = wp.matrix_from_rows(linear[3 * j], linear[3 * j + 1], linear[3 * j + 2])
                 place = wp.matrix_from_rows(angular[3 * j], angular[3 * j + 1], angular[3 * j + 2])
                 moved = linear_column(motion, axis, p - place)
+                if wp.static(pose):
+                    turned = wp.cw_mul(counted, angular_column(motion, axis, s, t, f))
                 if wp.static(coupled):
                     moved = wp.matrix_from_rows(shared[3 * j], shared[3 * j + 1], shared[3 * j + 2])
+                    turned = wp.matrix_from_rows(shared_turn[3 * j], shared_turn[3 * j + 1], shared_turn[3 * j + 2])
                 dx -= scaled(y_j, moved)
                 for i in range(3):
                     linear[3 * j + i] = moved[i]
                 if wp.static(pose):
-                    turned = wp.cw_mul(counted, angular_column(motion, axis, s, t, f))
-                    if wp.static(coupled):
-                        turned = wp.matrix_from_rows(shared_turn[3 * j], shared_turn[3 * j + 1], shared_turn[3 * j + 2])
                     turn -= scaled(y_j, turned)
                     for i in range(3):
                         angular[3 * j + i] = turned[i]
@@ -192,7 +185,6 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                     b31 += wp.cw_mul(c3, w1)
                     b32 += wp.cw_mul(c3, w2)
                     b33 += wp.cw_mul(c3, w3)
-
             if wp.static(pose):
                 along, about = pose_step(jjt, jwjt, dx, turn, unused)
             else:
@@ -205,7 +197,7 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                 q[j] = wp.min(wp.max(to, Lane(arms.lower[arm, j])), Lane(arms.upper[arm, j]))
             if wp.static(coupled):
                 for j in range(arms.dof):
-                    follow = arms.couplings[arm, j]
+                    follow = arms.couplings[arm, j]  # leader, factor, offset
                     q[j] = follow[1] * q[int(follow[0])] + Lane(follow[2])
 
         for j in range(arms.dof):
@@ -213,5 +205,5 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
             h_last[arm, group, j] = wp.cw_div(limit_n[j], limit_d[j])
             q_kept[arm, group, j] = kept[j]
 
-    static_torque = static_torque_kernel(precision, lanes, motions, kind)
-    return SimpleNamespace(Lane=Lane, Arms=Arms, solve_ik=solve_ik, static_torque=static_torque)
+    torque = static_torque_kernel(precision, lanes, motions, kind)
+    return SimpleNamespace(Lane=Lane, Arms=Arms, solve_ik=solve_ik, static_torque=torque)

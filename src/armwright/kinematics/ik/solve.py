@@ -12,7 +12,7 @@ from armwright.kinematics.arms.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.ik.ik import Postures, solve_postures
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import UrdfArm
-from armwright.tasks.motions import Poses
+from armwright.tasks.poses import Poses
 from armwright.tasks.targets import AXIS, ORIENTATION, REACHED
 
 ANGLE_REACHED = 1e-3  # [rad]

@@ -17,8 +17,8 @@ from armwright.kinematics.arms.forward import forward_kinematics
 from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.ik.ik import solve_postures
-from armwright.tasks.motions import Poses
 from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.poses import Poses
 from armwright.tasks.targets import AXIS
 
 N_SAMPLES = 2**15  # random postures
