@@ -35,7 +35,7 @@ BETWEEN = 16  # times as many instants of a sharp path, of which the largest val
 
 @dataclass(frozen=True)
 class CycleLoads:
-    """N arms along the M motions of a cycle, at F instants of each.
+    """N arms along the M motions of a cycle, at F instants of each; NaN of arms without loads (`CyclePaths`).
 
     Of sharp paths (`CycleGroup`), the largest values around each instant are kept.
     """
@@ -66,8 +66,9 @@ class CycleLoads:
 
 def holding_torques(paths: CyclePaths, terms: Sequence[TorqueTerms]) -> Array:
     """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
-    torques = np.empty((len(paths.jumps), len(paths.plan.motions), len(paths.instants), paths.groups[0].arms.dof))
-    for group, own in zip(paths.groups, terms, strict=True):
+    shape = len(paths.jumps), len(paths.plan.motions), len(paths.instants), paths.groups[0].arms.dof
+    torques = np.full(shape, np.nan)
+    for group, own in zip(paths.loaded, terms, strict=True):
         density = _density(group)
         gravity = _at_instants(own.torques[:, :, 0], group.counts, paths.instants.times(density))
         torques[group.index] = _thinned(gravity, density)
@@ -86,9 +87,9 @@ def cycle_loads(
     """
     plan, n = paths.plan, len(paths.jumps)
     m, dof = len(plan.motions), paths.groups[0].arms.dof
-    durations, holding = np.empty((n, m)), np.empty((n, m, dof))
-    torques, speeds = np.empty((2, n, m, len(paths.instants), dof))
-    for group, own in zip(paths.groups, terms, strict=True):
+    durations, holding = np.full((n, m), np.nan), np.full((n, m, dof), np.nan)
+    torques, speeds = np.full((2, n, m, len(paths.instants), dof), np.nan)
+    for group, own in zip(paths.loaded, terms, strict=True):
         density, gravity = _density(group), own.torques[:, :, 0]
         instants = paths.instants.times(density)
         size = max(1, 4 * SAMPLES[device] // (m * len(instants)))
@@ -113,8 +114,8 @@ def cycle_bearing_loads(
     terms: with wrenches.  durations: (N, M) of the motions [s].
     """
     loaded = load_kernels("cycle.bearing_kernels", device)
-    largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
-    for group, own in zip(paths.groups, terms, strict=True):
+    largest = np.full((*durations.shape, paths.groups[0].arms.dof, 3), np.nan)
+    for group, own in zip(paths.loaded, terms, strict=True):
         moments = _at(group.counts, paths.instants.times(_density(group)))
         arms, found = group.arms, np.empty_like(largest[group.index])
         given = (*moments, durations[group.index], arms.motion, arms.axis, bearing_offsets(arms), own.wrenches)

@@ -9,6 +9,7 @@ then followed with as many samples as it takes for neighbours to be near.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -50,10 +51,20 @@ class CycleGroup:
         """Number of samples along each motion."""
         return tuple(path.q.shape[1] for path in self.paths)
 
+    def __getitem__(self, rows: NDArray[np.bool_]) -> "CycleGroup":
+        """Return some of the arms."""
+        if rows.all():
+            return self
+        paths = tuple(MotionPath(path.motion, path.q[rows]) for path in self.paths)
+        return CycleGroup(self.index[rows], self.arms[np.flatnonzero(rows)], paths, self.source[rows], self.is_sharp)
+
 
 @dataclass(frozen=True)
 class CyclePaths:
-    """N arms along the M motions of a cycle."""
+    """N arms along the M motions of a cycle.
+
+    What means nothing of an arm is not computed, but NaN: clearances if its path is far off, loads if it jumps, too.
+    """
 
     plan: CyclePlan  # the cycle
     entry: Array
@@ -68,9 +79,21 @@ class CyclePaths:
     """(N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that speeds are
     not."""
     worst: Array  # (N, M, 3) share of the motion at which path error, angle and clearance are worst
+    is_off: NDArray[np.bool_]  # (N,) True if the path is far off, so that neither clearances nor jumps are known
     branches: IndexArray | None = None  # (N, B) as in `ChosenPostures`; None for rough paths
     candidates: Array | None = None  # (N, B, K, D) postures at the first pose of each block that were to choose from
     instants: Instants = EQUAL  # of each motion, at which its loads are evaluated
+
+    @property
+    def is_stopped(self) -> NDArray[np.bool_]:
+        """(N,) True for arms without loads."""
+        return self.is_off | self.jumps.any(axis=1)
+
+    @cached_property
+    def loaded(self) -> tuple[CycleGroup, ...]:
+        """The groups of the arms with loads."""
+        parts = (group[~self.is_stopped[group.index]] for group in self.groups)
+        return tuple(part for part in parts if len(part.index))
 
     def of_arm(self, row: int) -> tuple[ArmArrays, tuple[MotionPath, ...]]:
         """Return an arm, as one of one, and its path along each motion."""
@@ -128,13 +151,14 @@ def find_paths(
         done = (steps.max(axis=1) <= 1.0) | is_jump | chosen.hopeless[index] | (factor >= MAX_REFINEMENT)
         jumps[index] = is_jump[:, None] & is_line & (steps > 1.0)
         sharp = _is_sharp(part, paths) & ~is_jump & ~chosen.hopeless[index]
-        for rows, kind in ((np.flatnonzero(done & ~sharp), False), (np.flatnonzero(done & sharp), True)):
-            if len(rows):
-                found = tuple(MotionPath(path.motion, path.q[rows]) for path in paths)
-                groups.append(CycleGroup(index[rows], part[rows], found, _sources(plan, found), kind))
+        whole = CycleGroup(index, part, paths, _sources(plan, paths), is_sharp=False)
+        off = chosen.hopeless[index]
+        for rows, kind in ((done & ~sharp & ~off, False), (done & off, False), (done & sharp, True)):
+            if rows.any():
+                groups.append(replace(whole[rows], is_sharp=kind))
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
-    found = _measure(arms, plan, chosen.candidate, groups, jumps, obstacles, device)
+    found = _measure(arms, plan, chosen.candidate, groups, jumps, chosen.hopeless, obstacles, device)
     return replace(found, branches=chosen.branches, candidates=postures)
 
 
@@ -150,8 +174,8 @@ def rough_paths(
     entry = np.clip(near, arms.lower[:, None], arms.upper[:, None])
     paths = _follow(arms, plan, entry, ROUGH, device)
     group = CycleGroup(np.arange(len(arms)), arms, paths, _sources(plan, paths), is_sharp=False)
-    jumps = np.zeros((len(arms), len(paths)), dtype=bool)
-    return replace(_measure(arms, plan, entry, [group], jumps, obstacles, device, between=1), instants=FEW)
+    jumps, off = np.zeros((len(arms), len(paths)), dtype=bool), np.zeros(len(arms), dtype=bool)
+    return replace(_measure(arms, plan, entry, [group], jumps, off, obstacles, device, between=1), instants=FEW)
 
 
 def _refined(refinement: IndexArray, ratio: Array) -> IndexArray:
@@ -215,20 +239,26 @@ def _sources(plan: CyclePlan, paths: Sequence[MotionPath]) -> IndexArray:
 
 def _measure(
     arms: ArmArrays, plan: CyclePlan, entry: Array, groups: Sequence[CycleGroup], jumps: NDArray[np.bool_],
-    obstacles: Sequence[Obstacle], device: Device, between: int = 2,
+    is_off: NDArray[np.bool_], obstacles: Sequence[Obstacle], device: Device, between: int = 2,
 ) -> CyclePaths:  # fmt: skip
-    """Return the paths with what they are off by and how near they come; between: as in `_line_errors`."""
+    """Return the paths with what they are off by and how near they come; between: as in `_line_errors`.
+
+    is_off: (N,) as in `CyclePaths`, all alike in a group.
+    """
     n, m = jumps.shape
     values = np.zeros((5, n, m))
     worst, ends, step = np.zeros((n, m, 3)), np.empty((n, m, 2, arms.dof)), np.empty((n, m))
     for group in groups:
-        if plan.is_loop:
+        known = not is_off[group.index[0]]
+        if plan.is_loop and known:
             gap = np.abs(group.paths[-1].q[:, -1] - group.paths[0].q[:, 0]).max(axis=1)
             jumps[group.index, -1] |= gap > CLOSED
         errors = _line_errors(group, plan, device, between)
         q = np.concatenate([path.q for path in group.paths], axis=1)
         rules = joined_rules([plan.rules(path.motion, path.share) for path in group.paths])
-        clearance = np.stack(clearances(group.arms, q, obstacles, device, rules))  # (2, n, R)
+        clearance = np.full((2, *q.shape[:2]), np.nan)
+        if known:
+            clearance = np.stack(clearances(group.arms, q, obstacles, device, rules))  # (2, n, R)
         margin = group.arms.limit_distance(q)
         at = 0
         for i, path in enumerate(group.paths):
@@ -240,14 +270,14 @@ def _measure(
             values[2:4, group.index, i] = own.min(axis=2)
             worst[group.index, i, 2] = own.min(axis=0).argmin(axis=1) / (path.q.shape[1] - 1)
             values[4, group.index, i] = margin[:, at:end].min(axis=1)
-            if path.motion.by == "line":  # where a joint meets its limit, the speeds of the others jump
+            if path.motion.by == "line" and known:  # where a joint meets its limit, the speeds of the others jump
                 jumps[group.index, i] |= (margin[:, at + 1 : end - 1] <= ON_LIMIT).any(axis=1)
             ends[group.index, i], step[group.index, i] = path.q[:, [0, -1]], 1.0 / (path.q.shape[1] - 1)
             at = end
     if between > 1:
         _look_between(arms, plan, ends, step, values[2:4], worst[:, :, 2], obstacles, device)
     path_error, path_angle, own, clear, margin = values
-    return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
+    return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst, is_off)
 
 
 def _look_between(

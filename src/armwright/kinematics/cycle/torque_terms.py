@@ -30,12 +30,12 @@ class TorqueTerms(PerArm):
 def torque_terms(
     paths: CyclePaths, payload: float, device: Device = "cpu", wrenches: bool = False
 ) -> list[TorqueTerms]:
-    """Return the terms of each group of arms.
+    """Return the terms of each group of arms with loads.
 
     payload: its mass when carried [kg].  wrenches: compute those of the joints, too.
     """
     found: list[TorqueTerms] = []
-    for group in paths.groups:
+    for group in paths.loaded:
         q = np.concatenate([path.q for path in group.paths], axis=1)
         of_motions = [[np.broadcast_to(path.at(path.share, n), path.q.shape) for n in (1, 2)] for path in group.paths]
         states = np.concatenate([np.stack(each, axis=2) for each in of_motions], axis=1)
