@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 
 PENALTY = 1e100  # of infeasible designs; larger than any objective
+NOT_EVALUATED = 1e9  # violation of a constraint on what means nothing of an arm, such as torques on a path that jumps
+LARGEST_VIOLATION = 1e7  # of a constraint that was evaluated, where others may not be: all of them sum up to less
 
 
 def front_mask(values: Array) -> NDArray[np.bool_]:
@@ -142,7 +144,10 @@ def feasible_mask(violations: Array) -> NDArray[np.bool_]:
 
 
 def total_violation(violations: Array) -> Array:
-    """Return (N,) the sum of the positive violations (N, C); 0 for feasible designs."""
+    """Return (N,) the sum of the positive violations (N, C); 0 for feasible designs.
+
+    It orders designs by the stage that their evaluation reached, then by the violations known.
+    """
     return np.maximum(violations, 0.0).sum(axis=1)
 
 

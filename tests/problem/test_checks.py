@@ -11,7 +11,7 @@ from armwright.kinematics.arms.arm_arrays import FIXED
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.checks.finding import PROVEN, SUSPECTED
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
-from armwright.problem.checks.sampling import check_by_sampling, violations
+from armwright.problem.checks.sampling import check_by_sampling
 from armwright.problem.evaluators import load_evaluator
 from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
@@ -179,7 +179,7 @@ def test_proven_obstacles_leave_no_feasible_design(height: float, bounds: list[s
     checked = problem([[0.3, 0.1, height]], arm, obstacles=[TABLE], constraints=bounds, objectives=["torque"])
     assert [evidence for evidence, _ in found(checked)] == [PROVEN] * is_proven
     if is_proven:
-        sampled = violations(checked, checked.space.sample_matrix(3000, np.random.default_rng(0)))
+        sampled = checked.violations(checked.physics(checked.space.sample_matrix(3000, np.random.default_rng(0))))
         assert (sampled.max(axis=1) > 0.0).all()
         assert (sampled <= 0.0).any(axis=0).all()  # each alone can be satisfied
 

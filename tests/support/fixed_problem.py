@@ -77,7 +77,8 @@ def _fixed_paths(evaluation: Evaluation, plan: CyclePlan) -> CyclePaths:
     clearances = np.full((2, *error.shape), np.inf)
     nothing = np.zeros(error.shape)
     worst, entry = np.zeros((*error.shape, 3)), evaluation.q[:, [block.entry for block in plan.blocks]]
-    return CyclePaths(plan, entry, (), error, nothing, *clearances, nothing, nothing > 0.0, worst)
+    off = np.zeros(len(error), dtype=bool)
+    return CyclePaths(plan, entry, (), error, nothing, *clearances, nothing, nothing > 0.0, worst, off)
 
 
 LENGTH = Objective(

@@ -11,6 +11,7 @@ from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError
 from armwright.existing.existing_arm import known_values
 from armwright.kinematics.arms.arm_arrays import stack_arms
+from armwright.pareto import total_violation
 from armwright.problem import arm_quantities
 from armwright.problem.evaluation import NO_CYCLE, Evaluation
 from armwright.problem.problem import POSTURES_AT_ONCE, Problem
@@ -129,16 +130,7 @@ def _losses(problem: Problem, evaluation: Evaluation) -> Array:
     missed = np.maximum(evaluation.position_error - targets.tolerance, 0.0)
     missed += targets.metres_per_radian * np.maximum(evaluation.angle_error - targets.angle_tolerance, 0.0)
     excess = missed.sum(axis=1)
-    violation = _known_violation(problem, evaluation)
+    violation = total_violation(problem.known_violations(evaluation, known_values))
     torque = np.nan_to_num(known_values(arm_quantities.torque, evaluation)[0])
     met = np.where(violation > 0.0, 1.0 + violation / (1.0 + violation), torque / (1.0 + torque))
     return np.where(excess > 0.0, 2.0 + excess, met)
-
-
-def _known_violation(problem: Problem, evaluation: Evaluation) -> Array:
-    """Return (N,) sums of the violations of constraints on known quantities."""
-    violation = np.zeros(len(evaluation))
-    for constraint in problem.constraints:
-        if not known_values(constraint.quantity, evaluation)[1]:
-            violation += np.maximum(constraint(evaluation), 0.0)
-    return violation

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armwright.llm.answer import MAX_REASON_LENGTH
 from armwright.llm.answer_format import NOTHING, SINGLE, module_lists
+from armwright.pareto import NOT_EVALUATED
 from armwright.problem.branches import branches_of
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import AT_LIMIT, unreached_reason
@@ -49,7 +50,7 @@ class Digits:
         task = history.problem.task
         weight = space.max_joints * space.heaviest_link + task.tool.mass + 2.0 * float(task.payloads.max())
         heaviest = GRAVITY * reach * weight  # [N m], more than any torque
-        largest = np.abs(history.values[~history.failed]).max(axis=0, initial=0.0).tolist()
+        largest = np.abs(history.values).max(axis=0, initial=0.0, where=np.isfinite(history.values)).tolist()
         rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres
         objectives = tuple(max(3, _decimals(v)) for v in rough)
         return cls(
@@ -165,7 +166,9 @@ def _objectives(trial: FinishedTrial, at: Digits) -> str:
 
 
 def _number(value: float, decimals: int) -> str:
-    if not abs(value) < LARGE:
+    if not math.isfinite(value):
+        return "not evaluated"
+    if abs(value) >= LARGE:
         return f"{value:.4g}"
     return f"{round(value, decimals) + 0.0:.{decimals}f}"  # + 0.0 turns -0.0 into 0.0
 
@@ -191,11 +194,13 @@ def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
 def _violated(history: History, number: int) -> str:
     """Describe the violated constraints of a design; empty if the task has no constraints."""
     constraints = history.problem.constraints
+    pairs = zip(constraints, history.trials[number].violations, strict=True)
     violated = [
-        f"{c.quantity.symbol} = {c.measured(value):.4g}, not {c.relation} {c.bound:.12g}"
-        for c, value in zip(constraints, history.trials[number].violations, strict=True)
+        f"{c.quantity.symbol} not evaluated" if (has := c.measured(value)) is None
+        else f"{c.quantity.symbol} = {has:.4g}, not {c.relation} {c.bound:.12g}"
+        for c, value in sorted(pairs, key=lambda pair: pair[1] >= NOT_EVALUATED)
         if value > 0.0
-    ]
+    ]  # fmt: skip
     return ("; ".join(violated) or "none") if constraints else ""
 
 

@@ -44,7 +44,7 @@ def _figures(
     folder: Path, history: History, search: Mapping[str, Any] | None, existing: Sequence[ComparedArm]
 ) -> Iterator[tuple[str, Figure]]:
     """Yield figures by name; `search` is the record of a direct search, whose trials are its front."""
-    if len(history) and history.failed.all():
+    if len(history) and not history.evaluated.any():
         return  # there is nothing to draw
     yield "hypervolume", draw_hypervolume(history) if search is None else draw_search(history, search)
     if len(history.problem.objectives) > 1:
@@ -136,7 +136,7 @@ def draw_samples(history: History) -> Figure:
     for axes, iteration in zip(panels, shown, strict=False):
         part = History(history.problem, history.trials[: history.n_init + iteration], history.n_init)
         _scatter(axes, part, _reference(history), limits)
-        beyond = int(np.sum(np.any(part.values[~part.failed, :2] > limits[:, 1], axis=1)))
+        beyond = int(np.sum(np.any(part.values[part.evaluated, :2] > limits[:, 1], axis=1)))
         axes.set_title(f"After {iteration} iterations" + (f"\n({beyond} designs outside the view)" if beyond else ""))
         axes.label_outer()
     for axes in panels[len(shown) :]:
@@ -191,13 +191,13 @@ def _named(axes: Any, place: Any, sides: tuple[int, int], mark: str, label: str)
 def _limits(history: History) -> Array:
     """Return the drawn part of the plane (2, 2), low and high: where the feasible designs are, if there are any."""
     feasible = history.values[history.feasible]
-    shown = feasible if len(feasible) else history.values[~history.failed]
+    shown = feasible if len(feasible) else history.values[history.evaluated]
     return drawing.plane_limits(shown[:, :2], _reference(history), SHOWN)
 
 
 def _scatter(axes: Any, history: History, reference: Sequence[float], limits: Array, alpha: float = 0.85) -> None:
     values = history.values
-    infeasible = values[~history.feasible & ~history.failed]
+    infeasible = values[~history.feasible & history.evaluated]
     axes.scatter(*infeasible.T[:2], s=14, facecolors="none", edgecolors=INFEASIBLE, linewidths=0.7, zorder=2)
     for source in _sources(history):
         found = values[history.feasible & np.array([trial.source == source for trial in history])]
@@ -218,7 +218,7 @@ def _sources(history: History) -> list[str]:
 
 def _legend(history: History) -> list[Line2D]:
     marks = [_mark(look(source)) for source in _sources(history)]
-    if np.any(~history.feasible & ~history.failed):
+    if np.any(~history.feasible & history.evaluated):
         marks.append(drawing.legend_mark("infeasible", "o", INFEASIBLE, markerfacecolor="none", markersize=4))
     if len(history.problem.objectives) == 2:
         marks.append(Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front"))

@@ -186,7 +186,7 @@ def jumps(e: Evaluation) -> Array:
     """1 where the joints cannot move continuously on the way to the target, such as where the arm would have to flip
     into another posture, else 0.
     """
-    return e.largest_on_motions(e.paths.jumps.astype(np.float64))
+    return e.largest_on_motions(np.where(e.paths.is_off[:, None], np.nan, e.paths.jumps))
 
 
 @quantity("s", over="arm", needs=("cycle", "durations"), symbol="E_time")

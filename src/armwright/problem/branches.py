@@ -11,6 +11,7 @@ from armwright.arrays import Array
 from armwright.kinematics.cycle.cycle_choice import choose_postures
 from armwright.kinematics.cycle.entry_postures import entry_postures
 from armwright.problem.best_chain import SAME
+from armwright.problem.constraints import describe_violated
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
 from armwright.tasks.motions import CyclePlan
@@ -75,11 +76,10 @@ def _judged(problem: Problem, other: Evaluation, taken: Evaluation, row: int) ->
 
     other: of the design alone.  taken: of all designs, of which it is row `row`.
     """
-    pairs = zip(problem.constraints, problem.violations(other)[0].tolist(), strict=True)
-    violated = sorted((pair for pair in pairs if pair[1] > 0.0), key=lambda pair: -pair[1])
+    violated = describe_violated(problem.constraints, problem.violations(other)[0].tolist())
     if violated:
-        texts = [f"{c.description} ({c.measured(v):.4g} {c.quantity.unit})" for c, v in violated[:MOST]]
-        return f"violates {', '.join(texts)}{f' and {len(violated) - MOST} more' if len(violated) > MOST else ''}"
+        others = len(violated) - MOST
+        return f"violates {', '.join(violated[:MOST])}{f' and {others} more' if others > 0 else ''}"
     objectives = problem.objectives if problem.evaluator is None else ()
     values = [(one, f"{one.minimised(other)[0]:.4g}", f"{one.minimised(taken)[row]:.4g}") for one in objectives]
     texts = [f"{one.label.lower()} {new} instead of {old} {one.unit}" for one, new, old in values if new != old]

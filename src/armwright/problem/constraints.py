@@ -11,6 +11,7 @@ from typing import Literal, cast
 
 from armwright.arrays import LARGEST_OBJECTIVE, Array
 from armwright.exceptions import TaskError, did_you_mean
+from armwright.pareto import NOT_EVALUATED
 from armwright.problem.arm_quantities import CLEARANCES
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
@@ -55,10 +56,20 @@ class Constraint:
         excess = values - self.bound
         return (excess if self.relation == "<=" else -excess) / self.scale
 
-    def measured(self, violation: float) -> float:
-        """Return the quantity that has this violation, in its own unit, to 12 digits."""
+    def measured(self, violation: float) -> float | None:
+        """Return the quantity that has this violation, in its own unit, to 12 digits; None if it was not evaluated."""
+        if violation >= NOT_EVALUATED:
+            return None
         excess = self.scale * violation
         return float(f"{self.bound + (excess if self.relation == '<=' else -excess):.12g}")
+
+
+def describe_violated(constraints: Sequence[Constraint], violations: Sequence[float]) -> list[str]:
+    """Return the violated constraints with what a design has, the largest violation first, not evaluated ones last."""
+    pairs = [pair for pair in zip(constraints, violations, strict=True) if pair[1] > 0.0]
+    pairs.sort(key=lambda pair: -pair[1] if pair[1] < NOT_EVALUATED else 0.0)
+    texts = [(c, f"{c.measured(v):.4g} {c.quantity.unit}" if v < NOT_EVALUATED else "not evaluated") for c, v in pairs]
+    return [f"{constraint.description} ({text})" for constraint, text in texts]
 
 
 def read_constraints(texts: Sequence[str]) -> tuple[Constraint, ...]:

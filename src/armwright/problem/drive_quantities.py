@@ -92,7 +92,7 @@ def bearing_utilisation(e: Evaluation) -> Array:
     """
     if not e.has_bearing_limits:
         return np.zeros(e.position_error.shape)
-    return np.nan_to_num(e.bearing_loads / bearing_limits(e.drives)[:, None]).max(axis=(-2, -1))
+    return (e.bearing_loads / np.nan_to_num(bearing_limits(e.drives), nan=np.inf)[:, None]).max(axis=(-2, -1))
 
 
 @quantity("x load", over="arm", needs=MOTIONS, ratings=LIMITS, symbol="reserve", more_is_better=True)

@@ -77,9 +77,14 @@ class Evaluation(Scene):
         """(N, 1, B, D) posture at the first pose of each block of the cycle [rad] or [m]; None without a cycle."""
         return None if self.cycle_paths is None else self.cycle_paths.entry[:, None]
 
+    @property
+    def is_stopped(self) -> NDArray[np.bool_]:
+        """(N,) True for arms whose evaluation ended before all was known, of which that is NaN (`CyclePaths`)."""
+        return np.zeros(len(self), dtype=bool) if self.cycle_paths is None else self.cycle_paths.is_stopped
+
     @cached_property
     def torque_terms(self) -> list[TorqueTerms]:
-        """Terms of the torques along the cycle, for each group of arms."""
+        """Terms of the torques along the cycle, for each group of arms with loads."""
         return torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=self.has_bearing_limits)
 
     @property
@@ -170,7 +175,7 @@ class Evaluation(Scene):
     def motion_bearing_loads(self) -> Array:
         """(N, M, J, 3) the same in each motion of the cycle; SettingsError if a duration is not known."""
         terms = self.torque_terms
-        if not terms[0].wrenches.size:
+        if not all(own.wrenches.size for own in terms):
             terms = torque_terms(self.paths, float(self.payload.max()), self.device, wrenches=True)
         return cycle_bearing_loads(self.paths, terms, self.loads.durations, self.device)
 

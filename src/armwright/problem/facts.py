@@ -86,7 +86,7 @@ def facts_of(
     columns = [(quantity, *known(quantity, evaluation)) for quantity in QUANTITIES.values()]
     return [
         {
-            **{q.name: fact_of(q, finite_or_none(values[row]), reason) for q, values, reason in columns},
+            **{q.name: fact_of(q, finite_or_none(v[row]), reason * bool(np.isnan(v[row]))) for q, v, reason in columns},
             "mass": mass_fact(arm),  # which arrays have in the precision of the kernels
             VOLTAGE: _voltage(evaluation, row),
         }

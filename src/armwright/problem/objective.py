@@ -27,6 +27,7 @@ _OVER: Mapping[Over, str] = {
     "rms": " The root mean square over the targets.",
     "arm": "",
 }
+STOPPED = "not evaluated, since the arm misses a target or a line by far, or its path jumps"
 KEYS = {  # of ratings in records
     "peak": "peak_torque", "continuous": "rated_torque", "no_load_speed": "speed", "coulomb": "coulomb_friction",
 }  # fmt: skip
@@ -72,7 +73,8 @@ class Objective:
         except UnknownQuantityError as unknown:
             return np.full(len(evaluation), np.nan), unknown.reason
         finite = np.isfinite(values)
-        return np.where(finite, values, np.nan), "" if finite.all() else "it is not finite"
+        reason = STOPPED if evaluation.is_stopped.any() else "it is not finite"
+        return np.where(finite, values, np.nan), "" if finite.all() else reason
 
     def shares(self, evaluation: Evaluation) -> Array:
         """Return the shares of the targets in the minimised value, (N, T); for `over="arm"` the value itself, (N,)."""

@@ -17,8 +17,8 @@ from armwright.problem.failure import Failure
 class Outcome:
     """Hold the result of evaluating one design."""
 
-    values: tuple[float, ...]  # the M objectives, minimised; infinite if the evaluator failed
-    violations: tuple[float, ...] = ()  # of the C constraints; satisfied at <= 0
+    values: tuple[float, ...]  # the M objectives, minimised; infinite if not evaluated or if the evaluator failed
+    violations: tuple[float, ...] = ()  # of the C constraints; satisfied at <= 0; NOT_EVALUATED
     failure: Failure | None = None  # why the evaluator failed; None if it did not
     # Joint angles [rad] or strokes [m] at each target in the first case, 0 for joints that the design lacks
     q: tuple[tuple[float, ...], ...] = ()
@@ -30,8 +30,8 @@ class Outcome:
 class Outcomes:
     """Hold the results of evaluating N designs."""
 
-    values: Array  # (N, M) objectives, minimised; infinite where the evaluator failed
-    violations: Array  # (N, C) constraint violations; satisfied at <= 0
+    values: Array  # (N, M) objectives, minimised; infinite where not evaluated or the evaluator failed
+    violations: Array  # (N, C) constraint violations; satisfied at <= 0; NOT_EVALUATED where that is so
     failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])  # why the evaluator failed, by row
     # (N, C, B, D) at the first pose of each block of the cycle in each case [rad] or [m]; None without a cycle
     entry: Array | None = None

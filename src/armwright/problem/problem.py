@@ -1,6 +1,6 @@
 """The problem: a design space, a task, and the objectives to minimise."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -14,6 +14,7 @@ from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.cycle.line_following import IndexArray
 from armwright.kinematics.devices import Device, cores, load_all_kernels, resolve_device
 from armwright.kinematics.ik.ik import LANES
+from armwright.pareto import LARGEST_VIOLATION, NOT_EVALUATED
 from armwright.problem.arm_quantities import orientation_error
 from armwright.problem.best_chain import best_chain
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
@@ -254,17 +255,30 @@ class Problem:
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of N evaluated arms; SettingsError if one is not a finite number.
 
+        Objectives that were not evaluated (`CyclePaths`) are infinite.
         `measured` holds (N,) values of each objective that the custom evaluator measures.
         """
         values = [measured[o.name] if o.name in measured else o.minimised(evaluation) for o in self.objectives]
         names = [f"objective {o.name}" for o in self.objectives]
-        columns = _finite(values, names, len(evaluation))
+        columns = _finite(values, names, evaluation)
         return Outcomes(columns, self.violations(evaluation), entry=evaluation.entry, q=evaluation.q)
 
     def violations(self, evaluation: Evaluation) -> Array:
-        """Return the (N, C) violations of evaluated arms; SettingsError if one is not a finite number."""
-        violations = [constraint(evaluation) for constraint in self.constraints]
-        return _finite(violations, [f'constraint "{c.description}"' for c in self.constraints], len(evaluation))
+        """Return the (N, C) violations of evaluated arms; SettingsError if one is not a finite number.
+
+        Those that were not evaluated (`CyclePaths`) are NOT_EVALUATED.
+        """
+        columns = [constraint(evaluation) for constraint in self.constraints]
+        table = _finite(columns, [f'constraint "{c.description}"' for c in self.constraints], evaluation)
+        return table if evaluation.cycle_paths is None else _ordered(table)
+
+    def known_violations(
+        self, evaluation: Evaluation, known: Callable[[Objective, Evaluation], tuple[Array, str]] = Objective.known
+    ) -> Array:
+        """Return the (N, C) violations of evaluated arms, 0 of quantities that arms or task leave open."""
+        columns = [constraint.violation(known(constraint.quantity, evaluation)[0]) for constraint in self.constraints]
+        table = np.reshape(columns, (-1, len(evaluation))).T
+        return _ordered(np.where(np.isnan(table), np.where(evaluation.is_stopped, np.inf, 0.0)[:, None], table))
 
     def chunks(self, n: int) -> Iterator[slice]:
         """Yield the rows of n designs that are evaluated at once, so that their postures fit into memory."""
@@ -293,9 +307,8 @@ class Problem:
         """Return the physics of N arms on their best chain of postures."""
 
         def judge(evaluation: Evaluation, _: IndexArray) -> Outcomes:
-            values = [np.nan_to_num(c.violation(c.quantity.known(evaluation)[0])) for c in self.constraints]
-            violations = np.reshape(values, (-1, len(evaluation))).T
-            return Outcomes(np.empty((len(evaluation), 0)), violations, entry=evaluation.entry)
+            nothing = np.empty((len(evaluation), 0))
+            return Outcomes(nothing, self.known_violations(evaluation), entry=evaluation.entry)
 
         first, best = best_chain(arms, scene, self.constraints, judge, self.device)
         if best.entry is None or best.entry is first.entry:
@@ -316,11 +329,18 @@ class Problem:
         return 1 + (2 * len(length_columns(self.space)) if self.tolerance > 0.0 else 0)
 
 
-def _finite(columns: Sequence[Array], names: Sequence[str], n: int) -> Array:
-    """Return (n, K) of K columns; SettingsError if one holds anything but finite numbers."""
-    table = np.column_stack(columns) if columns else np.empty((n, 0))
-    if not np.all(np.isfinite(table)):
-        row, column = np.argwhere(~np.isfinite(table))[0]
+def _ordered(violations: Array) -> Array:
+    """Return violations that sum up in the order of stages: NOT_EVALUATED for infinite ones, others far below."""
+    return np.where(np.isinf(violations), NOT_EVALUATED, np.minimum(violations, LARGEST_VIOLATION))
+
+
+def _finite(columns: Sequence[Array], names: Sequence[str], evaluation: Evaluation) -> Array:
+    """Return (N, K) of K columns, infinite where not evaluated; SettingsError for other values that are not finite."""
+    table = np.column_stack(columns) if columns else np.empty((len(evaluation), 0))
+    table = np.where(evaluation.is_stopped[:, None] & np.isnan(table), np.inf, table)
+    wrong = ~np.isfinite(table) & ~evaluation.is_stopped[:, None]
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
         raise SettingsError(
             f"{names[column]}: expected a finite number for every design, got {table[row, column]}; try a large one "
             "for a bad design"

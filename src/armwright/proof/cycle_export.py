@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armwright.exceptions import SettingsError
+from armwright.exceptions import SettingsError, UnknownQuantityError
 from armwright.kinematics.arms.arm_arrays import FIXED, carrying, stack_arms
 from armwright.kinematics.cycle.motion_path import MotionPath
 from armwright.kinematics.cycle.trajectory import Trajectory, sample_trajectory
 from armwright.problem.evaluation import Evaluation, evaluate
+from armwright.problem.objective import STOPPED
 from armwright.problem.problem import Problem
 from armwright.proof.simulation_model import to_simulation_mjcf
 from armwright.robot.arm import Arm
@@ -60,7 +61,7 @@ def cycle_model(arm: Arm, task: Task) -> CycleModel:
     Examples:
         >>> import armwright as aw
         >>> task, space = aw.load_task("desk-sorting"), aw.load_space("desk-sorting")
-        >>> model = aw.cycle_model(space.arm(space.sample(1, 0)[0]), task)
+        >>> model = aw.cycle_model(space.arm(space.sample(6, 0)[-1]), task)
         >>> model.trajectory.q.shape[0] == len(model.trajectory.time)
         True
     """
@@ -79,6 +80,8 @@ def modelled(arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row:
 
 def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:
     """Return the trajectory of an arm, row `row` of an evaluation; SettingsError without a cycle of known durations."""
+    if evaluation.is_stopped[row]:
+        raise UnknownQuantityError(f"expected an arm that can follow the cycle; its loads are {STOPPED}", STOPPED)
     arrays = carrying(stack_arms([arm], "float64"), evaluation.load_shape)
     paths = tuple(
         MotionPath(path.motion, np.where(arrays.motion == FIXED, 0.0, path.q[..., : arrays.dof]))

@@ -17,10 +17,11 @@ import numpy as np
 from pydantic import BaseModel, model_validator
 from pydantic_core import to_jsonable_python
 
-from armwright.arrays import Array
+from armwright.arrays import Array, finite_or_none
 from armwright.exceptions import UnknownQuantityError
 from armwright.files import MAX_DERIVED, read_text
 from armwright.kinematics.cycle.motion_path import MotionPath
+from armwright.pareto import NOT_EVALUATED
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.branches import branches_of
 from armwright.problem.evaluation import Evaluation
@@ -228,7 +229,7 @@ def _record(history: History, number: int, arm: Arm, evaluation: Evaluation, row
         "source": trial.source,
         "reason": trial.reason,
         "params": dict(trial.design.params),
-        "objectives": objective_record(history, trial.values),
+        "objectives": objective_record(history, [*map(finite_or_none, trial.values)]),
         **({"violations": violation_record(history, trial)} if trial.violations else {}),
         "masses": history.problem.space.mass_note,
         **({"assumed": assumed} if assumed else {}),
@@ -256,7 +257,7 @@ def _motion(evaluation: Evaluation, row: int, joints: int) -> dict[str, Any]:
     """Return the motion of an arm through the cycle, with its number of joints."""
     _, paths = evaluation.paths.of_arm(row)
     try:
-        seconds = evaluation.loads.durations[row]
+        seconds = np.nan_to_num(evaluation.loads.durations[row], nan=UNTIMED)
     except UnknownQuantityError:
         seconds = np.full(len(paths), UNTIMED)
     return {
@@ -313,15 +314,16 @@ def _thinned(rows: Array) -> list[list[float]]:
     return [[float(f"{value:.{LOAD_DIGITS}g}") for value in column] for column in largest.T.tolist()]
 
 
-def violation_record(history: History, trial: FinishedTrial) -> dict[str, float]:
-    """Return the violations of a trial by constraint."""
-    return {c.description: value for c, value in zip(history.problem.constraints, trial.violations, strict=True)}
+def violation_record(history: History, trial: FinishedTrial) -> dict[str, float | None]:
+    """Return the violations of a trial by constraint; None where not evaluated."""
+    pairs = zip(history.problem.constraints, trial.violations, strict=True)
+    return {c.description: value if value < NOT_EVALUATED else None for c, value in pairs}
 
 
 def bounded_numbers(history: History, number: int) -> dict[str, float]:
-    """Return the quantities of a design that the constraints bound, by name."""
+    """Return the quantities of a design that the constraints bound, by name, as far as they were evaluated."""
     pairs = zip(history.problem.constraints, history.trials[number].violations, strict=True)
-    return {constraint.quantity.name: constraint.measured(violation) for constraint, violation in pairs}
+    return {c.quantity.name: has for c, violation in pairs if (has := c.measured(violation)) is not None}
 
 
 def objective_record(history: History, values: Sequence[T]) -> dict[str, T]:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.pareto import total_violation
+from armwright.pareto import NOT_EVALUATED, total_violation
 from armwright.problem.branches import branches_of
-from armwright.problem.constraints import Constraint
+from armwright.problem.constraints import Constraint, describe_violated
 from armwright.proof.cycle_faults import describe_faults, path_record
 from armwright.runs.history import History
 
@@ -77,9 +77,10 @@ class ViolationTally:
     def conflicts(self) -> list[tuple[int, ...]]:
         """Return the smallest sets of constraints, by index, that no design satisfies together.
 
-        These are all constraints that none satisfies at all, else the first set of the smallest size.
+        These are all evaluated constraints that none satisfies at all, else the first set of the smallest size.
         """
-        every = range(self.n_constraints)
+        evaluated = (np.array(list(self.nearest.values())) < NOT_EVALUATED).any(axis=0)
+        every = np.flatnonzero(evaluated).tolist()
         never = [(i,) for i in every if not self.n_satisfying([i])]
         if never:
             return never
@@ -95,7 +96,7 @@ def conflict_record(constraints: Sequence[Constraint], tally: ViolationTally) ->
         satisfied_by: Number of designs that satisfy each constraint.
         conflicts: Smallest sets of constraints that no design satisfies together.
         admitting: Constraints with other bounds, of the smallest sum of relative changes, that admit one of them;
-            bounds of 0 change only if no design meets all of these.
+            bounds of 0 change only if no design meets all of these; empty if none was evaluated to the end.
         admitting_alone: The smallest change of a single bound that does; None if no design violates only one.
     """
     names = [constraint.description for constraint in constraints]
@@ -104,6 +105,7 @@ def conflict_record(constraints: Sequence[Constraint], tally: ViolationTally) ->
     rigid = np.array([constraint.bound == 0.0 for constraint in constraints])
     is_adjustable = ~(rows[:, rigid] > 0.0).any(axis=1)
     rows = rows[is_adjustable] if is_adjustable.any() else rows
+    rows = rows[(rows < NOT_EVALUATED).all(axis=1)]  # no bound is known that admits others
     totals, violated = total_violation(rows), (rows > 0.0).sum(axis=1)
     alone = np.flatnonzero(violated == 1)
     single = None if not len(alone) else _loosened(constraints, rows[alone[np.argmin(totals[alone])]])[0]
@@ -111,7 +113,7 @@ def conflict_record(constraints: Sequence[Constraint], tally: ViolationTally) ->
         "designs": tally.n_designs,
         "satisfied_by": {name: tally.n_satisfying([i]) for i, name in enumerate(names)},
         "conflicts": [[names[i] for i in chosen] for chosen in tally.conflicts()],
-        "admitting": _loosened(constraints, rows[np.argmin(totals)]),
+        "admitting": _loosened(constraints, rows[np.argmin(totals)]) if len(rows) else [],
         "admitting_alone": single,
     }
 
@@ -128,7 +130,7 @@ def _loosened(constraints: Sequence[Constraint], violations: Array) -> list[str]
 def _rounded(constraint: Constraint, violation: float) -> float:
     """Return a bound of few digits that a design with this violation satisfies."""
     value = constraint.measured(violation)
-    if value == 0.0:
+    if not value:
         return 0.0
     step = 10.0 ** (math.floor(math.log10(abs(value))) - DIGITS + 1)
     outwards = math.ceil if constraint.relation == "<=" else math.floor
@@ -148,9 +150,7 @@ def describe_infeasibility(history: History, feasibility: Mapping[str, Any] | No
     found: Mapping[str, Any] = feasibility or {}
     if found.get("nearest") is None:
         found = feasibility_record(history)["feasibility"]
-    pairs = zip(constraints, history.violations[number].tolist(), strict=True)
-    worst_first = sorted(pairs, key=lambda pair: -pair[1])
-    violated = [f"{c.description} ({c.measured(v):.4g} {c.quantity.unit})" for c, v in worst_first if v > 0.0]
+    violated = describe_violated(constraints, history.violations[number].tolist())
     others = f", and {', '.join(violated[1:])}" if len(violated) > 1 else ""
     along = f"; along its cycle: {found['nearest']['faults']}" if found["nearest"]["faults"] else ""
     return (
@@ -168,11 +168,12 @@ def describe_conflict(record: Mapping[str, Any]) -> str:
         alone = f" ({', '.join(f'{met[name]:,}' for name in names)} alone)" if len(names) > 1 else ""
         none = f"none of {designs:,} designs satisfies" if designs > 1 else "the only design does not satisfy"
         parts.append(f"{none} {together}{alone}")
-    change = f"bounds that would admit one: {', '.join(record['admitting'])}"
+    if record["admitting"]:
+        parts.append(f"bounds that would admit one: {', '.join(record['admitting'])}")
     single = record["admitting_alone"]
     if single is not None and record["admitting"] != [single]:
-        change += f"; a single one: {single}"
-    return f"{'; '.join(parts)}; {change}"
+        parts.append(f"a single one: {single}")
+    return "; ".join(parts)
 
 
 def feasibility_record(history: History, tally: ViolationTally | None = None) -> dict[str, Any]:
@@ -197,14 +198,14 @@ def feasibility_record(history: History, tally: ViolationTally | None = None) ->
         measured = [constraint.measured(value) for constraint, value in zip(constraints, violations, strict=True)]
         nearest = {
             "number": number,
-            "violation": float(total_violation(violations[None])[0]),
+            "violation": float(total_violation(violations[None] * (violations < NOT_EVALUATED))[0]),
             "measured": dict(zip(names, measured, strict=True)),
             **path_record(evaluation, 0),
             "faults": "; ".join(filter(None, [describe_faults(evaluation, 0), *map(str, branches)])),
             **({"branches": asdict(branches[0])} if branches else {}),
         }
         conflict = conflict_record(constraints, tally or ViolationTally.of(history.violations[~history.failed]))
-    counts = (history.violations > 0.0).sum(axis=0).tolist()
+    counts = ((history.violations > 0.0) & (history.violations < NOT_EVALUATED)).sum(axis=0).tolist()
     return {
         "feasibility": {
             "infeasible": int((~history.feasible).sum()),

@@ -165,7 +165,7 @@ def _judged(problem: Problem, nominal: Sequence[Evaluation], changes: Iterable[C
             violations = np.array([constraint(evaluation) for constraint in geometry]).reshape(-1, len(changed.owners))
             fails = violations > allowed[:, None]
             reserves = reserve.known(evaluation)[0]
-            holds = ~(fails.any(axis=0) | (reserves < 1.0 - ROUNDING))
+            holds = ~(fails.any(axis=0) | evaluation.is_stopped | (reserves < 1.0 - ROUNDING))
             distances = clearance.known(evaluation)[0]
             for row in np.flatnonzero(changed.owners >= 0).tolist():
                 own, least = found[int(changed.owners[row])], finite_or_none(reserves[row])
@@ -213,7 +213,7 @@ def _describe_limit(evaluation: Evaluation, row: int) -> str:
     return f"{cause} of joint {joint + 1}, {place}"
 
 
-def _describe(constraint: Constraint, value: float) -> str:
+def _describe(constraint: Constraint, value: float | None) -> str:
     """Describe a bound that a geometry exceeds: `clearance -0.4 mm`."""
     label = constraint.quantity.label.lower()
     return label if constraint.quantity.unit == "targets" else f"{label} {fact_of(constraint.quantity, value).text}"

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
-from armwright.arrays import Array
+from armwright.arrays import Array, finite_or_none
 from armwright.files import MAX_DERIVED, naming_write_errors, read_text, replace_folder, to_csv
 from armwright.pareto import hypervolume
 from armwright.problem.assumptions import assumed_values
@@ -244,7 +244,7 @@ def _proposer_record(history: History, proposer: ProposerSummary) -> dict[str, A
 def _row(history: History, trial: FinishedTrial) -> dict[str, Any]:
     """Return a trial as a row of trials.csv."""
     params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
-    values = trial.values if trial.failure is None else [None] * len(trial.values)
+    values = [*map(finite_or_none, trial.values)]
     results = {**objective_record(history, values), **violation_record(history, trial)}
     failure = {} if not history.failed.any() else {"failure": trial.failure.kind if trial.failure else None}
     return {"number": trial.number, "source": trial.source, **params, **results, **failure}

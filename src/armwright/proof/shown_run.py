@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.pareto import hypervolume
+from armwright.pareto import NOT_EVALUATED, hypervolume
 from armwright.problem.arm_quantities import TORQUE_SCALE, torque
 from armwright.problem.assumptions import assumed_values
 from armwright.problem.facts import ASKED, Facts, describe_supply
@@ -170,7 +170,7 @@ def _designs(history: History) -> Arrays:
         "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
         "values": history.values,
         "params": params,
-        "violations": history.violations,
+        "violations": np.where(history.violations < NOT_EVALUATED, history.violations, np.nan),
         "q": q,
         "base": arms.base,
         "up": np.array(up, dtype=np.float32),

@@ -137,7 +137,7 @@ class Candidates:
         for name in {names[row] for row, _ in results}:
             own = [(row, trial) for row, trial in results if names[row] == name]
             alike = names == name
-            evaluated = [(row, trial) for row, trial in own if trial.failure is None]
+            evaluated = [(row, trial) for row, trial in own if trial.is_evaluated]
             if evaluated:
                 values[alike] = self._corrected(values[alike], np.flatnonzero(alike), evaluated)
             feasible[alike] = (1 + sum(history.feasible[trial.number] for _, trial in own)) / (1 + len(own))

@@ -80,7 +80,7 @@ class History:
 
     @cached_property
     def values(self) -> Array:
-        """(N, M) the objectives, infinite where the evaluation failed; units as in the problem's objectives."""
+        """(N, M) objectives, infinite where not evaluated or that failed; units as in the problem's objectives."""
         return self._matrix("values", len(self.problem.objectives))
 
     @cached_property
@@ -92,6 +92,11 @@ class History:
     def failed(self) -> NDArray[np.bool_]:
         """(N,) True if the evaluation failed."""
         return np.array([trial.failure is not None for trial in self.trials], dtype=bool)
+
+    @cached_property
+    def evaluated(self) -> NDArray[np.bool_]:
+        """(N,) True if all objectives are known."""
+        return np.array([trial.is_evaluated for trial in self.trials], dtype=bool)
 
     @cached_property
     def feasible(self) -> NDArray[np.bool_]:
@@ -166,7 +171,7 @@ class History:
 
         If fewer than FEW of these succeeded, the trials up to the FEW-th success, or all so far; None without any.
         """
-        succeeded = np.flatnonzero(~self.failed)[: self._n_needed]
+        succeeded = np.flatnonzero(self.evaluated)[: self._n_needed]
         if not len(succeeded):
             return None
         first = slice(max(self.n_init, int(succeeded[-1]) + 1))
@@ -176,7 +181,7 @@ class History:
     @property
     def has_reference_trials(self) -> bool:
         """Whether enough trials have succeeded for a reference point that further ones do not change."""
-        return len(self) >= self.n_init and int((~self.failed).sum()) >= self._n_needed
+        return len(self) >= self.n_init and int(self.evaluated.sum()) >= self._n_needed
 
     @property
     def _n_needed(self) -> int:
@@ -207,7 +212,11 @@ class History:
 def found_reference_point(values: Array, violations: Array) -> tuple[float, ...]:
     """Choose a reference point from the feasible designs if their front has M designs, else from all.
 
-    A front of fewer designs leaves hardly any volume within 1.1 times its values.
+    A front of fewer designs leaves hardly any volume within 1.1 times its values. If no design has all objectives, each
+    is taken by itself, and one that none has is 1.
     """
+    if not np.isfinite(values).all(axis=1).any():
+        known = np.where(np.isfinite(values), values, -np.inf).max(axis=0)
+        return default_reference_point(np.where(known > -np.inf, known, 1.0)[None])
     feasible = masked_objectives(values, violations)
     return default_reference_point(feasible if front_mask(feasible).sum() >= values.shape[1] else values)

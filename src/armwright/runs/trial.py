@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
-from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
+from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter, WrapValidator
 
 from armwright.arrays import LARGEST_OBJECTIVE
 from armwright.files import replace_surrogates
-from armwright.pareto import PENALTY
+from armwright.pareto import NOT_EVALUATED, PENALTY
 from armwright.problem.failure import Failure
 from armwright.problem.objective import Objective
 from armwright.problem.outcomes import Outcome
@@ -25,8 +25,17 @@ LONGEST = 1e8  # [s]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
 
 
-_Objectives = tuple[Annotated[float, Field(ge=-LARGEST_OBJECTIVE, le=LARGEST_OBJECTIVE)], ...]
-_Violations = tuple[Annotated[float, Field(ge=-PENALTY, le=PENALTY)], ...]
+def _null_for(missing: float) -> tuple[Any, Any]:
+    """Return how a number is read and written whose value, of what was not evaluated, is null in a line."""
+    return (
+        WrapValidator(lambda given, check: missing if given is None else check(given)),
+        PlainSerializer(lambda value: None if value >= missing else value),
+    )
+
+
+_Objective = Annotated[float, Field(ge=-LARGEST_OBJECTIVE, le=LARGEST_OBJECTIVE), *_null_for(math.inf)]
+_Objectives = tuple[_Objective, ...]
+_Violations = tuple[Annotated[float, Field(ge=-PENALTY, le=PENALTY), *_null_for(NOT_EVALUATED)], ...]
 _Angles = tuple[tuple[Annotated[float, Field(ge=-LONGEST, le=LONGEST)], ...], ...]
 _Entry = tuple[_Angles, ...]
 _Seconds = Mapping[str, Annotated[float, Field(ge=-LONGEST, le=LONGEST)]]
@@ -68,7 +77,7 @@ class FinishedTrial:
     number: int  # of the trial in its run, from 0
     source: str  # `random`, `initial_design`, `bbo`, `front_search`, or the name of the proposer
     design: _Params  # what was evaluated
-    values: _Objectives  # the objectives; infinite if its evaluation failed, and left out of its line
+    values: _Objectives  # objectives; infinite if not evaluated, null in its line, or if that failed, and left out
     proposal: str | None = None  # the proposal's id, if a proposer made the design
     reason: _Text = ""  # why the proposer suggested it
     fault: str | None = None  # why a trial that was a proposer's became a black-box one
@@ -88,6 +97,11 @@ class FinishedTrial:
     def outcome(self) -> Outcome:
         """What its evaluation found."""
         return Outcome(self.values, self.violations, self.failure, self.q, self.entry)
+
+    @property
+    def is_evaluated(self) -> bool:
+        """Return whether all of its objectives are known."""
+        return all(map(math.isfinite, self.values))
 
     @property
     def answer(self) -> str | None:

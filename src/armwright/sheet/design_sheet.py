@@ -8,6 +8,7 @@ from typing import Any
 from armwright.arrays import finite_or_none
 from armwright.files import MAX_DERIVED, read_text
 from armwright.problem.assumptions import assumed_values, describe_assumed
+from armwright.problem.constraints import describe_violated
 from armwright.problem.facts import Facts, reach_facts
 from armwright.proof.design_record import read_records
 from armwright.proof.recommendation import NOT_SIMULATED
@@ -20,7 +21,6 @@ from armwright.sheet.arm_lines import ASSUMED, arm_lines
 from armwright.sheet.joint_lines import joint_lines
 from armwright.sheet.parts import mass_lines, parts_list
 from armwright.sheet.record import DataSheet
-from armwright.text import rounded
 
 SHEET_VALUES = ("backlash", "joint_stiffness")  # of actuators, which a sheet depends on whatever the objectives
 
@@ -86,11 +86,7 @@ def _violated(history: History, number: int) -> tuple[str, ...]:
     trial = history.trials[number]
     if trial.failure is not None:
         return (f"its evaluation failed: {trial.failure.reason}",)
-    return tuple(
-        f"{constraint.description} (it has {rounded(constraint.measured(violation))})"
-        for constraint, violation in zip(history.problem.constraints, trial.violations, strict=True)
-        if violation > 0.0
-    )
+    return tuple(describe_violated(history.problem.constraints, trial.violations))
 
 
 def _assumptions(history: History, member: FrontMember, payload: float, unpriced: Sequence[str]) -> dict[str, str]:

@@ -30,7 +30,7 @@ VOLTAGE_SHARE = 0.9  # of the voltage, that suffices for it
 
 @dataclass(frozen=True)
 class CycleLoads:
-    """N arms along the M motions of a cycle, at F instants of each.
+    """N arms along the M motions of a cycle, at F instants of each; NaN of arms without loads (`CyclePaths`).
 
     Of sharp paths (`CycleGroup`), the largest values around each instant are kept.
     """
@@ -61,8 +61,9 @@ class CycleLoads:
 
 def holding_torques(paths: CyclePaths, terms: Sequence[TorqueTerms], device: Device = "cpu") -> Array:
     """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
-    torques = np.empty((len(paths.jumps), len(paths.plan.motions), len(paths.instants), paths.groups[0].arms.dof))
-    for group, own in zip(paths.groups, terms, strict=True):
+    shape = len(paths.jumps), len(paths.plan.motions), len(paths.instants), paths.groups[0].arms.dof
+    torques = np.full(shape, np.nan)
+    for group, own in zip(paths.loaded, terms, strict=True):
         load, _ = _loads(paths, group, own, device)
         at_rest = replace(load, inertial=np.zeros_like(load.inertial), velocity=np.zeros_like(load.velocity))
         drives, times = _without_drives(group.arms), np.ones(load.gravity.shape[:2])
@@ -83,9 +84,9 @@ def cycle_loads(
     """
     plan, n = paths.plan, len(paths.jumps)
     m, dof = len(plan.motions), paths.groups[0].arms.dof
-    durations, holding = np.empty((n, m)), np.empty((n, m, dof))
-    torques, speeds = np.empty((2, n, m, len(paths.instants), dof))
-    for group, own in zip(paths.groups, terms, strict=True):
+    durations, holding = np.full((n, m), np.nan), np.full((n, m, dof), np.nan)
+    torques, speeds = np.full((2, n, m, len(paths.instants), dof), np.nan)
+    for group, own in zip(paths.loaded, terms, strict=True):
         size = max(1, 4 * SAMPLES[device] // (m * len(paths.instants) * group.density))
         for rows in (slice(at, at + size) for at in range(0, len(group.index), size)):
             part = CycleGroup(group.index[rows], group.arms[rows], group.paths, group.source[rows], group.is_sharp)
@@ -119,8 +120,8 @@ def cycle_bearing_loads(
     terms: with wrenches.  durations: (N, M) of the motions [s].
     """
     loaded = load_kernels("cycle.load_kernels", device)
-    largest = np.empty((*durations.shape, paths.groups[0].arms.dof, 3))
-    for group, own in zip(paths.groups, terms, strict=True):
+    largest = np.full((*durations.shape, paths.groups[0].arms.dof, 3), np.nan)
+    for group, own in zip(paths.loaded, terms, strict=True):
         arms, found = group.arms, np.empty_like(largest[group.index])
         given = (_picks_on(paths, group, loaded), durations[group.index], arms.motion, arms.axis, bearing_offsets(arms))
         loaded.launch("bearing_loads", found.shape[:2], *given, own.wrenches, outputs=[found])

@@ -9,6 +9,7 @@ then followed with as many samples as it takes for neighbours to be near.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,10 +60,20 @@ class CycleGroup:
         """Return the samples that the loads at the instants need."""
         return picks(self.counts, paths.plan.source, paths.instants.times(self.density))
 
+    def __getitem__(self, rows: NDArray[np.bool_]) -> "CycleGroup":
+        """Return some of the arms."""
+        if rows.all():
+            return self
+        paths = tuple(MotionPath(path.motion, path.q[rows]) for path in self.paths)
+        return CycleGroup(self.index[rows], self.arms[np.flatnonzero(rows)], paths, self.source[rows], self.is_sharp)
+
 
 @dataclass(frozen=True)
 class CyclePaths:
-    """N arms along the M motions of a cycle."""
+    """N arms along the M motions of a cycle.
+
+    What means nothing of an arm is not computed, but NaN: clearances if its path is far off, loads if it jumps, too.
+    """
 
     plan: CyclePlan  # the cycle
     entry: Array
@@ -77,10 +88,22 @@ class CyclePaths:
     """(N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that speeds are
     not."""
     worst: Array  # (N, M, 3) share of the motion at which path error, angle and clearance are worst
+    is_off: NDArray[np.bool_]  # (N,) True if the path is far off, so that neither clearances nor jumps are known
     branches: IndexArray | None = None  # (N, B) as in `ChosenPostures`; None for rough paths
     candidates: Array | None = None  # (N, B, K, D) postures at the first pose of each block that were to choose from
     blocked: NDArray[np.bool_] | None = None  # (N,) as in `ChosenPostures`; None for rough paths
     instants: Instants = EQUAL  # of each motion, at which its loads are evaluated
+
+    @property
+    def is_stopped(self) -> NDArray[np.bool_]:
+        """(N,) True for arms without loads."""
+        return self.is_off | self.jumps.any(axis=1)
+
+    @cached_property
+    def loaded(self) -> tuple[CycleGroup, ...]:
+        """The groups of the arms with loads."""
+        parts = (group[~self.is_stopped[group.index]] for group in self.groups)
+        return tuple(part for part in parts if len(part.index))
 
     def of_arm(self, row: int) -> tuple[ArmArrays, tuple[MotionPath, ...]]:
         """Return an arm, as one of one, and its path along each motion."""
@@ -139,13 +162,14 @@ def find_paths(
         done = (steps.max(axis=1) <= 1.0) | is_jump | chosen.hopeless[index] | (factor >= MAX_REFINEMENT)
         jumps[index] = is_jump[:, None] & is_line & (steps > 1.0)
         sharp = _is_sharp(part, paths) & ~is_jump & ~chosen.hopeless[index]
-        for rows, kind in ((np.flatnonzero(done & ~sharp), False), (np.flatnonzero(done & sharp), True)):
-            if len(rows):
-                found = tuple(MotionPath(path.motion, path.q[rows]) for path in paths)
-                groups.append(CycleGroup(index[rows], part[rows], found, _sources(plan, found), kind))
+        whole = CycleGroup(index, part, paths, _sources(plan, paths), is_sharp=False)
+        off = chosen.hopeless[index]
+        for rows, kind in ((done & ~sharp & ~off, False), (done & off, False), (done & sharp, True)):
+            if rows.any():
+                groups.append(replace(whole[rows], is_sharp=kind))
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
-    found = _measure(arms, plan, chosen.candidate, groups, jumps, obstacles, device)
+    found = _measure(arms, plan, chosen.candidate, groups, jumps, chosen.hopeless, obstacles, device)
     return replace(found, branches=chosen.branches, candidates=postures, blocked=chosen.blocked)
 
 
@@ -161,8 +185,8 @@ def rough_paths(
     entry = np.clip(near, arms.lower[:, None], arms.upper[:, None])
     paths = _follow(arms, plan, entry, ROUGH, device)
     group = CycleGroup(np.arange(len(arms)), arms, paths, _sources(plan, paths), is_sharp=False)
-    jumps = np.zeros((len(arms), len(paths)), dtype=bool)
-    return replace(_measure(arms, plan, entry, [group], jumps, obstacles, device, between=1), instants=FEW)
+    jumps, off = np.zeros((len(arms), len(paths)), dtype=bool), np.zeros(len(arms), dtype=bool)
+    return replace(_measure(arms, plan, entry, [group], jumps, off, obstacles, device, between=1), instants=FEW)
 
 
 def _refined(refinement: IndexArray, ratio: Array) -> IndexArray:
@@ -226,9 +250,12 @@ def _sources(plan: CyclePlan, paths: Sequence[MotionPath]) -> IndexArray:
 
 def _measure(
     arms: ArmArrays, plan: CyclePlan, entry: Array, groups: Sequence[CycleGroup], jumps: NDArray[np.bool_],
-    obstacles: Sequence[Obstacle], device: Device, between: int = 2,
+    is_off: NDArray[np.bool_], obstacles: Sequence[Obstacle], device: Device, between: int = 2,
 ) -> CyclePaths:  # fmt: skip
-    """Return the paths with what they are off by and how near they come; between: as in `_line_errors`."""
+    """Return the paths with what they are off by and how near they come; between: as in `_line_errors`.
+
+    is_off: (N,) as in `CyclePaths`, all alike in a group.
+    """
     n, m = jumps.shape
     is_line, is_back = (np.array(each) for each in (
         [motion.by == "line" for motion in plan.motions], [i != source for i, source in enumerate(plan.source)]
@@ -237,28 +264,29 @@ def _measure(
     values, worst = np.zeros((5, n, m)), np.zeros((3, n, m))
     ends, step = np.empty((n, m, 2, arms.dof)), np.empty((n, m))
     for group in groups:
-        index, counts = group.index, np.array(group.counts)
-        if plan.is_loop:
+        index, counts, known = group.index, np.array(group.counts), not is_off[group.index[0]]
+        if plan.is_loop and known:
             gap = np.abs(group.paths[-1].q[:, -1] - group.paths[0].q[:, 0]).max(axis=1)
             jumps[index, -1] |= gap > CLOSED
         first = np.concatenate([[0], np.cumsum(counts)])
         q = np.concatenate([path.q for path in group.paths], axis=1)
-        omitted, rules = group.source != np.arange(m, dtype=np.intp), plan.path_rules(group.counts)
-        least, at = path_clearances(group.arms, q, first, obstacles, device, rules, omitted=omitted)
-        least, at = (
-            np.take_along_axis(least, group.source[None, None], 3),
-            np.take_along_axis(at, group.source[None], 2),
-        )
-        values[2:4, index] = np.where(carries, least[:, 1], least[:, 0])
-        worst[2, index] = (np.where(carries, at[1], at[0]) - first[group.source]) / (counts[group.source] - 1)
+        if known:
+            omitted, rules = group.source != np.arange(m, dtype=np.intp), plan.path_rules(group.counts)
+            least, at = path_clearances(group.arms, q, first, obstacles, device, rules, omitted=omitted)
+            least = np.take_along_axis(least, group.source[None, None], 3)
+            at = np.take_along_axis(at, group.source[None], 2)
+            values[2:4, index] = np.where(carries, least[:, 1], least[:, 0])
+            worst[2, index] = (np.where(carries, at[1], at[0]) - first[group.source]) / (counts[group.source] - 1)
+        else:
+            values[2:4, index] = np.nan
         for i, errors in _line_errors(group, plan, device, between).items():
             values[:2, index, i] = errors.max(axis=1).T
             worst[:2, index, i] = errors.argmax(axis=1).T / (errors.shape[1] - 1)
         margin = group.arms.limit_distance(q)
         values[4, index] = np.minimum.reduceat(margin, first[:-1], axis=1)
         margin[:, np.concatenate([first[:-1], first[1:] - 1])] = np.inf
-        # Where a joint meets its limit within a line, the speeds of the others jump.
-        jumps[index] |= is_line & (np.minimum.reduceat(margin, first[:-1], axis=1) <= ON_LIMIT)
+        if known:  # where a joint meets its limit within a line, the speeds of the others jump
+            jumps[index] |= is_line & (np.minimum.reduceat(margin, first[:-1], axis=1) <= ON_LIMIT)
         ends[index], step[index] = np.stack([q[:, first[:-1]], q[:, first[1:] - 1]], axis=2), 1.0 / (counts - 1)
     values[:2], worst[:2] = values[:2, :, plan.source], worst[:2, :, plan.source]
     worst = np.where(is_back, 1.0 - worst, worst)
@@ -266,7 +294,7 @@ def _measure(
         _look_between(arms, plan, ends, step, values[2:4], worst[2], obstacles, device)
     path_error, path_angle, own, clear, margin = values
     worst = np.moveaxis(worst, 0, 2)
-    return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
+    return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst, is_off)
 
 
 def _look_between(

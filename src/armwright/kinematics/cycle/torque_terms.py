@@ -31,12 +31,12 @@ class TorqueTerms(PerArm):
 def torque_terms(
     paths: CyclePaths, payload: float, device: Device = "cpu", wrenches: bool = False
 ) -> list[TorqueTerms]:
-    """Return the terms of each group of arms.
+    """Return the terms of each group of arms with loads.
 
     payload: its mass when carried [kg].  wrenches: compute those of the joints, too.
     """
     found: list[TorqueTerms] = []
-    for group in paths.groups:
+    for group in paths.loaded:
         picked = group.picks(paths)
         n, dof = len(group.index), group.arms.dof
         q, (q_s, q_ss) = np.empty((n, len(picked.sample), dof)), np.empty((2, n, len(picked.sample), dof))

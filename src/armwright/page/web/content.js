@@ -59,8 +59,9 @@ export class Content {
   source(i) { return this.head.sources[this._part("source", i)[0]]; }
   look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
   values(i) { return this._part("values", i); }
-  violations(i) { return this._part("violations", i); } // one per constraint; satisfied at <= 0
+  violations(i) { return this._part("violations", i); } // one per constraint; satisfied at <= 0; NaN: not evaluated
   hasFailed(i) { return i in this.failures; }
+  isEvaluated(i) { return this.values(i).every(Number.isFinite); } // all objectives are known
   isFeasible(i) { return !this.hasFailed(i) && this.violations(i).every((value) => value <= 0); }
 
   // The active parameters: the arm has their module, and its type uses them.

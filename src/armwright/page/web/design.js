@@ -65,7 +65,7 @@ export function drawDesign() {
   const iteration = head.is_study && i >= content.nInit ? ` Iteration ${i - content.nInit + 1}.` : "";
   const objectives = content.hasFailed(i) ? [`Evaluation failed (${content.failures[i]})`] : content.objectives.map((o, k) => {
     const mean = o.name === "position_error" && n > 1 ? ` summed over ${n} targets (${millimetres(values[k] / n)} on average)` : "";
-    return `${o.label} ${quantity(values[k], o.unit)}${mean}`;
+    return `${o.label} ${evaluated(values[k], o.unit)}${mean}`;
   });
   const feasible = head.constraints.length ? ` ${describeConstraints(i)}` : "";
   const motors = content.chosen(i, "motor").length ? ` Motors: ${content.chosen(i, "motor").join(", ")}.` : "";
@@ -95,12 +95,14 @@ export function drawDesign() {
   $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${ignored}${loads} ${head.masses}.${describeAssumed(i)}${solids}${lines}${boxes}${sheet}`;
 }
 
+const evaluated = (value, unit) => Number.isFinite(value) ? quantity(value, unit) : "not evaluated";
+
 // Describes the quantities that constraints bound.
 function describeConstraints(i) {
   const violations = content.violations(i);
   const values = content.head.constraints.map((c, k) => {
     const has = c.bound + c.sign * c.scale * violations[k];
-    return `${c.description}: ${quantity(has, c.unit)}${violations[k] > 0 ? " (violated)" : ""}`;
+    return `${c.description}: ${evaluated(has, c.unit)}${violations[k] > 0 ? " (violated)" : ""}`;
   });
   return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${values.join("; ")}.`;
 }

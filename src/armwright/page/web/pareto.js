@@ -68,7 +68,7 @@ function isPrecise() {
 function range(k) {
   const reference = content.head.reference_point;
   if (reference === null) return undefined;
-  const all = [...Array(content.n).keys()].filter((i) => !content.hasFailed(i)), feasible = all.filter((i) => content.isFeasible(i));
+  const all = [...Array(content.n).keys()].filter((i) => content.isEvaluated(i)), feasible = all.filter((i) => content.isFeasible(i));
   const within = (feasible.length ? feasible : all).filter((i) => [x, y].every((m) => content.values(i)[m] <= VIEW * reference[m]));
   const front = frontUntil(content.n), shown = within.length ? within : front.length ? front : all;
   if (!shown.length) return [0, VIEW * reference[k]];
@@ -139,7 +139,7 @@ function draw() {
   }
   const onFront = new Set(many && n === content.n ? content.head.front : front);
   const failed = [...Array(n).keys()].filter((i) => content.hasFailed(i));
-  const infeasible = [...Array(n).keys()].filter((i) => !content.isFeasible(i) && !content.hasFailed(i));
+  const infeasible = [...Array(n).keys()].filter((i) => !content.isFeasible(i) && content.isEvaluated(i));
   if (infeasible.length) {
     traces.push({
       ...points(infeasible), hovertemplate: "%{text}<br>%{x:.4g}, %{y:.4g}<extra>infeasible</extra>", name: "infeasible",
@@ -189,7 +189,7 @@ function draw() {
   };
   plot("pareto", traces, layout, CONFIG);
   const outside = reference === null ? 0
-    : [...Array(n).keys()].filter((i) => !content.hasFailed(i)).filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
+    : [...Array(n).keys()].filter((i) => content.isEvaluated(i)).filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
   const notes = ["Click a design to see its arm."];
   if (outside) notes.push(`${outside} of ${plural(n, "design")} ${outside === 1 ? "lies" : "lie"} outside this view; zoom out to see more.`);
   if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
@@ -224,7 +224,7 @@ function mark() {
   const { xaxis, yaxis } = $("pareto")._fullLayout, [width, height] = [xaxis._length, yaxis._length];
   for (const [id, i] of [["ring-selected", state.design], ["ring-compared", state.compared]]) {
     const ring = $(id);
-    ring.hidden = i === null || i >= until() || content.hasFailed(i);
+    ring.hidden = i === null || i >= until() || !content.isEvaluated(i);
     if (ring.hidden) continue;
     const values = content.values(i);
     const [left, top] = [xaxis.d2p(placed(values[x], 0)), yaxis.d2p(values[y])];

@@ -22,6 +22,7 @@ from armwright.spaces.parameters import CategoricalParameter, Design, FloatParam
 
 PHYSICS, DYNAMICS, PARAMETERS = "physics", "dynamics", "parameters"  # sets of inputs
 PROBES = 400  # random designs that scale the inputs
+FEW = 64  # of these, that tell which quantities are defined: most do not follow a cycle
 BASE = slice(3)  # columns of a design matrix: the position of the base, which means the same in every structure
 HEAVY_TAIL = 8.0  # the largest value over the median, from which a quantity counts by its logarithm
 LOG_FLOOR = 3e-2  # of the median, added before a logarithm
@@ -38,10 +39,13 @@ class Scaling:
     floors: Array  # (K,) added before the logarithm; NaN for columns that have none
     mean: Array  # (K,) after it
     deviation: Array  # (K,) after it
+    largest: Array  # (F,) of each column, for what was not evaluated
 
     @classmethod
     def of(cls, columns: Array) -> "Scaling":
-        """Return the scaling of columns (N, F)."""
+        """Return the scaling of columns (N, F); NaN where not evaluated."""
+        largest = np.fmax.reduce(columns, axis=0)
+        columns = np.where(np.isnan(columns), largest, columns)
         floors = np.array([_log_floor(column) for column in columns.T])
         shaped = _logarithms(columns, floors)
         deviation = shaped.std(axis=0)
@@ -52,11 +56,12 @@ class Scaling:
             if not kept or np.abs(units[:, kept].T @ units[:, column]).max() < SAME * len(units):
                 kept.append(column)
         index = np.array(kept, dtype=np.intp)
-        return cls(index, floors[index], shaped[:, index].mean(axis=0), deviation[index])
+        return cls(index, floors[index], shaped[:, index].mean(axis=0), deviation[index], largest)
 
     def __call__(self, columns: Array) -> Array:
         """Return the (N, K) scaled inputs of columns (N, F)."""
-        return (_logarithms(columns[:, self.kept], self.floors) - self.mean) / self.deviation
+        known = np.where(np.isnan(columns), self.largest, columns)[:, self.kept]
+        return (_logarithms(known, self.floors) - self.mean) / self.deviation
 
 
 def _log_floor(column: Array) -> float:
@@ -166,7 +171,7 @@ class CheapFeatures:
         problem = self._problem
         clearances = bool(problem.task.obstacles) or problem.uses("clearance")
         asked = [q for q in QUANTITIES.values() if q.name != "joints" and (clearances or "clearance" not in q.needs)]
-        evaluation = problem.physics(self._probes[:8])
+        evaluation = problem.physics(self._probes[:FEW])
         return tuple(quantity for quantity in asked if _is_defined(quantity, evaluation))
 
 
@@ -210,6 +215,7 @@ def _checked_features(function: FeatureFunction, designs: Sequence[Design]) -> A
 def _is_defined(quantity: Objective, evaluation: Evaluation) -> bool:
     """Return whether a quantity exists for such arms and such a task."""
     try:
-        return bool(np.all(np.isfinite(quantity(evaluation))))
+        values = quantity(evaluation)[~evaluation.is_stopped]
+        return bool(len(values)) and bool(np.all(np.isfinite(values)))
     except ArmwrightError:
         return False

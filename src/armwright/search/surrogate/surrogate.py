@@ -122,7 +122,7 @@ class Surrogate:
         An error is the root mean square over the standard deviation of the transformed objective; None if the objective
         is constant. Repeated designs count once, because predictions from their copies would be perfect.
         """
-        trials = [trial for trial in history if trial.duplicate_of is None and trial.failure is None]
+        trials = [trial for trial in history if trial.duplicate_of is None and trial.is_evaluated]
         if len(trials) < FEWEST:
             return None
         space = self.problem.space

@@ -12,7 +12,7 @@ from armwright.problem.problem import Problem
 from armwright.problem.stated_bounds import MARGIN, stated_bounds, with_bounds
 from armwright.runs.history import found_reference_point
 
-N_SAMPLE = 10  # random designs that give the provisional point
+N_SAMPLE, N_OF_CYCLE = 10, 200  # random designs that give the provisional point: of a cycle, most are not evaluated
 N_FEASIBLE = 1000  # feasible designs that give the final one
 RANGE_MARGIN = 0.5  # of the range of their front: later designs reach beyond it
 
@@ -22,7 +22,7 @@ class ReferenceSurvey:
 
     Where the constraints of the task imply a bound of an objective, the coordinate is 1.1 times the bound. The others
     come from the front of the first 1000 feasible designs that the search evaluates. Until then (`is_open`) the search
-    is bounded by a provisional point, from ten random designs, which matters little: infeasible designs rank by their
+    is bounded by a provisional point, from random designs, which matters little: infeasible designs rank by their
     violation.
     """
 
@@ -35,7 +35,8 @@ class ReferenceSurvey:
         if problem.reference_point is not None:
             self.point = problem.reference_point
         elif self.is_open:
-            random = problem.evaluate(problem.space.sample(N_SAMPLE, seed))
+            n = N_SAMPLE if problem.task.cycle is None else N_OF_CYCLE
+            random = problem.evaluate(problem.space.sample(n, seed))
             self.point = with_bounds(found_reference_point(random.values, random.violations), self._bounds)
         else:
             self.point = with_bounds([0.0] * len(self._bounds), self._bounds)
