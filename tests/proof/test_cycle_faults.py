@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from tests.support.command_line import armwright
 
 UPPER, FORE = 0.4, 0.35  # [m]
 SIDES = [[0.4, -0.3, 0.3], [0.4, 0.3, 0.3]]
+APART = [[0.45, -0.35, 0.3], [0.45, 0.35, 0.3]]  # reached also by joints of a narrow range
 SWEEP: dict[str, Any] = {"closed": False, "time": 1.0, "steps": [{"to": 1}, {"to": 2}]}
 POST = {"kind": "cylinder", "name": "post", "center": [0.5, 0.0, 0.2], "radius": 0.03, "height": 0.4}
 
@@ -75,7 +77,11 @@ def test_extremes_are_the_worst_of_all_samples() -> None:
 def test_motions_of_a_step_with_approach_are_named() -> None:
     targets = [{"position": position, "axis": [0, 0, -1]} for position in SIDES]
     steps = [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}]
-    record = path_record(driven({"time": 1.0, "approach": 0.05, "steps": steps}, targets=targets), 0)["path"]
+    task = {"name": "driven", "targets": targets, "cycle": {"time": 1.0, "approach": 0.05, "steps": steps}}
+    arm = turntable()
+    wrist, hand = Joint("revolute", "y", -2.8, 2.8), Link((0.0, 0.0, 0.1), 0.01, (0.0, 0.0, 0.05), 0.02)
+    arm = replace(arm, joints=(*arm.joints, wrist), links=(*arm.links, hand))
+    record = path_record(aw.evaluate(arm, Task.model_validate(task)), 0)["path"]
     assert record["path_error"]["motion"] in ("line out", "line in")
     assert record["path_angle"]["motion"] in ("line out", "line in")
     assert {record[name]["step"] for name in ("path_error", "clearance", "limit_distance")} <= {1, 2}
@@ -98,7 +104,7 @@ def test_line_out_of_reach_is_reported_with_its_place() -> None:
 
 
 def test_colliding_step_gets_a_via_point_that_avoids_the_obstacle() -> None:
-    evaluation = driven(SWEEP, obstacles=[POST], limit=1.5)  # too little to pass the post backwards
+    evaluation = driven(SWEEP, APART, 1.5, obstacles=[POST])  # too little to pass the post backwards
     extreme = path_extremes(evaluation.paths, 0)["clearance"]
     assert extreme.value < 0.0
     arm, (path,) = evaluation.paths.of_arm(0)
@@ -116,7 +122,7 @@ def test_colliding_step_gets_a_via_point_that_avoids_the_obstacle() -> None:
 
 def test_via_point_is_not_made_up() -> None:
     wall = {"kind": "box", "center": [0.5, 0.0, 0.5], "size": [0.9, 0.1, 4.0]}
-    evaluation = driven(SWEEP, obstacles=[wall], limit=1.5)  # too little to go round the back
+    evaluation = driven(SWEEP, APART, 1.5, obstacles=[wall])  # too little to go round the back
     assert "try a via point, a target on a way around it" in describe_faults(evaluation, 0)
 
 

@@ -29,7 +29,7 @@ DESIGNS = SPACE.sample(3, seed=0)
 def assert_equal(one: Evaluation, other: Evaluation) -> None:
     """Postures, torques, clearances and paths are equal to the bit."""
     for name in ("q", "reached", "angle_error", "joint_torques", "payload", "clearance"):
-        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
     assert np.array_equal(one.paths.path_error, other.paths.path_error)
 
 
