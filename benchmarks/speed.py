@@ -7,9 +7,7 @@ poses         targets with an axis or an orientation beside points, 100 updates 
               each variant of the kernels takes to compile
 clearance     links against each other and three obstacles, beside position error and torque
 real-arms     axis targets, clearance and motors beside the paper's objectives
-cycles        candidates, path, clearance, durations and torques along seven lines; and designs with `--robust`, whose
-              copies keep the postures of the design, beside copies that choose theirs
-motor-bodies  the same cycles with and without motor bodies and a column
+motor-bodies  cycles of seven lines with and without motor bodies and a column
 reach-map     about 2,000 points with 50 directions each, and of 1,000 poses the share that is missed of those that 60
               random restarts of `aw.solve` find
 
@@ -33,19 +31,16 @@ from one_core import on_one_core
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import armwright as aw
-from armwright.arrays import Array
 from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.devices import load_kernels
 from armwright.kinematics.ik.ik import LANES, solve_postures
 from armwright.problem.evaluation import evaluate_arrays
 from armwright.problem.objectives import named_objectives
-from armwright.problem.outcomes import Outcomes, worst_case
 from armwright.problem.problem import Problem
 from armwright.problem.scene import Scene
 from armwright.rotations import rotation_from_rpy
 from armwright.spaces.arm_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.spaces.tolerance import TOLERANCE, perturbed
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.targets import AXIS, ORIENTATION, position_targets
 from armwright.tasks.task import Task
@@ -198,39 +193,6 @@ def real_arms() -> None:
     )
 
 
-def cycles() -> None:
-    problem = Problem(CYCLE, CYCLE_SPACE)
-    matrix = CYCLE_SPACE.matrix(CYCLE_SPACE.sample(N_CYCLES, seed=0))
-    feasible = matrix[(problem.evaluate(matrix).violations <= 0.0).all(axis=1)]
-    many = feasible[np.arange(N_CYCLES) % len(feasible)]
-    robust = replace(problem, tolerance=TOLERANCE)
-    print(f"Cycles a second; {len(feasible)} of {N_CYCLES} random designs are feasible")
-    measure(
-        {
-            "random designs": lambda: problem.evaluate(matrix),
-            "feasible designs": lambda: problem.evaluate(many),
-            "feasible designs, robust": lambda: robust.evaluate(many),
-        },
-        N_CYCLES,
-        CYCLE_ROUNDS,
-    )
-    single = min(seconds(lambda: problem.evaluate(feasible[:1])) for _ in range(20))
-    print(f"  a single design: {1e3 * single:.2f} ms")
-    chosen = worst_case([problem.evaluate(rows) for rows in (feasible, *perturbed(CYCLE_SPACE, feasible))])
-    compare_copies(robust.evaluate(feasible), chosen)
-
-
-def compare_copies(kept: Outcomes, chosen: Outcomes) -> None:
-    """Print how many designs are feasible with all their copies, and how much the torque utilisation differs."""
-    holds, other = ((one.violations <= 0.0).all(axis=1) for one in (kept, chosen))
-    print(
-        f"  feasible with all copies: {holds.sum()} with kept postures, {other.sum()} with chosen ones, of {len(kept)}"
-    )
-    change: Array = (kept.values[:, 1] / chosen.values[:, 1] - 1.0)[holds & other]
-    shown = ", ".join(f"{value:+.1%}" for value in np.quantile(change, [0.0, 0.25, 0.5, 0.75, 1.0]))
-    print(f"  torque utilisation with kept postures relative to chosen ones, quartiles of {len(change)}: {shown}")
-
-
 def motor_bodies() -> None:
     matrix = CYCLE_SPACE.matrix(CYCLE_SPACE.sample(N_CYCLES, seed=0))
     work: dict[str, Callable[[], object]] = {}
@@ -270,7 +232,6 @@ PARTS = {
     "poses": poses,
     "clearance": clearance,
     "real-arms": real_arms,
-    "cycles": cycles,
     "motor-bodies": motor_bodies,
     "reach-map": reach_map,
 }

@@ -134,7 +134,7 @@ def test_payload_that_passes_an_obstacle_between_samples_collides() -> None:
     arm = Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", axis, -1.5, 1.5) for axis in "zyy"), tuple(links))
     payload = {"mass": 0.1, "center": [0.0, 0.0, 0.05], "size": [0.01, 0.01, 0.01]}
     cycle = {"closed": False, "time": 1.0, "steps": [{"to": 1, "do": "pick"}, {"to": 2}]}
-    content = {"targets": [[0.4, -0.3, 0.3], [0.4, 0.3, 0.3]], "payload": payload, "cycle": cycle}
+    content = {"targets": [[0.45, -0.35, 0.3], [0.45, 0.35, 0.3]], "payload": payload, "cycle": cycle}
     bare, (path,) = evaluate(arm, Task.model_validate({"name": "bare", **content})).paths.of_arm(0)
     steps = path.q.shape[1] - 1
     share = np.array([(steps // 2 + 0.5) / steps])

@@ -173,7 +173,9 @@ def test_fastest_motions_keep_the_makers_limits_with_less_voltage_and_more_paylo
     """No limit is exceeded in any of the three cases, and one of them is reached by each motion."""
     space = aw.load_space(name).model_copy(update={"safety_factor": safety_factor})
     problem = Problem(aw.load_task(name), space)
-    evaluation = problem.physics(space.sample(12, 3))
+    known = known_front(Problem(problem.task, default_space(name)))
+    assert known is not None
+    evaluation = problem.physics(known.designs[:12])
     scene, durations = problem.scenes[0], evaluation.loads.durations
     heavier = scene.__class__(**vars(scene) | {"payload": (1.0 + MORE_PAYLOAD) * scene.payload})
     weak = evaluation.reloaded(scene, evaluation.drives.at_voltage(VOLTAGE_SHARE))

@@ -202,8 +202,8 @@ def test_an_arm_with_weak_motors_fails_at_their_limits() -> None:
     [
         {"kind": "sphere", "center": [0.25, 0.11, 0.1], "radius": 0.08},
         {"kind": "box", "center": [0.28, 0.13, 0.2], "size": [0.16, 0.02, 0.4], "yaw": 0.4},
-        {"kind": "cylinder", "center": [0.25, 0.11, 0.2], "radius": 0.06, "height": 0.4},
-        {"kind": "mesh", "mesh": "lamp.stl", "position": [0.25, 0.11, 0.0], "points": WEDGE},
+        {"kind": "cylinder", "center": [0.28, 0.11, 0.2], "radius": 0.06, "height": 0.4},
+        {"kind": "mesh", "mesh": "lamp.stl", "position": [0.28, 0.1, 0.0], "points": WEDGE},
     ],
     ids=lambda shape: shape["kind"],
 )

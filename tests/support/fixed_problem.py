@@ -7,6 +7,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays
+from armwright.kinematics.contact.clearance import clearances
 from armwright.kinematics.cycle.cycle_path import CyclePaths
 from armwright.pareto import default_reference_point
 from armwright.problem.arm_quantities import position_error
@@ -74,11 +75,13 @@ def _fixed_paths(evaluation: Evaluation, plan: CyclePlan) -> CyclePaths:
     """Along a motion to a target, all is as at that target, but for a bow of the tip."""
     targets = [plan.targets[motion.step] for motion in plan.motions]
     error = evaluation.position_error[:, targets] + 0.025
-    clearances = np.full((2, *error.shape), np.inf)
+    near = clearances(evaluation.arms, evaluation.q, evaluation.obstacles, rules=evaluation.tip_rules)
     nothing = np.zeros(error.shape)
     worst, entry = np.zeros((*error.shape, 3)), evaluation.q[:, [block.entry for block in plan.blocks]]
     off = np.zeros(len(error), dtype=bool)
-    return CyclePaths(plan, entry, (), error, nothing, *clearances, nothing, nothing > 0.0, worst, off)
+    return CyclePaths(
+        plan, entry, (), error, nothing, *(each[:, targets] for each in near), nothing, nothing > 0.0, worst, off
+    )
 
 
 LENGTH = Objective(
