@@ -76,6 +76,7 @@ def _fixed_paths(evaluation: Evaluation, plan: CyclePlan) -> CyclePaths:
     targets = [plan.targets[motion.step] for motion in plan.motions]
     error = evaluation.position_error[:, targets] + 0.025
     near = clearances(evaluation.arms, evaluation.q, evaluation.obstacles, rules=evaluation.tip_rules)
+    own, free = (each[:, targets] for each in near)
     nothing = np.zeros(error.shape)
     worst, entry = np.zeros((*error.shape, 3)), evaluation.q[:, [block.entry for block in plan.blocks]]
     off = np.zeros(len(error), dtype=bool)
