@@ -80,9 +80,7 @@ def _fixed_paths(evaluation: Evaluation, plan: CyclePlan) -> CyclePaths:
     nothing = np.zeros(error.shape)
     worst, entry = np.zeros((*error.shape, 3)), evaluation.q[:, [block.entry for block in plan.blocks]]
     off = np.zeros(len(error), dtype=bool)
-    return CyclePaths(
-        plan, entry, (), error, nothing, *(each[:, targets] for each in near), nothing, nothing > 0.0, worst, off
-    )
+    return CyclePaths(plan, entry, (), error, nothing, own, free, nothing, nothing > 0.0, worst, off)
 
 
 LENGTH = Objective(
