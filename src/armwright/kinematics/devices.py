@@ -106,11 +106,6 @@ class Loaded:
     def struct(self, name: str, values: Mapping[str, Any]) -> Any:
         """Return a struct of the kernels on the device; values: by the names of its fields."""
         kind = getattr(self.kernels, name)
-        if self.device == "cuda":
-            made = kind()
-            for field, value in values.items():
-                setattr(made, field, self._given(value, kind.vars[field].type))
-            return made
         packed, arrays = kind.ctype(), list[Any]()
         for field, value in values.items():
             array, given = self._described(value, kind.vars[field].type)
@@ -125,34 +120,30 @@ class Loaded:
         """
         kernel = getattr(self.kernels, name)
         arguments = zip((*inputs, *outputs), kernel.adj.args, strict=True)
-        if self.device == "cpu":
-            described = [self._described(value, argument.type) for value, argument in arguments]
-            self.warp.launch(kernel, dim, inputs=[given for _, given in described], device="cpu")
-            return
-        given = [self._given(value, argument.type) for value, argument in arguments]
-        self.warp.launch(kernel, dim, inputs=given, device=self.device)
-        for values, found in zip(outputs, given[len(inputs) :], strict=True):
-            values[...] = found.numpy()
+        described = [self._described(value, argument.type) for value, argument in arguments]
+        self.warp.launch(kernel, dim, inputs=[given for _, given in described], device=self.device)
+        if self.device == "cuda":
+            for values, (found, _) in zip(outputs, described[len(inputs) :], strict=True):
+                values[...] = found.numpy()
 
     def _described(self, value: Any, kind: Any) -> tuple[Any, Any]:
-        """Return a value, kept as long as a kernel may read it, and what a kernel or a struct on the CPU takes for it.
+        """Return a value, kept as long as a kernel may read it, and what a kernel or a struct takes for it.
 
-        Warp takes a descriptor of an array as it is; making its own array would take three times as long.
+        Warp takes a descriptor of an array as it is; on the CPU, making its own array would take three times as long.
         """
-        if isinstance(value, np.ndarray):
-            scalar, inner, descriptor = _layout(self.warp, kind.dtype)
-            values = np.ascontiguousarray(cast("NDArray[Any]", value), dtype=scalar)
-            outer, address = values.ndim - inner, values.__array_interface__["data"][0]
-            return values, descriptor(address, 0, outer, values.shape[:outer], values.strides[:outer])
-        return value, value.__ctype__() if isinstance(value, self.warp.array) else value
-
-    def _given(self, value: Any, kind: Any) -> Any:
-        """Return a value as a kernel or a struct takes it."""
-        return self.array(cast("NDArray[Any]", value), kind.dtype) if isinstance(value, np.ndarray) else value
+        if not isinstance(value, np.ndarray):
+            return value, value.__ctype__() if isinstance(value, self.warp.array) else value
+        if self.device == "cuda":
+            array = self.array(cast("NDArray[Any]", value), kind.dtype)
+            return array, array.__ctype__()
+        scalar, inner, descriptor = _layout(self.warp, kind.dtype)
+        values = np.ascontiguousarray(cast("NDArray[Any]", value), dtype=scalar)
+        outer, address = values.ndim - inner, values.__array_interface__["data"][0]
+        return values, descriptor(address, 0, outer, values.shape[:outer], values.strides[:outer])
 
 
 class _Packed:
-    """A struct as kernels on the CPU take it, with the arrays that it points to."""
+    """A struct as kernels take it, with the arrays that it points to."""
 
     def __init__(self, ctype: Any, arrays: Sequence[Any]) -> None:
         self._ctype, self._arrays = ctype, arrays
