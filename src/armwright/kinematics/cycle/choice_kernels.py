@@ -25,13 +25,9 @@ def choice_kernels() -> SimpleNamespace:
 
     @kernel
     def joint_motions(
-        q: wp.array4d(dtype=real),
-        first: wp.array(dtype=int),
-        end: wp.array(dtype=int),
-        speed: wp.array2d(dtype=real),
-        times: wp.array(dtype=real),
-        costs: wp.array4d(dtype=real),
-    ):
+        q: wp.array4d(dtype=real), first: wp.array(dtype=int), end: wp.array(dtype=int), speed: wp.array2d(dtype=real),
+        times: wp.array(dtype=real), costs: wp.array4d(dtype=real),
+    ):  # fmt: skip
         """Compute the costs of joint motions from each candidate of a block to each of the next one.
 
         q: (N, K, S, D) [rad] or [m].  first: (B + 1,), end: (B,) samples of blocks.  speed: (N, D) [rad/s] or [m/s].
@@ -50,13 +46,9 @@ def choice_kernels() -> SimpleNamespace:
 
     @kernel
     def choose(
-        blocks: wp.array3d(dtype=real),
-        edges: wp.array4d(dtype=real),
-        arms: wp.array(dtype=int),
-        total: wp.array3d(dtype=real),
-        came_from: wp.array3d(dtype=int),
-        choice: wp.array2d(dtype=int),
-    ):
+        blocks: wp.array3d(dtype=real), edges: wp.array4d(dtype=real), arms: wp.array(dtype=int),
+        total: wp.array3d(dtype=real), came_from: wp.array3d(dtype=int), choice: wp.array2d(dtype=int),
+    ):  # fmt: skip
         """Choose the candidates of some arms.
 
         blocks: (N, B, K).  edges: (N, E, K, K), E = B if a joint motion closes the cycle.  arms: (n,).

@@ -91,19 +91,10 @@ def picks(counts: tuple[int, ...], source: tuple[int, ...], instants: Instants) 
         share[index] = s * n - before
     way = np.array([1.0 if index == other else -1.0 for index, other in enumerate(source)])
     final = np.array([len(wanted[other]) - 1 for other in source])
-    return Picks(
-        sample=np.concatenate([begin[index] + wanted[index] for index in own]),
-        motion_of=np.repeat(own, sizes),
-        start=np.array([start[other] for other in source]),
-        low=low,
-        high=high,
-        share=share,
-        rate=rate,
-        change=change,
-        way=way,
-        first=np.where(way > 0.0, 0, final),
-        last=np.where(way > 0.0, final, 0),
-    )
+    sample = np.concatenate([begin[index] + wanted[index] for index in own])
+    begins = np.array([start[other] for other in source])
+    first, last = np.where(way > 0.0, 0, final), np.where(way > 0.0, final, 0)
+    return Picks(sample, np.repeat(own, sizes), begins, low, high, share, rate, change, way, first, last)
 
 
 def quintic(t: Array) -> tuple[Array, Array, Array]:
