@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.pareto import (
-    FrontTracker,
     default_reference_point,
     feasible_mask,
     front_indices,
     front_mask,
+    hypervolume_history,
     masked_objectives,
     total_violation,
 )
@@ -150,11 +150,7 @@ class History:
         """(N,) after each trial, the random ones included; (0,) without a reference point."""
         if self.reference_point is None:
             return np.zeros(0)
-        tracker, volumes = FrontTracker(len(self.problem.objectives), self.reference_point), np.zeros(len(self))
-        for i, row in enumerate(self.masked_objectives):
-            tracker.add(row)
-            volumes[i] = tracker.hypervolume
-        return volumes
+        return hypervolume_history(self.masked_objectives, self.reference_point)
 
     @property
     def hypervolume(self) -> Array:
