@@ -124,14 +124,6 @@ class History:
         """The trials of proposers."""
         return tuple(trial for trial in self.trials if trial.source not in NOT_PROPOSED)
 
-    @cached_property
-    def _designs(self) -> set[Design]:
-        return {trial.design for trial in self.trials}
-
-    def has_tried(self, design: Design) -> bool:
-        """Return whether a trial has this design."""
-        return design in self._designs
-
     def before(self, number: int) -> "History":
         """Return the history at the start of trial `number`."""
         if number >= len(self):
