@@ -219,16 +219,12 @@ class ModelClient(LlmBackend):
         return self._reply(messages[len(past) :], started)
 
     def _reply(self, messages: Sequence[ModelMessage], started: float) -> Reply:
-        responses = [message for message in messages if isinstance(message, ModelResponse)]
-        costs = [cost_of(response, self._server) for response in responses]
-        return Reply(
-            answer=text_of(responses[-1]) if responses else "",
-            requests=len(responses),
-            input_tokens=sum(response.usage.input_tokens for response in responses),
-            output_tokens=sum(response.usage.output_tokens for response in responses),
-            cost_usd=sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
-            seconds=round(time.perf_counter() - started, 3),
-        )
+        reply = Reply()
+        for response in messages:
+            if isinstance(response, ModelResponse):
+                usage, cost = response.usage, cost_of(response, self._server)
+                reply = reply.plus(Reply(text_of(response), 1, usage.input_tokens, usage.output_tokens, cost))
+        return replace(reply, seconds=round(time.perf_counter() - started, 3))
 
     def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:
         """Run the coroutine in the event-loop thread and return its result.
