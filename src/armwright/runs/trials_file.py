@@ -20,4 +20,4 @@ def read_trials(path: Path, config: RunConfig) -> tuple[list[FinishedTrial], int
 
 def count_trials(path: Path) -> int:
     """Return the number of lines of a file, which are not read as trials; 0 without a file."""
-    return len(read_log(path, lambda *_: None, "")[0])
+    return len(read_log(path, lambda line, _: line, "")[0])
