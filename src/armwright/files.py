@@ -7,13 +7,15 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import FileIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
-from armwright.exceptions import ArmwrightError, RunFolderError
+from pydantic import ValidationError
+
+from armwright.exceptions import ArmwrightError, DesignError, RunFolderError
 
 MAX_DERIVED = 64 * 1024 * 1024  # [bytes] of a file that a run derives from its trials, far above the largest
 MAX_LINE = 16 * 1024 * 1024  # [bytes] of a record; a prompt has at most 1,000,000 characters
@@ -21,6 +23,9 @@ MAX_RECORDS = 1024 * 1024 * 1024  # [bytes] of a file of records, such as 300,00
 _PART = re.compile(r"(\d{1,10})-[0-9a-f]{16}\.part$")  # of a process
 # Windows reserves device names, whatever their suffix, and drops a dot at the end.
 _NO_FILE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?|.*\.", re.IGNORECASE)
+
+
+T = TypeVar("T")
 
 
 @contextmanager
@@ -66,6 +71,39 @@ def read_records(file: BinaryIO, path: Path) -> Iterator[bytes]:
             raise RunFolderError(f"{path}: expected at most {limit // 1024**2:,} MiB of {of}; restore the file")
         if line.endswith(b"\n"):
             yield line[:-1]
+
+
+def read_log(path: Path, parse: Callable[[bytes, int], T], way_out: str) -> tuple[list[T], int]:
+    """Return the records of a file that grows line by line, and its length [bytes] without a truncated last line.
+
+    Without a file there are none. `parse` gets a line and its number, from 0.
+
+    Raises:
+        RunFolderError: The file cannot be read, or a line is damaged; the message ends with the way out.
+    """
+    records: list[T] = []
+    end = 0
+    try:
+        with path.open("rb") as file:
+            for number, line in enumerate(read_records(file, path)):
+                end += len(line) + 1
+                records.append(parse(line, number))
+    except FileNotFoundError:
+        return [], 0
+    except OSError as fault:
+        raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
+    except (ValueError, DesignError) as fault:
+        raise RunFolderError(
+            f"{path}, line {len(records) + 1} is damaged ({_first_error(fault)}); {way_out}"
+        ) from fault
+    return records, end
+
+
+def _first_error(fault: Exception) -> str:
+    if not isinstance(fault, ValidationError):
+        return str(fault)
+    first = fault.errors(include_url=False, include_context=False, include_input=False)[0]
+    return f"{'.'.join(map(str, first['loc']))}: {first['msg'].removeprefix('Value error, ')}".removeprefix(": ")
 
 
 def replace_file(target: Path, content: bytes, mode: int = 0o666) -> None:

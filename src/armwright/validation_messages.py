@@ -1,7 +1,8 @@
-"""Messages about values that a schema refuses: the key, what is expected with its unit, what was found, what to try."""
+"""Messages about values that are refused: the key, what is expected with its unit, what was found, what to try."""
 
 import json
 import math
+import operator
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -11,10 +12,11 @@ from typing import Any, Literal, cast, get_args, get_origin
 from pydantic import PydanticUserError, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from armwright.exceptions import did_you_mean
+from armwright.exceptions import SettingsError, did_you_mean
 from armwright.schema_types import all_keys_of, field_path, keys_of, members_of, owners_of, type_at
 from armwright.units import KEY_UNITS, read_quantity
 
+_MAX_INTEGER = 2**31 - 1
 _COUNTS = {2: "two", 3: "three", 4: "four"}
 _DIRECTIONS = {"down": [0, 0, -1], "up": [0, 0, 1]}
 _BOUNDS = {
@@ -26,6 +28,17 @@ _BOUNDS = {
 _TELLING = ("extra_forbidden", "value_error", *_BOUNDS)  # errors of a value of the right type
 _MOST_ALTERNATIVES = 20  # errors of one value that are looked at
 _LETTERS = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+def check_integer(name: str, value: Any, least: int) -> int:
+    """Return the value as an int; SettingsError unless it is an integer from `least` on."""
+    try:
+        number = operator.index(value)  # accepts the integers of numpy
+    except TypeError:
+        number = -1
+    if isinstance(value, bool) or not least <= number <= _MAX_INTEGER:
+        raise SettingsError(f"{name}: expected a whole number from {least} to {_MAX_INTEGER}, got {value!r}")
+    return number
 
 
 def describe_fault(fault: ValidationError, schema: Any, data: Any) -> str:

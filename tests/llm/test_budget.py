@@ -1,7 +1,7 @@
 """Call and cost budgets of a run, and its forecast."""
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +9,9 @@ import pytest
 from pydantic_ai.messages import ModelResponse
 from pydantic_ai.usage import RequestUsage
 
-from armwright import LlmProposer, ModelOptions, PromptOptions
+from armwright import LlmProposer, ModelOptions
 from armwright.exceptions import ModelError, ProposalError
-from armwright.llm.backend import LlmBackend, OutputFormat, Question, Reply, Turn
-from armwright.llm.budget import CallBudget
+from armwright.llm.backend import FREE_TEXT, AskOptions, LlmBackend, OutputFormat, Question, Reply
 from armwright.llm.prices import describe_cost
 from armwright.llm.responses import cost_of
 from armwright.llm.servers import server_of
@@ -49,14 +48,8 @@ class Greedy(LlmBackend):
         self.go_on = threading.Event()
         self._lock = threading.Lock()
 
-    def ask(
-        self,
-        question: Question,
-        output: OutputFormat | None = None,
-        most_requests: int | None = None,
-        earlier: Sequence[Turn] | None = None,
-    ) -> Reply:
-        taken = min(self.most, most_requests or self.most)
+    def ask(self, question: Question, options: AskOptions = FREE_TEXT) -> Reply:
+        taken = min(self.most, options.most_requests or self.most)
         with self._lock:
             self.requests += taken
         self.asking.set()
@@ -178,14 +171,14 @@ def test_refused_answers_in_flight_stay_within_the_budget(chat_server: ChatServe
 @pytest.mark.parametrize("threads", [3, 4, 8])
 def test_concurrent_calls_share_one_budget(budget: dict[str, Any], threads: int) -> None:
     backend = Greedy()
-    came = Session(backend, "asking", PromptOptions(), CallBudget(**budget)).ask_together(threads, lambda: None)
+    came = Session(backend, "asking", ModelOptions(**budget)).ask_together(threads, lambda: None)
     assert backend.requests == min(10, 3 * threads)
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["budget"] * max(0, threads - 4)
 
 
 def test_cancel_releases_calls_waiting_for_budget() -> None:
     backend = Greedy()
-    session = Session(backend, "asking", PromptOptions(), CallBudget(max_calls=3))
+    session = Session(backend, "asking", ModelOptions(max_calls=3))
     came = session.ask_together(4, session.cancel)
     assert backend.requests == 3
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["cancelled"] * 3

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from armwright import Problem, load_task, optimize
 from armwright.exceptions import ModelError
 from armwright.llm import client as chat
-from armwright.llm.backend import FINAL, CallError, Question
+from armwright.llm.backend import FINAL, AskOptions, CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.study.progress import Progress, StudyResult
 from tests.fuzz.mutation import changed
@@ -264,7 +264,7 @@ def test_arbitrary_responses_are_answers_or_faults(
         question = Question("llm-0004", step, "Which?")
         with suppress(CallError):
             if step == "answer":
-                asked.backend.ask(question, asked.output_format(PROBLEM))
+                asked.backend.ask(question, AskOptions(asked.output_format(PROBLEM)))
             else:
                 asked.backend.ask(question)
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from armwright import LlmProposer, ModelOptions, Problem, load_task, optimize
-from armwright.llm.backend import CHECK, CHECK_FORMAT, CallError, OutputFormat, Question, Reply
+from armwright.llm.backend import CHECK, CHECK_FORMAT, AskOptions, CallError, OutputFormat, Question, Reply
 from armwright.llm.client import ModelClient
 from armwright.llm.transport import MAX_RESPONSE
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, completion, wants_design
@@ -79,7 +79,7 @@ def client(server: ChatServer, **options: Any) -> ModelClient:
 
 
 def check(asked: ModelClient) -> Reply:
-    return asked.ask(CHECK, CHECK_FORMAT)
+    return asked.ask(CHECK, AskOptions(CHECK_FORMAT))
 
 
 def fault(call: Callable[[], object]) -> CallError:
@@ -112,7 +112,7 @@ def test_harmless_oddities_are_accepted(chat_server: ChatServer, case: str) -> N
     chat_server.answer = answer
     asked = client(chat_server)
     assert json.loads(check(asked).answer) == ANSWER
-    reply = asked.ask(QUESTION, FORMAT)
+    reply = asked.ask(QUESTION, AskOptions(FORMAT))
     assert (json.loads(reply.answer), reply.requests) == (ANSWER, 1)
     if case == "odd usage":
         assert (reply.input_tokens, reply.output_tokens) == (0, 2)

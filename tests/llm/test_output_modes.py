@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from armwright.exceptions import ModelError
-from armwright.llm.backend import CallError, Question
+from armwright.llm.backend import AskOptions, CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.study.progress import Progress, StudyResult
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer, is_check
@@ -148,8 +148,9 @@ def test_question_without_a_check_finds_the_mode_once(chat_server: ChatServer) -
     """As of drafts and of Optuna studies."""
     chat_server.answer = refusing(*STRUCTURED)
     asked = llm_proposer(chat_server.url)
+    asking = AskOptions(asked.output_format(PROBLEM))
     for number in (4, 7):
-        reply = asked.backend.ask(Question(f"llm-{number:04d}", "answer", "Which?"), asked.output_format(PROBLEM))
+        reply = asked.backend.ask(Question(f"llm-{number:04d}", "answer", "Which?"), asking)
         assert (reply.output_mode, reply.requests) == ("prompted", 1)
     assert len(chat_server.requests) == 3 + 1
 
@@ -159,17 +160,18 @@ def test_question_without_a_check_leaves_an_ignored_mode(chat_server: ChatServer
     """Within the requests of a question, if need be over several of them."""
     chat_server.answer = ignoring(*STRUCTURED)
     asked = llm_proposer(chat_server.url)
-    question, form = Question("llm-0004", "answer", "Which?"), asked.output_format(PROBLEM)
+    question = Question("llm-0004", "answer", "Which?")
+    asking = AskOptions(asked.output_format(PROBLEM), most_requests)
     spent: list[int] = []
     while not chat_server.requests or chat_server.requests[-1].keys() & set(STRUCTURED):
         try:
-            reply = asked.backend.ask(question, form, most_requests)
+            reply = asked.backend.ask(question, asking)
         except CallError as fault:
             reply = fault.reply
         spent.append(reply.requests)
     assert spent == ([7] if most_requests is None else [3, 3, 1])  # an answer is asked for three times in a mode
     assert reply.output_mode == "prompted"
-    assert asked.backend.ask(question, form, most_requests).requests == 1
+    assert asked.backend.ask(question, asking).requests == 1
 
 
 @pytest.mark.parametrize("wrong", ["link_1", "joint_1"])
@@ -177,6 +179,6 @@ def test_invalid_design_is_no_reason_to_leave_a_mode(chat_server: ChatServer, wr
     chat_server.answer = lambda request: json.dumps({**GOOD_DESIGN, wrong: "7"})
     asked = llm_proposer(chat_server.url)
     with pytest.raises(CallError, match=wrong):
-        asked.backend.ask(Question("llm-0004", "answer", "Which?"), asked.output_format(PROBLEM))
+        asked.backend.ask(Question("llm-0004", "answer", "Which?"), AskOptions(asked.output_format(PROBLEM)))
     assert all("response_format" in request for request in chat_server.requests)
     assert len(chat_server.requests) == 3

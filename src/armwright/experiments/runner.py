@@ -15,14 +15,13 @@ from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
 from armwright.proof.results import read_summary
-from armwright.runs.config import check_same_run
+from armwright.runs.config import check_same_run, run_config
 from armwright.runs.folder import read_config
 from armwright.search.samplers import sampler_factory, sampler_for
 from armwright.spaces.design_space import default_space, load_space
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.study.front.front_run import find_front
 from armwright.study.progress import RunResult
-from armwright.study.run_settings import run_config
 from armwright.study.settings import study_method
 from armwright.study.study import optimize
 from armwright.study.workers.cluster import MAX_LOSSES, Cluster, Finished, Workers

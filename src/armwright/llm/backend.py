@@ -74,6 +74,17 @@ class OutputFormat:
     read: Callable[[Mapping[str, Any] | str], str]  # turns an answer into the text to record; UsageError refuses it
 
 
+@dataclass(frozen=True)
+class AskOptions:
+    """How a question is asked."""
+
+    output: OutputFormat | None = None  # None for free text
+    most_requests: int | None = None  # those after invalid answers included; None for no limit
+    earlier: Sequence[Turn] | None = None  # of the conversation that it continues; None for a question on its own
+
+
+FREE_TEXT = AskOptions()
+
 # A tiny question, so that a wrong name, key or address is reported before any work is done. Its structured answer shows
 # the output modes that the server supports.
 CHECK = Question("", "check", "Answer with one word: ready")
@@ -112,17 +123,10 @@ class LlmBackend:
     def begin(self) -> None:
         """Start a session; an earlier cancellation no longer counts."""
 
-    def ask(
-        self,
-        question: Question,
-        output: OutputFormat | None = None,
-        most_requests: int | None = None,
-        earlier: Sequence[Turn] | None = None,
-    ) -> Reply:
+    def ask(self, question: Question, options: AskOptions = FREE_TEXT) -> Reply:
         """Return the answer, free text by default; raises CallError if there is none.
 
-        Refusals by `output` go back to the model. `most_requests` includes those after invalid answers; None for no
-        limit. `earlier` are the turns of the conversation that the question continues; None for a question on its own.
+        Refusals of the answer by the output format go back to the model.
         """
         raise NotImplementedError
 

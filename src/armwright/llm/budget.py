@@ -20,7 +20,7 @@ class CallBudget:
     question is asked at a time.
     """
 
-    def __init__(self, max_calls: int | None = None, max_cost: float | None = None) -> None:
+    def __init__(self, max_calls: int | None, max_cost: float | None) -> None:
         self.max_calls = max_calls
         self.max_cost = max_cost
         self._change = threading.Condition()

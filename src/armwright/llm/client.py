@@ -16,14 +16,15 @@ from armwright.extras import naming_extras
 from armwright.files import replace_surrogates
 from armwright.llm.backend import (
     CHECK,
+    FREE_TEXT,
     MAX_REQUESTS,
+    AskOptions,
     CallError,
     Interrupted,
     LlmBackend,
     OutputFormat,
     Question,
     Reply,
-    Turn,
 )
 from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
 from armwright.llm.redaction import WithoutKeys, redacted, redacted_line
@@ -124,19 +125,14 @@ class ModelClient(LlmBackend):
         """Start a session."""
         self._cancelled = False
 
-    def ask(
-        self,
-        question: Question,
-        output: OutputFormat | None = None,
-        most_requests: int | None = None,
-        earlier: Sequence[Turn] | None = None,
-    ) -> Reply:
+    def ask(self, question: Question, options: AskOptions = FREE_TEXT) -> Reply:
         """Return the answer to a prompt; refusals of its output format are sent back to the model.
 
         The first output mode that the server accepts and respects is used from then on.
         """
+        output, most_requests = options.output, options.most_requests
         if output is None:
-            reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, earlier)
+            reply = self._run(Agent(self._model, retries=REASKS), question, options)
             if not reply.answer.strip():
                 raise CallError("answer", f"{self.model} gave an empty answer", reply)
             return reply
@@ -144,7 +140,7 @@ class ModelClient(LlmBackend):
         for mode in modes:
             left = None if most_requests is None else most_requests - spent.requests
             try:
-                run = partial(self._run, question=question, most_requests=left, earlier=earlier)
+                run = partial(self._run, question=question, options=replace(options, most_requests=left))
                 reply = self._ask_in(mode, output, 0 if question is CHECK else REASKS, run)
             except (CallError, Interrupted) as fault:
                 fault.reply = spent = spent.plus(fault.reply)
@@ -201,21 +197,15 @@ class ModelClient(LlmBackend):
         for future in list(self._pending):
             future.cancel()
 
-    def _run(
-        self,
-        agent: Agent[None, Any],
-        question: Question,
-        most_requests: int | None,
-        earlier: Sequence[Turn] | None,
-    ) -> Reply:
+    def _run(self, agent: Agent[None, Any], question: Question, options: AskOptions) -> Reply:
         started = time.perf_counter()
         settings = ModelSettings(**self._settings, request_timeout=self.timeout, max_retries=0)
-        if earlier is not None:
+        if options.earlier is not None:
             settings["cache"] = True  # where a provider does not cache by itself: the next question repeats this one
         past: list[ModelMessage] = []
-        for turn in earlier or ():  # structured answers are text, whichever output mode they were given in
+        for turn in options.earlier or ():  # structured answers are text, whichever output mode they were given in
             past += [ModelRequest([UserPromptPart(turn.question)]), ModelResponse([TextPart(turn.answer)])]
-        limits = UsageLimits(request_limit=most_requests)
+        limits = UsageLimits(request_limit=options.most_requests)
         call = agent.run(question.prompt, message_history=past, model_settings=settings, usage_limits=limits)
         with capture_run_messages() as messages:
             try:
@@ -229,16 +219,12 @@ class ModelClient(LlmBackend):
         return self._reply(messages[len(past) :], started)
 
     def _reply(self, messages: Sequence[ModelMessage], started: float) -> Reply:
-        responses = [message for message in messages if isinstance(message, ModelResponse)]
-        costs = [cost_of(response, self._server) for response in responses]
-        return Reply(
-            answer=text_of(responses[-1]) if responses else "",
-            requests=len(responses),
-            input_tokens=sum(response.usage.input_tokens for response in responses),
-            output_tokens=sum(response.usage.output_tokens for response in responses),
-            cost_usd=sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
-            seconds=round(time.perf_counter() - started, 3),
-        )
+        reply = Reply()
+        for response in messages:
+            if isinstance(response, ModelResponse):
+                usage, cost = response.usage, cost_of(response, self._server)
+                reply = reply.plus(Reply(text_of(response), 1, usage.input_tokens, usage.output_tokens, cost))
+        return replace(reply, seconds=round(time.perf_counter() - started, 3))
 
     def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:
         """Run the coroutine in the event-loop thread and return its result.

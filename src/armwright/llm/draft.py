@@ -20,7 +20,6 @@ from pydantic import BaseModel
 from armwright.exceptions import FailureError, ModelError, ProposalError, SettingsError, SpaceError, TaskError
 from armwright.files import naming_write_errors, replace_file
 from armwright.llm.backend import MAX_REQUESTS, CallError, OutputFormat, Question
-from armwright.llm.budget import CallBudget
 from armwright.llm.configuration import ConfiguredModel, configuration_path, configured_model
 from armwright.llm.draft_prompt import draft_prompt, draft_schema
 from armwright.llm.model_options import ModelOptions
@@ -95,7 +94,7 @@ class Drafter(LlmSession):
         from armwright.llm.client import ModelClient
 
         options = configured.options
-        super().__init__(ModelClient(options), "draft", options, CallBudget(options.max_calls, options.max_cost))
+        super().__init__(ModelClient(options), "draft", options)
         self.configured = configured
         self.out = out
         self.force = force

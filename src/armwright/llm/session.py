@@ -11,6 +11,7 @@ from armwright.llm.backend import (
     CHECK,
     CHECK_FORMAT,
     MAX_REQUESTS,
+    AskOptions,
     CallError,
     Interrupted,
     LlmBackend,
@@ -21,7 +22,7 @@ from armwright.llm.backend import (
 )
 from armwright.llm.budget import CallBudget
 from armwright.llm.conversation import conversation, new_part
-from armwright.llm.model_options import PromptOptions
+from armwright.llm.model_options import ModelOptions, PromptOptions
 from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, total_cost
 from armwright.proof.summary_file import ProposerSummary
 
@@ -30,17 +31,16 @@ class LlmSession:
     """Ask one backend, within a budget, and record every call; several threads may ask at a time.
 
     Its trials have the source `name`. With memory `chat`, the proposals are one conversation, in which each question is
-    sent with the turns before it. The budget limits the whole transcript; None for no limits.
+    sent with the turns before it. The limits of ModelOptions hold for the whole transcript.
     """
 
-    def __init__(
-        self, backend: LlmBackend, name: str, options: PromptOptions, budget: CallBudget | None = None
-    ) -> None:
+    def __init__(self, backend: LlmBackend, name: str, options: PromptOptions) -> None:
         self.name = name
         self.backend = backend
         self.options = options
         self.chat = options.memory == "chat"
-        self._budget = budget or CallBudget()
+        limits = options if isinstance(options, ModelOptions) else ModelOptions()
+        self._budget = CallBudget(limits.max_calls, limits.max_cost)
         self._transcript = Transcript(None)
         self._over = threading.Event()  # set when no more answers are wanted in this session
 
@@ -135,7 +135,7 @@ class LlmSession:
             while True:
                 earlier = self._earlier(question)
                 try:
-                    reply = self.backend.ask(question, output, left, earlier)
+                    reply = self.backend.ask(question, AskOptions(output, left, earlier))
                 except (CallError, Interrupted) as fault:
                     if fault.kind != "cancelled" or fault.reply.requests:
                         self._keep(question, fault.reply, fault)

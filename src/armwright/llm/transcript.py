@@ -4,15 +4,14 @@ import errno
 import json
 import os
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from io import FileIO
 from pathlib import Path
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
-from armwright.exceptions import RunFolderError
-from armwright.files import naming_write_errors, open_to_append, read_records
+from armwright.files import naming_write_errors, open_to_append, read_log
 from armwright.llm.backend import Question, Reply
 
 TRANSCRIPTS = "transcripts.jsonl"  # in a run folder
@@ -41,7 +40,7 @@ class Transcript:
 
     def __init__(self, path: Path | None, read_only: bool = False) -> None:
         self._path = path
-        self._calls = list(_read(path, mend=not read_only)) if path is not None else []
+        self._calls = _read(path, mend=not read_only) if path is not None else []
         self._lock = threading.Lock()
 
     @property
@@ -92,23 +91,10 @@ def _append(file: FileIO, line: bytes) -> None:
         raise
 
 
-def _read(path: Path, mend: bool) -> Iterator[Call]:
+def _read(path: Path, mend: bool) -> list[Call]:
     """Read the calls of a file; `mend` removes a last line that a crash cut short."""
-    end = 0
-    try:
-        with path.open("rb") as file:
-            for number, line in enumerate(read_records(file, path), start=1):
-                end += len(line) + 1
-                try:
-                    yield CALL.validate_json(line)
-                except ValidationError as fault:
-                    where = f"{path}, line {number}"
-                    raise RunFolderError(f"{where} is damaged; restore the file or delete the line") from fault
-            is_cut_short = file.tell() > end
-    except FileNotFoundError:
-        return
-    except OSError as fault:
-        raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    if mend and is_cut_short:
+    calls, end = read_log(path, lambda line, _: CALL.validate_json(line), "restore the file or delete the line")
+    if mend and path.is_file() and path.stat().st_size > end:
         with naming_write_errors(path):
             os.truncate(path, end)
+    return calls

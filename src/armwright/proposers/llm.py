@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-from armwright.llm.budget import CallBudget
 from armwright.llm.conversation import RESULTS, conversation
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MAX_TOKENS, estimated_tokens, parameters_prompt
@@ -27,8 +26,7 @@ class LlmProposer(PromptedProposer):
         from armwright.llm.client import ModelClient
 
         options = ModelOptions.of(options)
-        budget = CallBudget(options.max_calls, options.max_cost)
-        super().__init__(ModelClient(options), options.source, options, budget)
+        super().__init__(ModelClient(options), options.source, options)
         self.options = options
 
     def settings(self) -> Mapping[str, Any]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from armwright.exceptions import FailureError, SettingsError, UsageError
 from armwright.files import naming_write_errors, read_text, replace_file
-from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply, Turn
+from armwright.llm.backend import FREE_TEXT, AskOptions, CallError, LlmBackend, Question, Reply
 from armwright.llm.model_options import PromptOptions
 from armwright.proposers.prompted import PromptedProposer
 
@@ -39,13 +39,7 @@ class ManualBackend(LlmBackend):
         answers = [self.folder / f"{number:03d}-answer.{ending}" for ending in ENDINGS]
         return self.folder / f"{number:03d}-prompt.md", answers
 
-    def ask(
-        self,
-        question: Question,
-        output: OutputFormat | None = None,
-        most_requests: int | None = None,
-        earlier: Sequence[Turn] | None = None,
-    ) -> Reply:
+    def ask(self, question: Question, options: AskOptions = FREE_TEXT) -> Reply:
         """Return the answer; one that is refused is moved aside with the reason."""
         started = time.perf_counter()
         number = question.trial
@@ -56,7 +50,7 @@ class ManualBackend(LlmBackend):
             if answer is not None:
                 text = read_text(answer, MAX_FILE, FailureError)
                 try:
-                    accepted = text if output is None else output.read(text)
+                    accepted = text if options.output is None else options.output.read(text)
                     return Reply(accepted, requests=1, seconds=round(time.perf_counter() - started, 3))
                 except UsageError as refusal:
                     self._refuse(number, answer, str(refusal))

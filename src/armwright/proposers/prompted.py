@@ -9,7 +9,6 @@ from typing import Any
 from armwright.exceptions import DesignError, ProposalError
 from armwright.llm.answer import answer_schema, read_answer, read_text, written_answer
 from armwright.llm.backend import LlmBackend, OutputFormat, Question
-from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import design_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
@@ -22,13 +21,11 @@ from armwright.runs.history import History
 class PromptedProposer(LlmSession, Proposer):
     """Ask a backend for each proposal, and record questions and answers.
 
-    `name` is the `source` of its trials. The options say how designs are asked for; the budget limits the whole run.
+    `name` is the `source` of its trials. The options say how designs are asked for, and what the whole run may spend.
     """
 
-    def __init__(
-        self, backend: LlmBackend, name: str, options: PromptOptions, budget: CallBudget | None = None
-    ) -> None:
-        super().__init__(backend, name, options, budget)
+    def __init__(self, backend: LlmBackend, name: str, options: PromptOptions) -> None:
+        super().__init__(backend, name, options)
         self.overlaps = self.overlaps and not self.chat  # a turn follows the one before it
 
     def settings(self) -> Mapping[str, Any]:

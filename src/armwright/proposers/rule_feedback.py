@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,27 +14,7 @@ PULL = 0.1  # base displacement [m] if all targets are missed in one direction
 REACHED = 0.005  # error [m] below which a target no longer pulls the base
 BENT = 0.35  # mean angle [rad] above which a joint is bent
 TRIM = 0.8  # scale of a trimmed link
-LEAST_SCALE, MAX_SCALE = 0.4, 1.6
-
-
-@dataclass(frozen=True)
-class Gap:
-    """A step of the front between two neighbours."""
-
-    area: float  # hypervolume that an ideal design in the gap would add
-    low: FrontMember | None  # neighbour with the smaller position error; None at the edge of the reference box
-    high: FrontMember | None  # neighbour with the smaller torque; None at the edge of the reference box
-    more: float  # α-scaled torque of `low`
-    less: float  # α-scaled torque of `high`
-
-    @property
-    def description(self) -> str:
-        """The neighbours, as text."""
-        if self.low is None:
-            return "the front's end of least position error"
-        if self.high is None:
-            return "the front's end of least torque"
-        return f"the front's gap between trials {self.low.number} and {self.high.number}"
+SCALES = (0.4, 1.6)  # smallest and largest
 
 
 def members_inside(history: History) -> list[FrontMember]:
@@ -51,18 +30,25 @@ def fill(history: History, inside: list[FrontMember], rng: np.random.Generator) 
     of the length, and its base is moved towards the targets that it misses.
     """
     assert history.reference_point is not None
-    gap = wide_gap(inside, history.reference_point, rng)
+    most_error, most_torque = history.reference_point[:2]
+    corners = [(0.0, most_torque), *((m.values[0], m.values[1]) for m in inside), (most_error, 0.0)]
+    steps = list(itertools.pairwise(corners))
+    k = draw_gap([(end[0] - start[0]) * (start[1] - end[1]) for start, end in steps], rng)  # by the area of each
     share = float(rng.uniform(*MIDDLE))
-    low, high = gap.low, gap.high
-    if low is not None and high is not None and low.design.joints == high.design.joints:
-        design = between(low.design, high.design, share, history)
-        return design, f"fills {gap.description}: between the two; {describe(design)}"
-    sides = [side for side in (low, high) if side is not None]
+    sides = inside[max(0, k - 1) : k + 1]  # one neighbour at the edges of the reference box
+    if len(sides) == 2:
+        low, high = sides
+        gap = f"the front's gap between trials {low.number} and {high.number}"
+        if low.design.joints == high.design.joints:
+            design = between(low.design, high.design, share, history)
+            return design, f"fills {gap}: between the two; {describe(design)}"
+    else:
+        gap = f"the front's end of least {'position error' if k == 0 else 'torque'}"
     side = sides[int(rng.integers(len(sides)))]
-    torque = share * gap.more + (1.0 - share) * gap.less
-    scale = float(np.clip(np.sqrt(torque / max(side.values[1], 1e-9)), LEAST_SCALE, MAX_SCALE))
+    (_, more), (_, less) = steps[k]
+    scale = float(np.clip(np.sqrt((share * more + (1.0 - share) * less) / max(side.values[1], 1e-9)), *SCALES))
     design = scaled(history, side, scale)
-    return design, f"fills {gap.description}: trial {side.number} at {scale:.2f} of its size; {describe(design)}"
+    return design, f"fills {gap}: trial {side.number} at {scale:.2f} of its size; {describe(design)}"
 
 
 def trim(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
@@ -93,17 +79,6 @@ def swap(history: History, inside: list[FrontMember], rng: np.random.Generator) 
 
 Rule = Callable[[History, list[FrontMember], np.random.Generator], tuple[Design, str]]
 RULES: dict[str, Rule] = {"fill": fill, "trim": trim, "swap": swap}
-
-
-def wide_gap(inside: list[FrontMember], reference_point: tuple[float, ...], rng: np.random.Generator) -> Gap:
-    """Draw a step of the front by its area, including the steps at the edges of the reference box."""
-    sides: list[FrontMember | None] = [None, *inside, None]
-    corners = [(0.0, reference_point[1]), *((m.values[0], m.values[1]) for m in inside), (reference_point[0], 0.0)]
-    gaps: list[Gap] = []
-    for k, ((error, torque), (more_error, less_torque)) in enumerate(itertools.pairwise(corners)):
-        area = (more_error - error) * (torque - less_torque)
-        gaps.append(Gap(area, sides[k], sides[k + 1], torque, less_torque))
-    return gaps[draw_gap([gap.area for gap in gaps], rng)]
 
 
 def between(a: Design, b: Design, share: float, history: History) -> Design:

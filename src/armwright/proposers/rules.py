@@ -134,4 +134,5 @@ def distinct(design: Design, history: History, rng: np.random.Generator) -> Desi
         links = np.array(design.links) * np.exp(rng.normal(0.0, spread, len(design.links)))
         return history.problem.space.clipped(origin, design.joints, links, design)
 
-    return change_until_new(design, history.has_tried, changed)
+    tried = {trial.design for trial in history}
+    return change_until_new(design, tried.__contains__, changed)

@@ -21,6 +21,7 @@ from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from armwright.text import one_line
+from armwright.validation_messages import check_integer
 
 # Settings that may differ when a run resumes. The objectives of the task are those of the run.
 MAY_DIFFER = {
@@ -147,6 +148,22 @@ def _recorded(record: ObjectiveRecord) -> Objective:
         )
 
     return Objective(record.name, record.unit, record.label.lower(), each, "arm", record.label, record.symbol)
+
+
+def run_config(problem: Problem, method: Method | FrontMethod, seed: int) -> RunConfig:
+    """Return the settings of a new run."""
+    return RunConfig(
+        task=problem.task,
+        space=problem.space,
+        tolerance=problem.tolerance,
+        device=problem.device,
+        objectives=record_objectives(problem.objectives),
+        reference_point=problem.reference_point,
+        method=method,
+        seed=check_integer("seed", seed, 0),
+        evaluator=None if problem.evaluator is None else problem.evaluator.name,
+        versions=versions(problem.evaluator),
+    )
 
 
 def describe_method(config: RunConfig) -> str:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.pareto import (
-    FrontTracker,
     default_reference_point,
     feasible_mask,
     front_indices,
     front_mask,
+    hypervolume_history,
     masked_objectives,
     total_violation,
 )
@@ -129,14 +129,6 @@ class History:
         """The trials of proposers."""
         return tuple(trial for trial in self.trials if trial.source not in NOT_PROPOSED)
 
-    @cached_property
-    def _designs(self) -> set[Design]:
-        return {trial.design for trial in self.trials}
-
-    def has_tried(self, design: Design) -> bool:
-        """Return whether a trial has this design."""
-        return design in self._designs
-
     def before(self, number: int) -> "History":
         """Return the history at the start of trial `number`."""
         if number >= len(self):
@@ -155,11 +147,7 @@ class History:
         """(N,) after each trial, the random ones included; (0,) without a reference point."""
         if self.reference_point is None:
             return np.zeros(0)
-        tracker, volumes = FrontTracker(len(self.problem.objectives), self.reference_point), np.zeros(len(self))
-        for i, row in enumerate(self.masked_objectives):
-            tracker.add(row)
-            volumes[i] = tracker.hypervolume
-        return volumes
+        return hypervolume_history(self.masked_objectives, self.reference_point)
 
     @property
     def hypervolume(self) -> Array:

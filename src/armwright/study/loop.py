@@ -1,6 +1,7 @@
 """The loop of a study: it starts trials, takes their results in any order, and records them in theirs."""
 
 import time
+from collections import Counter
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -276,6 +277,7 @@ class Study:
         if self._watch is None:
             return
         record = self._record
+        failures = [(trial.number, trial.failure) for trial in record.trials if trial.failure is not None]
         self._watch(
             Progress(
                 doing=doing,
@@ -286,9 +288,9 @@ class Study:
                 front_size=record.front.size,
                 source=source,
                 n_in_flight=self._schedule.n_in_flight,
-                faults=record.faults.copy(),
-                failures=record.failures.copy(),
-                latest_failures=record.latest_failures.copy(),
+                faults=Counter(trial.fault for trial in record.trials if trial.fault),
+                failures=Counter(failure.kind for _, failure in failures),
+                latest_failures={failure.kind: f"trial {n}: {failure.description}" for n, failure in failures},
                 **about,
             )
         )

@@ -1,6 +1,4 @@
-"""The finished trials of a study: on disk, as a history, and counted."""
-
-from collections import Counter
+"""The finished trials of a study: on disk, as a history, and their front."""
 
 from armwright.pareto import FrontTracker
 from armwright.problem.evaluators import evaluator_error
@@ -20,16 +18,13 @@ class Record:
     def __init__(self, problem: Problem, config: RunConfig, folder: RunFolder | None, allow_failures: bool) -> None:
         self.config = config
         self.trials = [] if folder is None else folder.open_trials(config)
-        self.faults: Counter[str] = Counter()  # of proposals, by kind
-        self.failures: Counter[str] = Counter()  # of evaluations, by kind
-        self.latest_failures: dict[str, str] = {}  # trial and reason of the last failure of each kind
         self.front = FrontTracker(len(problem.objectives), config.reference_point)
         self._folder = folder
         self._allow_failures = allow_failures
         self._problem = problem
         self._is_frozen = problem.reference_point is not None
         for trial in self.trials:
-            self._count(trial)
+            self._track(trial)
         self._freeze_reference_point()
 
     def history(self) -> History:
@@ -48,17 +43,12 @@ class Record:
         if self._folder is not None:
             self._folder.append(trial)
         self.trials.append(trial)
-        self._count(trial)
+        self._track(trial)
         self._freeze_reference_point()
 
-    def _count(self, trial: FinishedTrial) -> None:
+    def _track(self, trial: FinishedTrial) -> None:
         if trial.is_feasible:
             self.front.add(trial.values)
-        if trial.fault:
-            self.faults[trial.fault] += 1
-        if trial.failure is not None:
-            self.failures[trial.failure.kind] += 1
-            self.latest_failures[trial.failure.kind] = f"trial {trial.number}: {trial.failure.description}"
 
     def _check_first(self, trial: FinishedTrial) -> None:
         failure = trial.failure

@@ -13,8 +13,8 @@ from armwright.runs.config import Method
 from armwright.search.samplers import SamplerFactory, sampler_name
 from armwright.search.surrogate.sampler import SurrogateFactory
 from armwright.spaces.parameters import Design
-from armwright.study.run_settings import check_integer
 from armwright.study.workers.cluster import Workers
+from armwright.validation_messages import check_integer
 
 
 @dataclass(frozen=True)

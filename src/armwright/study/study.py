@@ -12,13 +12,13 @@ from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.checks.requirements import refuse_unread_parameters
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
+from armwright.runs.config import run_config
 from armwright.runs.folder import RunFolder
 from armwright.search.samplers import SamplerFactory, sampler_for
 from armwright.search.surrogate.cheap_features import FeatureFunction
 from armwright.spaces.parameters import Design
 from armwright.study.loop import Study
 from armwright.study.progress import Progress, StudyResult
-from armwright.study.run_settings import run_config
 from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, study_method
 from armwright.study.workers.cluster import Workers
 

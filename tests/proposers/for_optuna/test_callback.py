@@ -175,9 +175,9 @@ def test_permanent_fault_is_logged_once(log: list[str]) -> None:
     [
         ({"proposer": RulesProposer()}, "expected an instance of StudyProposer, got .*RulesProposer"),
         ({"proposer": Told}, "expected an instance of StudyProposer, got <class .*Told"),
-        ({"proposer": Told(), "every": 0}, "every = 0: expected a whole number"),
-        ({"proposer": Told(), "every": 2.5}, "every = 2.5: expected a whole number"),
-        ({"proposer": Told(), "first": 0}, "first = 0: expected a whole number"),
+        ({"proposer": Told(), "every": 0}, "every: expected a whole number from 1 to .*, got 0"),
+        ({"proposer": Told(), "every": 2.5}, "every: expected a whole number from 1 to .*, got 2.5"),
+        ({"proposer": Told(), "first": 0}, "first: expected a whole number from 1 to .*, got 0"),
     ],
 )
 def test_invalid_settings_are_refused(settings: dict[str, Any], words: str) -> None:

@@ -3,7 +3,6 @@
 import threading
 from collections import Counter
 from collections.abc import Mapping
-from numbers import Integral
 from typing import Any
 
 import optuna
@@ -16,6 +15,7 @@ from armwright.proposers.for_optuna.parameters import checked_params, observed_s
 from armwright.proposers.for_optuna.proposer import StudyProposer
 from armwright.search.samplers import quiet_study
 from armwright.seeding import PROPOSING, derived_seed
+from armwright.validation_messages import check_integer
 
 # A child of Optuna's logger, for its verbosity and handlers. `warnings` would end a study that runs with warnings as
 # errors, and would hide repeated messages.
@@ -50,8 +50,8 @@ class ProposalCallback:
         if StudyProposer not in type(proposer).__mro__:
             raise SettingsError(f"expected an instance of StudyProposer, got {proposer!r}")
         self.proposer = proposer
-        self.every = _whole("every", every)
-        self.first = max(1, self.every - 1) if first is None else _whole("first", first)
+        self.every = check_integer("every", every, 1)
+        self.first = max(1, self.every - 1) if first is None else check_integer("first", first, 1)
         self.seed = seed
         self.proposed = 0
         self.faults: Counter[str] = Counter()
@@ -122,9 +122,3 @@ def enqueue(study: optuna.Study, params: Mapping[str, Any], attributes: Mapping[
     copy.enqueue_trial(dict(params), user_attrs=dict(attributes))
     assign_generation(copy, copy.get_trials(deepcopy=False)[-1])
     study.add_trial(copy.get_trials()[-1])
-
-
-def _whole(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:  # numpy integers too
-        raise SettingsError(f"{name} = {value!r}: expected a whole number of at least 1")
-    return int(value)

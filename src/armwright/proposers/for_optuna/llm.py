@@ -10,7 +10,6 @@ import optuna
 
 from armwright.exceptions import SettingsError
 from armwright.llm.backend import OutputFormat
-from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.session import LlmSession
 from armwright.proposers.for_optuna.answer import answer_schema, read_answer, written_answer
@@ -41,8 +40,7 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         from armwright.llm.client import ModelClient
 
         options = ModelOptions.of(options)
-        budget = CallBudget(options.max_calls, options.max_cost)
-        super().__init__(ModelClient(options), options.source, options, budget)
+        super().__init__(ModelClient(options), options.source, options)
         self.description = description
         self.given_space = dict(space or {})
         path = None if transcript is None else Path(transcript)

@@ -83,7 +83,7 @@ def fill(view: StudyView, rng: np.random.Generator) -> Suggestion:
 
 def extend(view: StudyView, rng: np.random.Generator) -> Suggestion:
     """Extrapolate past an end of the front, away from a neighbour of that end."""
-    objective = int(rng.integers(view.n_objectives))
+    objective = int(rng.integers(len(view.values.T)))
     order = sorted(view.best, key=lambda i: view.values[i, objective])
     end, neighbour = order[0], order[1 + int(rng.integers(min(3, len(order) - 1)))]
     beyond = 1.0 + float(rng.uniform(*BEYOND))
@@ -119,7 +119,7 @@ def swap(view: StudyView, rng: np.random.Generator) -> Suggestion:
 
 def trend(view: StudyView, rng: np.random.Generator) -> Suggestion:
     """Move one of the best trials down the linear trend of a randomly weighted rank."""
-    score = view.ranks @ rng.dirichlet(np.ones(view.n_objectives))
+    score = view.ranks @ rng.dirichlet(np.ones(len(view.values.T)))
     parent = min(view.best, key=lambda i: score[i])
     own = view.params[parent]
     names = [name for name in own if is_number(view.space[name])]

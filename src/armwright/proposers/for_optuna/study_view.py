@@ -55,11 +55,6 @@ class StudyView:
         return self.values.argsort(axis=0, kind="stable").argsort(axis=0, kind="stable") / len(self.values)
 
     @property
-    def n_objectives(self) -> int:
-        """Number of objectives M."""
-        return int(np.size(self.values, 1))
-
-    @property
     def choices(self) -> list[str]:
         """Categorical parameters with at least two distinguishable choices."""
         categories = {n: d for n, d in self.space.items() if isinstance(d, CategoricalDistribution)}

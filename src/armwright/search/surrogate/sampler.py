@@ -74,7 +74,7 @@ class SurrogateSampler(BaseSampler):
 
     def infer_relative_search_space(self, study: Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
         """Return all parameters of the space; none for an enqueued trial or without enough finished ones."""
-        if "fixed_params" in trial.system_attrs or _n_finished(study) < STARTUP:
+        if "fixed_params" in trial.system_attrs or len(self._observations(study, trial).matrix) < STARTUP:
             return {}
         return distributions(self._surrogate.problem.space)
 
@@ -119,9 +119,3 @@ class SurrogateSampler(BaseSampler):
 def has_failed(trial: FrozenTrial) -> bool:
     """Return whether the evaluation of a finished trial failed, so that its values mean nothing."""
     return trial.state is TrialState.FAIL or not np.all(np.isfinite(trial.values))
-
-
-def _n_finished(study: Study) -> int:
-    """Return the number of designs that were evaluated, with or without success."""
-    finished = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.FAIL))
-    return sum(bool(trial.params) for trial in finished)

@@ -17,12 +17,11 @@ from armwright.exceptions import SettingsError
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.checks.requirements import refuse_unread_parameters
 from armwright.problem.problem import Problem
-from armwright.runs.config import FrontMethod
+from armwright.runs.config import FrontMethod, run_config
 from armwright.runs.folder import SEARCH, RunFolder, read_run
 from armwright.study.front.direct_search import DirectSearch, FrontRun
 from armwright.study.front.search_budget import SearchBudget, SearchProgress
 from armwright.study.front.time_plan import TimePlan
-from armwright.study.run_settings import run_config
 
 
 def find_front(

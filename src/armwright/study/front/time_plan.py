@@ -6,7 +6,6 @@ recommended ones, their files, figures and a page. If it would take longer than 
 
 import math
 import time
-from collections.abc import Callable
 
 from armwright.kinematics.devices import compilation
 from armwright.study.front.search_budget import SearchBudget
@@ -25,30 +24,22 @@ SMALLEST_CHUNK, CHUNK_GROWTH = 16, 4  # designs, of which fewer take nearly as l
 class TimePlan:
     """Share out the wall-clock time of a search, without the compilation of kernels.
 
-    With `drawing`, figures and a page follow the search. The time begins at `started` by the clock, or now;
-    `excluded` returns how much of it so far does not count [s].
+    With `drawing`, figures and a page follow the search. The time begins at `started` by the monotonic clock,
+    or now.
     """
 
-    def __init__(
-        self,
-        budget: SearchBudget,
-        drawing: bool = False,
-        started: float | None = None,
-        clock: Callable[[], float] = time.monotonic,
-        excluded: Callable[[], float] = lambda: compilation.seconds,
-    ) -> None:
+    def __init__(self, budget: SearchBudget, drawing: bool = False, started: float | None = None) -> None:
         self.budget = budget
         self.earlier = 0.0  # time of earlier sessions that counts [s]
         self._limit = math.inf if budget.seconds is None else budget.seconds
         self._drawing = DRAWING_SECONDS if drawing else 0.0
-        self._clock, self._excluded = clock, excluded
-        self._started = (clock() if started is None else started) - excluded()
+        self._started = (time.monotonic() if started is None else started) - compilation.seconds
         self._search_started = 0.0
 
     @property
     def elapsed(self) -> float:
         """Time of this session [s]."""
-        return self._clock() - self._started - self._excluded()
+        return time.monotonic() - self._started - compilation.seconds
 
     @property
     def session(self) -> float:
