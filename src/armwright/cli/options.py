@@ -1,24 +1,9 @@
 """Options of commands, and the objects that they describe.
 
 A command is a plain function: parameters before `*` are its arguments, the others its options. Their help stands in its
-docstring, in a section for each group of `--help`: `name (METAVAR): text. Default: text.` What several commands share
-is stated here.
-"""
+docstring, in a section for each group of `--help`: `name (METAVAR): text. Default: text.` This module's docstring holds
+what several commands share:
 
-import inspect
-import os
-import re
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_origin
-
-import typer
-
-if TYPE_CHECKING:
-    from armwright.problem.problem import Problem
-    from armwright.study.workers.cluster import Workers
-
-SHARED = """
 Parameters:
     run (RUN): A run folder.
     source (RUN|ARM): A run folder, a URDF file, or a name such as ur5e (robot_descriptions; extra arms).
@@ -51,6 +36,20 @@ Output:
     figures: Make the page (report.html) and the figures of a finished run.
     json_: Print only JSON to stdout.
 """
+
+import inspect
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_origin
+
+import typer
+
+if TYPE_CHECKING:
+    from armwright.problem.problem import Problem
+    from armwright.study.workers.cluster import Workers
+
 _SECTION = re.compile(r"^([A-Z][\w ]*):\n((?:    .+\n)+)", re.MULTILINE)
 _PARAMETER = re.compile(r"^    (\w+)(?: \(([^)\n]+)\))?: (.+(?:\n     .+)*)", re.MULTILINE)
 
@@ -58,7 +57,7 @@ _PARAMETER = re.compile(r"^    (\w+)(?: \(([^)\n]+)\))?: (.+(?:\n     .+)*)", re
 def read_declaration(function: Callable[..., None]) -> tuple[str, inspect.Signature]:
     """Return the help of a command without its parameters, and its signature with these declared for Typer."""
     text, signature = inspect.cleandoc(function.__doc__ or "") + "\n", inspect.signature(function)
-    known = {**_read_help(SHARED), **_read_help(text)}
+    known = {**_read_help(__doc__ or ""), **_read_help(text)}
     parameters = [_declare(one, known.get(one.name, {})) for one in signature.parameters.values()]
     return _SECTION.sub("", text).strip(), signature.replace(parameters=parameters)
 
