@@ -54,8 +54,8 @@ class _Tree:
     def __init__(self, base: str, joints: Mapping[str, Sequence[UrdfJoint]], where: str) -> None:
         self._joints, self._where = joints, where
         self._deepest: dict[str, int] = {}  # independent joints of the longest chain beyond each link
+        # What is fixed to each link: 1 for a frame of a tool, -1 for one of something else, how far, its name
         self.frames: dict[str, tuple[int, int, str]] = {}
-        """What is fixed to each link: 1 for a frame of a tool, -1 for one of something else, how far, its name."""
         links = [base]
         for link in links:
             links += [joint.child for joint in joints[link]]
