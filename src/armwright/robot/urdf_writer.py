@@ -64,8 +64,8 @@ def urdf_tree(arm: Arm, name: str) -> Element:
     _add_joint(robot, "world_to_base", "world", "base", arm.base)
     if arm.column is not None:
         cylinder = {"radius": number(arm.column.radius), "length": number(arm.column.length)}
-        _add_solid(_add_massless(robot, "column"), "link", arm.column.middle, ORIGIN, "cylinder", cylinder)
-        _add_joint(robot, "column_joint", "base", "column", ORIGIN)
+        column = _add_fixed(robot, "column", "base", ORIGIN)
+        _add_solid(column, "link", arm.column.middle, ORIGIN, "cylinder", cylinder)
     for segment in segments(arm):
         if segment.joint.body is not None:
             _add_motor(robot, segment, segment.joint.body)
@@ -124,9 +124,8 @@ def _add_motor(robot: Element, segment: Segment, body: MotorBody) -> None:
     """Add the link of an actuator's body; its mass is a part of the link that carries it."""
     dimensions = {"radius": number(body.radius), "length": number(body.length)}
     dimensions = {"size": numbers(body.size)} if body.shape == "box" else dimensions
-    element = _add_massless(robot, segment.motor_name)
-    _add_solid(element, f"joint_{segment.joint.nearest_axis}", body.centre, body_rpy(body), body.shape, dimensions)
-    _add_joint(robot, f"{segment.motor_name}_joint", segment.parent, segment.motor_name, segment.position)
+    motor = _add_fixed(robot, segment.motor_name, segment.parent, segment.position)
+    _add_solid(motor, f"joint_{segment.joint.nearest_axis}", body.centre, body_rpy(body), body.shape, dimensions)
 
 
 def _add_solid(
@@ -141,9 +140,11 @@ def _add_solid(
             SubElement(body, "material", name=material)
 
 
-def _add_massless(robot: Element, name: str) -> Element:
+def _add_fixed(robot: Element, name: str, parent: str, position: Vector) -> Element:
+    """Add a massless link that is fixed to another one, and return it."""
     element = SubElement(robot, "link", name=name)
     inertial = SubElement(element, "inertial")
     SubElement(inertial, "mass", value="0")
     SubElement(inertial, "inertia", dict.fromkeys(TENSOR_INDICES, "0"))
+    _add_joint(robot, f"{name}_joint", parent, name, position)
     return element
