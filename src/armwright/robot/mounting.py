@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.robot.arm import Arm, Link, Tensor
-from armwright.robot.axes import Vector, axis_along
+from armwright.robot.axes import Vector, as_vector, axis_along
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.rotations import rotation_about
 
@@ -59,11 +59,10 @@ def turned(arm: Arm, rotation: Array) -> Arm:
     """Return an arm turned about the origin with its base, its joint values unchanged; rotation: (3, 3)."""
 
     def vector(v: Vector) -> Vector:
-        x, y, z = (rotation @ v).tolist()
-        return x, y, z
+        return as_vector(rotation @ v)
 
     def tensor(rows: Tensor) -> Tensor:
-        x, y, z = map(tuple, (rotation @ rows @ rotation.T).tolist())
+        x, y, z = map(as_vector, rotation @ rows @ rotation.T)
         return x, y, z
 
     def link(each: Link) -> Link:
