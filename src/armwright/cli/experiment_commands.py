@@ -3,8 +3,7 @@
 import sys
 from pathlib import Path
 
-from armwright.cli.arm_options import parse_base, parse_prices
-from armwright.cli.options import select_workers
+from armwright.cli.options import parse_base, parse_prices, select_workers
 from armwright.cli.streams import activity, exit_interrupted, open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError, SettingsError
 
@@ -115,7 +114,7 @@ def compare(
     from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import show_comparison, show_files
     from armwright.experiments.compare_runs import compare_summaries
-    from armwright.experiments.run_list import read_finished_runs
+    from armwright.experiments.run_record import read_finished_runs
     from armwright.experiments.tables import tables, write_tables
 
     console = open_console(json_ or csv_)
