@@ -12,8 +12,7 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import FailureError, SettingsError, TaskError
-from armwright.experiments.cells import plan_cells
-from armwright.experiments.outcome import collect
+from armwright.experiments.cells import collect, plan_cells
 from armwright.experiments.plan import (
     ExperimentPlan,
     builtin_files,

@@ -41,9 +41,9 @@ def experiment(
     """
     from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_files, show_outcome, show_plan
-    from armwright.experiments import outcome, plan
+    from armwright.experiments import plan
     from armwright.experiments import runner as running
-    from armwright.experiments.cells import plan_cells
+    from armwright.experiments.cells import collect, plan_cells
     from armwright.experiments.tables import write_tables
     from armwright.llm.configuration import load_model_options
 
@@ -66,12 +66,12 @@ def experiment(
     drawing = can_draw(console, figures)
     failed: list[running.CellOutcome] = []
     try:
-        outcome.write_plan(chosen, out)
+        plan.write_plan(chosen, out)
         ended = running.run_cells(due, placed, console.print)
         for number, done in enumerate(ended, start=1):
             show_outcome(console, done, number, len(due))
             failed += [done] if done.fault else []
-        found = outcome.collect(chosen, cells)
+        found = collect(chosen, cells)
         notes = notes_on_cells(skipped, failed)
         title = f"Experiment {chosen.name}"
         tables = write_tables(out, found, title, notes)

@@ -1,4 +1,4 @@
-"""The cells of an experiment: one run per seed, task and method."""
+"""The cells of an experiment, one run per seed, task and method, and the comparison of those that are finished."""
 
 import itertools
 from collections.abc import Sequence
@@ -6,9 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from armwright.exceptions import SettingsError, TaskError, did_you_mean
+from armwright.exceptions import FailureError, SettingsError, TaskError, did_you_mean
+from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.plan import ExperimentPlan, MethodPlan
+from armwright.experiments.run_record import read_run_summary
 from armwright.llm.recording_file import shipped_recordings
+from armwright.proof.results import read_summary
 from armwright.tasks.catalogue import load_task
 
 RUNS = "runs"  # in an experiment's folder
@@ -124,3 +127,22 @@ def _task(name: str, folder: Path) -> tuple[str, str]:
             raise TaskError(f"there is no file {file}, which the experiment names as a task")
         return str(file.resolve()), load_task(file).name
     return name, load_task(name).name
+
+
+def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
+    """Compare the finished cells, with the labels and in the order of the plan."""
+    records = [
+        read_run_summary(cell.folder, cell.plan.label) for cell in cells if read_summary(cell.folder) is not None
+    ]
+    if not records:
+        raise FailureError("no cell of the experiment is finished, so there is nothing to compare")
+    labels = [method.label for method in plan.methods.values()]
+    tasks = list(dict.fromkeys(cell.task_name for cell in cells))
+    against = {m.label: [plan.methods[key].label for key in m.against] for m in plan.methods.values() if m.against}
+    published = {
+        (plan.methods[key].label, task): numbers
+        for key, by_task in plan.published.items()
+        for task, numbers in by_task.items()
+    }
+    baseline = plan.methods[plan.baseline or next(iter(plan.methods))].label
+    return Comparison(records, labels, tasks, baseline, against, published, plan.published_in)

@@ -22,9 +22,8 @@ ACROSS = 0.5  # largest cosine of the angle between the axes of a jaw and of the
 FEWEST = 3  # joints of an arm before a joint that is a jaw by its motion
 GRIPPER = re.compile(r"jaw|finger|( |_|joint)grip(per)?(_?joint)?\d*$", re.IGNORECASE)  # in names of link and joint
 FRAMES = re.compile(r"(^|[_/])(tool\d*|tcp|tip|eef?|end_?effector|flange|frame)(_|$)", re.IGNORECASE)  # of a tool
-OTHERS = re.compile(
-    "jaw|finger|camera|optical|depth|imu|sensor|collision|_sc$", re.IGNORECASE
-)  # in names of other links
+# In names of other links
+OTHERS = re.compile("jaw|finger|camera|optical|depth|imu|sensor|collision|_sc$", re.IGNORECASE)
 
 
 def find_tip(base: str, joints: Mapping[str, Sequence[UrdfJoint]], where: str) -> str:

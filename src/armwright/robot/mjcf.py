@@ -79,10 +79,8 @@ def _add_link(body: Element, joint: Joint, link: Link) -> None:
     add_inertial(body, link)
     if link.length > 0.0:
         cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}
-        euler = numbers(geometry.rpy_along(link.offset))
-        SubElement(
-            body, "geom", {**cylinder, "pos": numbers(geometry.midpoint(link)), "euler": euler, "material": "link"}
-        )
+        place = {"pos": numbers(geometry.midpoint(link)), "euler": numbers(geometry.rpy_along(link.offset))}
+        SubElement(body, "geom", {**cylinder, **place, "material": "link"})
     marker = {"type": "sphere", "size": number(geometry.marker_radius(link)), "material": f"joint_{joint.nearest_axis}"}
     SubElement(body, "geom", marker)
 
@@ -106,12 +104,8 @@ def add_motor(
     element = SubElement(carrier, "body", name=name, pos=numbers(segment.position))
     x, y, z = body.size
     size = (x / 2, y / 2, z / 2) if body.shape == "box" else (body.radius, body.length / 2)
-    solid = {
-        "type": body.shape,
-        "size": numbers(size),
-        "pos": numbers(body.centre),
-        "euler": numbers(geometry.body_rpy(body)),
-    }
+    place = {"pos": numbers(body.centre), "euler": numbers(geometry.body_rpy(body))}
+    solid = {"type": body.shape, "size": numbers(size), **place}
     SubElement(element, "geom", {**solid, "material": f"joint_{segment.joint.nearest_axis}", **(attributes or {})})
 
 
@@ -124,13 +118,8 @@ def add_column(base: Element, column: Column, attributes: Mapping[str, str] | No
 
 def add_tip(body: Element, arm: Arm) -> None:
     """Add the site `tip` to the last link."""
-    rpy = geometry.tip_rpy(arm)
-    tip = {
-        "name": "tip",
-        "pos": numbers(geometry.tip_position(arm)),
-        "size": number(arm.links[-1].radius),
-        "rgba": TIP_COLOUR,
-    }
+    rpy, size = geometry.tip_rpy(arm), number(arm.links[-1].radius)
+    tip = {"name": "tip", "pos": numbers(geometry.tip_position(arm)), "size": size, "rgba": TIP_COLOUR}
     if any(rpy):
         tip["euler"] = numbers(rpy)
     SubElement(body, "site", tip)

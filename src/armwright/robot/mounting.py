@@ -46,11 +46,9 @@ def needs_turning(arm: Arm) -> bool:
 
 def mounted(described: UrdfArm, mounting: Mounting) -> UrdfArm:
     """Return an arm whose base link was at the origin with the base link elsewhere."""
-    arm = (
-        turned(described.arm, rotation_about(np.array([0.0, 0.0, 1.0]), mounting.yaw))
-        if mounting.yaw
-        else described.arm
-    )
+    arm = described.arm
+    if mounting.yaw:
+        arm = turned(arm, rotation_about(np.array([0.0, 0.0, 1.0]), mounting.yaw))
     x, y, z = (at + shift for at, shift in zip(arm.base, mounting.position, strict=True))
     return replace(described, arm=replace(arm, base=(x, y, z)))
 

@@ -92,9 +92,8 @@ def _add_link(robot: Element, segment: geometry.Segment) -> None:
     element = SubElement(robot, "link", name=segment.name)
     # Also written for a mass of 0; without it, MuJoCo assumes the density of water and scikit-robot 1 g.
     if not link.without_mass:
-        _add_inertial(
-            element, link.total_com, geometry.inertia_rpy(link), link.total_mass, geometry.inertia_moments(link)
-        )
+        moments = geometry.inertia_moments(link)
+        _add_inertial(element, link.total_com, geometry.inertia_rpy(link), link.total_mass, moments)
     if link.length > 0.0:
         cylinder = {"radius": number(link.radius), "length": number(link.length)}
         _add_solid(element, "link", geometry.midpoint(link), geometry.rpy_along(link.offset), "cylinder", cylinder)
@@ -109,9 +108,8 @@ def _add_motor(robot: Element, segment: geometry.Segment, body: MotorBody) -> No
     dimensions = {"radius": number(body.radius), "length": number(body.length)}
     dimensions = {"size": numbers(body.size)} if body.shape == "box" else dimensions
     motor = _add_fixed(robot, segment.motor_name, segment.parent, segment.position)
-    _add_solid(
-        motor, f"joint_{segment.joint.nearest_axis}", body.centre, geometry.body_rpy(body), body.shape, dimensions
-    )
+    material = f"joint_{segment.joint.nearest_axis}"
+    _add_solid(motor, material, body.centre, geometry.body_rpy(body), body.shape, dimensions)
 
 
 def _add_solid(

@@ -1,6 +1,6 @@
 """What a task needs of each joint of an arm and of its drive."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -17,12 +17,11 @@ from armwright.robot.motor_body import MotorBody
 from armwright.sheet.record import JointLine
 
 
-def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[str] = ()) -> tuple[JointLine, ...]:
-    """Return a line for each moving joint, named joint_1, joint_2 and so on by default.
+def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[str] = ()) -> Iterator[JointLine]:
+    """Yield a line for each moving joint, named joint_1, joint_2 and so on by default.
 
     The evaluation is that of this arm alone in the task; None without a task.
     """
-    lines: list[JointLine] = []
     moving = [j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"]
     need = {} if evaluation is None else _needs(evaluation)
     if arm.no_mass:
@@ -30,7 +29,7 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
     for k, j in enumerate(moving):
         joint = arm.joints[j]
         used = None if evaluation is None else _used(evaluation, j)
-        line = JointLine(
+        yield JointLine(
             number=j + 1,
             name=names[k] if names else f"joint_{j + 1}",
             kind=joint.kind,
@@ -44,8 +43,6 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
             body="" if joint.body is None else _describe_body(joint.body),
             **{name: finite_or_none(values[j]) for name, values in need.items()},
         )
-        lines.append(line)
-    return tuple(lines)
 
 
 def _describe_body(body: MotorBody) -> str:
