@@ -20,10 +20,8 @@ EXTRAS: Mapping[str, Sequence[str]] = {
     "llm": ("anthropic", "google.genai", "openai", "pydantic_ai"),
     "studies": ("cloudpickle", "jinja2", "optuna", "threadpoolctl"),
 }
-DISTRIBUTIONS: Mapping[str, str] = {
-    "google.genai": "google-genai",
-    "pydantic_ai": "pydantic-ai-slim",
-}  # if not the same
+# Their distributions, if these have other names
+DISTRIBUTIONS: Mapping[str, str] = {"google.genai": "google-genai", "pydantic_ai": "pydantic-ai-slim"}
 
 
 def is_installed(package: str) -> bool:

@@ -43,7 +43,7 @@ def experiment(
     from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_files, show_outcome, show_plan
     from armwright.experiments import plan
     from armwright.experiments import runner as running
-    from armwright.experiments.cells import collect, plan_cells
+    from armwright.experiments.cells import CellOutcome, collect, plan_cells
     from armwright.experiments.tables import write_tables
     from armwright.llm.configuration import load_model_options
 
@@ -64,7 +64,7 @@ def experiment(
     placed = running.default_workers(len(due)) if is_default else select_workers(workers, scheduler)
     show_plan(console, due, len(cells) - len(due), skipped, placed)
     drawing = can_draw(console, figures)
-    failed: list[running.CellOutcome] = []
+    failed: list[CellOutcome] = []
     try:
         plan.write_plan(chosen, out)
         ended = running.run_cells(due, placed, console.print)

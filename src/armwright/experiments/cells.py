@@ -46,6 +46,16 @@ class Cell:
         return f"{self.plan.label}, {self.task_name}, seed {self.seed}"
 
 
+@dataclass(frozen=True)
+class CellOutcome:
+    """The outcome of a cell."""
+
+    cell: Cell
+    seconds: float
+    hypervolume: float | None = None
+    fault: str = ""  # why it failed; empty if it is finished
+
+
 def plan_cells(
     plan: ExperimentPlan,
     folder: Path,

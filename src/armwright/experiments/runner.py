@@ -4,12 +4,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
 from armwright.exceptions import ArmwrightError
-from armwright.experiments.cells import Cell
+from armwright.experiments.cells import Cell, CellOutcome
 from armwright.extras import missing_packages
 from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
@@ -29,16 +29,6 @@ from armwright.study.workers.cluster import MAX_LOSSES, Cluster, Finished, Worke
 from armwright.tasks.catalogue import load_task
 
 POLL = 1.0  # [s] between two checks of the cluster
-
-
-@dataclass(frozen=True)
-class CellOutcome:
-    """The outcome of a cell."""
-
-    cell: Cell
-    seconds: float
-    hypervolume: float | None = None
-    fault: str = ""  # why it failed; empty if it is finished
 
 
 def run_cell(cell: Cell) -> CellOutcome:
