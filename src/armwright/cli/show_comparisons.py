@@ -38,7 +38,7 @@ def show_plan(
         console.print(note)
     with_model = [cell for cell in due if cell.plan.needs_a_model and cell.replay is None]
     if with_model:
-        proposals = sum(-(-cell.n_total // cell.plan.n_step) for cell in with_model)
+        proposals = sum(-(-cell.experiment.n_total // cell.plan.n_step) for cell in with_model)
         asked = {
             f"{options.model}{describe_server(options)}" for cell in with_model for options in [cell.plan.model_options]
         }

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
@@ -27,15 +27,12 @@ class Cell:
     task, space: names or absolute paths. replay: a recording, or the folder of a recorded run, to replay.
     """
 
-    method: str
+    experiment: ExperimentPlan = field(hash=False)  # the same for all cells
     plan: MethodPlan
     task: str
     task_name: str
     space: str | None
     seed: int
-    n_init: int
-    n_total: int
-    robust: bool
     folder: Path
     replay: str | None = None
     reason: str = ""  # why it cannot be run; empty if it can
@@ -89,15 +86,12 @@ def plan_cells(
         method, task_folder = plan.methods[key], out.resolve() / RUNS / key / task_name / f"seed{seed}"
         replay, reason = _model_source(method, task_name, seed, folder)
         cell = Cell(
-            method=key,
+            experiment=plan,
             plan=method,
             task=task,
             task_name=task_name,
             space=space,
             seed=seed,
-            n_init=plan.n_init,
-            n_total=plan.n_total,
-            robust=plan.robust,
             folder=task_folder,
             replay=replay,
             reason=reason,

@@ -51,9 +51,9 @@ def _run(cell: Cell) -> RunResult:
         problem,
         proposer=plan.choose_proposer(cell.replay).proposer or "none",
         sampler=plan.sampler,
-        n_init=cell.n_init,
+        n_init=cell.experiment.n_init,
         n_step=plan.n_step,
-        n_total=cell.n_total,
+        n_total=cell.experiment.n_total,
         in_flight=plan.model_options.in_flight,
         seed=cell.seed,
         out=cell.folder,
@@ -65,7 +65,7 @@ def _problem(cell: Cell) -> Problem:
     return Problem(
         task,
         default_space(task.name) if cell.space is None else load_space(cell.space),
-        tolerance=TOLERANCE if cell.robust else 0.0,
+        tolerance=TOLERANCE if cell.experiment.robust else 0.0,
         device=resolve_device("auto", many=cell.plan.design is not None),
     )
 
@@ -73,13 +73,14 @@ def _problem(cell: Cell) -> Problem:
 def is_finished(cell: Cell) -> bool:
     """Return whether a cell is finished with the same settings; a front search is asked again each time."""
     plan, summary = cell.plan, read_summary(cell.folder)
-    if summary is None or plan.design is not None or summary["n_trials"] < cell.n_init + cell.n_total:
+    n_init, n_total = cell.experiment.n_init, cell.experiment.n_total
+    if summary is None or plan.design is not None or summary["n_trials"] < n_init + n_total:
         return False
     try:
         problem = _problem(cell)
         proposer, sampler = plan.choose_proposer(cell.replay).proposer, sampler_for(problem, plan.sampler)
         in_flight = plan.model_options.in_flight
-        method = study_method(proposer, sampler, cell.n_init, plan.n_step, cell.n_total, in_flight)
+        method = study_method(proposer, sampler, n_init, plan.n_step, n_total, in_flight)
         check_same_run(cell.folder, read_config(cell.folder), run_config(problem, method, cell.seed))
     except ArmwrightError:
         return False  # `run_cell` reports it
