@@ -8,8 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from armwright.experiments.cells import plan_cells
-from armwright.experiments.outcome import collect
+from armwright.experiments.cells import collect, plan_cells
 from armwright.experiments.plan import load_experiment
 from armwright.experiments.runner import run_cells
 from armwright.experiments.tables import markdown

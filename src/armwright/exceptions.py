@@ -143,10 +143,7 @@ class StoppedError(ArmwrightError):
 
 def _line(text: str) -> str:
     """Return a text on one line, with invisible characters escaped and the middle of a long text left out."""
-    text = _cut(text)
-    if text.isprintable():
-        return text
-    return _cut("".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text))
+    return _cut("".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in _cut(text)))
 
 
 def _cut(text: str) -> str:

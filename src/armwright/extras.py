@@ -4,32 +4,24 @@ A module may import a package of an extra like any other: the command or the pub
 the extra (`naming_extras`).
 """
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 
 from armwright.exceptions import MissingExtraError
 
-# Packages of each extra: import name and distribution name.
-EXTRAS: Mapping[str, Mapping[str, str]] = {
-    "arms": {"robot_descriptions": "robot_descriptions", "xacrodoc": "xacrodoc"},
-    "distributed": {"cryptography": "cryptography", "distributed": "distributed"},
-    "figures": {"matplotlib": "matplotlib"},
-    "gp": {"greenlet": "greenlet", "torch": "torch"},
-    "live": {"ruamel.yaml": "ruamel.yaml", "starlette": "starlette", "uvicorn": "uvicorn"},
-    "llm": {
-        "anthropic": "anthropic",
-        "google.genai": "google-genai",
-        "openai": "openai",
-        "pydantic_ai": "pydantic-ai-slim",
-    },
-    "studies": {
-        "cloudpickle": "cloudpickle",
-        "jinja2": "jinja2",
-        "optuna": "optuna",
-        "threadpoolctl": "threadpoolctl",
-    },
+# Packages of each extra, by import name
+EXTRAS: Mapping[str, Sequence[str]] = {
+    "arms": ("robot_descriptions", "xacrodoc"),
+    "distributed": ("cryptography", "distributed"),
+    "figures": ("matplotlib",),
+    "gp": ("greenlet", "torch"),
+    "live": ("ruamel.yaml", "starlette", "uvicorn"),
+    "llm": ("anthropic", "google.genai", "openai", "pydantic_ai"),
+    "studies": ("cloudpickle", "jinja2", "optuna", "threadpoolctl"),
 }
+# Their distributions, if these have other names
+DISTRIBUTIONS: Mapping[str, str] = {"google.genai": "google-genai", "pydantic_ai": "pydantic-ai-slim"}
 
 
 def is_installed(package: str) -> bool:

@@ -51,8 +51,13 @@ def read_bytes(path: Path, limit: int, error: type[Exception]) -> bytes:
 
 def read_text(path: Path, limit: int, error: type[Exception]) -> str:
     """Read a text file in UTF-8 as `read_bytes` does, without a byte order mark."""
+    return decode_text(read_bytes(path, limit, error), path, error)
+
+
+def decode_text(content: bytes, path: Path, error: type[Exception]) -> str:
+    """Return the text of a file in UTF-8, with LF line ends and without a byte order mark."""
     try:
-        return read_bytes(path, limit, error).decode("utf-8-sig").replace("\r\n", "\n")
+        return content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as fault:
         raise error(f"{path} is not a text file in UTF-8") from fault
 

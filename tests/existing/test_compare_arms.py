@@ -34,7 +34,7 @@ from armwright.robot.urdf_reader import read_urdf
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.sheet.design_sheet import design_sheet
-from armwright.sheet.urdf_sheet import Job, urdf_sheet
+from armwright.sheet.urdf_sheet import urdf_sheet
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from armwright.tasks.tool import Tool
@@ -148,7 +148,7 @@ def test_designs_and_arms_have_the_values_of_their_data_sheets(run: Path, compar
         assert tuple(value for value, _ in sheet.objectives.values()) == design.values
     for arm, file in zip(compared.arms, (UR5, PANDA), strict=True):
         placement = placed(compared.problem, read_urdf(file), 0, Mounting(arm.base, arm.yaw))
-        sheet = urdf_sheet(placement.described, job=Job(compared.problem, placement.mounting, placement.description))
+        sheet = urdf_sheet(placement)
         assert {name: fact.value for name, fact in sheet.facts.items()} == values_of(arm)
         assert sheet.violated == arm.violated
         assert tuple(value for value, _ in sheet.objectives.values()) == arm.values
@@ -243,8 +243,7 @@ def test_arm_of_unknown_mass_has_no_torque_and_is_not_compared(run: Path, histor
     assert searched.value("unreached_targets") == 0
     moving = TASK.model_copy(update={"cycle": Task(name="c", targets=TASK.targets, cycle=cycle).cycle})  # type: ignore[arg-type]
     there = placed(aw.Problem(moving, WITH_MOTORS), read_urdf(file), 0, Mounting((-0.2, 0.0, 0.0)))
-    job = Job(aw.Problem(moving, WITH_MOTORS), there.mounting, there.description)
-    with_task, alone = urdf_sheet(there.described, job), urdf_sheet(read_urdf(file))
+    with_task, alone = urdf_sheet(there), urdf_sheet(read_urdf(file))
     assert all(joint.torque is joint.peak_utilisation is joint.tilting_moment is None for joint in with_task.joints)
     assert all(joint.speed_utilisation for joint in with_task.joints[:1])
     assert with_task.violated == ()

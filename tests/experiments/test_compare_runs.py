@@ -18,8 +18,7 @@ from armwright import Problem, Task, find_front, load_task, optimize, read_run
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.experiments.compare_runs import Comparison, compare_runs, compare_summaries
-from armwright.experiments.run_list import find_runs
-from armwright.experiments.run_record import RunSummary, read_run_summary, shares_by_source
+from armwright.experiments.run_record import RunSummary, find_runs, read_run_summary, shares_by_source
 from armwright.experiments.statistics import interval, paired_test
 from armwright.experiments.tables import markdown, write_tables
 from armwright.pictures.comparison_figures import write_comparison_figures

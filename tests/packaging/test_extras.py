@@ -16,7 +16,7 @@ import pytest
 import armwright as aw
 from armwright import extras
 from armwright.exceptions import MissingExtraError, UsageError
-from armwright.extras import EXTRAS, missing_packages, naming_extras
+from armwright.extras import DISTRIBUTIONS, EXTRAS, missing_packages, naming_extras
 from armwright.page.live_server import serve, start_server
 from armwright.robot.robot_descriptions import find_urdf
 from tests import ROOT
@@ -32,6 +32,11 @@ def plain(name: str) -> str:
     return re.sub("[-_.]+", "-", re.split(r"[\[<>=!~ ]", name)[0]).lower()
 
 
+def distributions(extra: str) -> list[str]:
+    """The distributions of an extra."""
+    return [DISTRIBUTIONS.get(package, package) for package in EXTRAS[extra]]
+
+
 def test_extras_match_pyproject() -> None:
     bring_studies = {extra for extra in STATED if "armwright[studies]" in STATED[extra]}
     assert bring_studies == {"distributed", "gp", "llm"}
@@ -43,9 +48,9 @@ def test_extras_match_pyproject() -> None:
     assert set(EXTRAS) == set(stated)
     assert STATED["all"] == [f"armwright[{','.join(sorted(stated))}]"]
     assert re.match(r"pydantic-ai-slim\[anthropic,google,openai\]", *stated["llm"])  # which brings their packages
-    assert [*EXTRAS["llm"].values()] == ["anthropic", "google-genai", "openai", "pydantic-ai-slim"]
+    assert distributions("llm") == ["anthropic", "google-genai", "openai", "pydantic-ai-slim"]
     for extra in set(EXTRAS) - {"llm"}:
-        assert {plain(name) for name in EXTRAS[extra].values()} == {plain(name) for name in stated[extra]}
+        assert {plain(name) for name in distributions(extra)} == {plain(name) for name in stated[extra]}
 
 
 @cache
@@ -56,10 +61,10 @@ def holders() -> Mapping[str, list[str]]:
 
 @pytest.mark.parametrize("extra", [pytest.param(one, marks=NEEDS_GP if one == "gp" else ()) for one in EXTRAS])
 def test_packages_of_an_extra_belong_to_its_distributions(extra: str) -> None:
-    installed = EXTRAS[extra].keys() - missing_packages(extra)
+    installed = set(EXTRAS[extra]) - set(missing_packages(extra))
     assert installed
     for package in installed:
-        distribution = EXTRAS[extra][package]
+        distribution = DISTRIBUTIONS.get(package, package)
         assert plain(distribution) in map(plain, holders()[package.partition(".")[0]])
 
 

@@ -12,6 +12,7 @@ import pinocchio
 import pytest
 
 import armwright as aw
+from armwright.existing.base_placement import Placement
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.drive_quantities import (
     bearing_utilisation,
@@ -32,7 +33,7 @@ from armwright.runs.history import History
 from armwright.sheet.design_sheet import design_sheet, sheet_of
 from armwright.sheet.record import DataSheet
 from armwright.sheet.tables import verdict_of
-from armwright.sheet.urdf_sheet import Job, urdf_sheet
+from armwright.sheet.urdf_sheet import urdf_sheet
 from armwright.sheet.writer import sheet_record
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
@@ -178,7 +179,7 @@ def test_joints_of_a_urdf_are_stated_as_it_counts_them() -> None:
     task = Task(name="feeder", targets=((0.4, -0.2, 0.3), (0.4, 0.2, 0.3), (0.1, 0.4, 0.5)))
     problem = aw.Problem(task, DesignSpace.model_validate(SPACE))
     there = mounted(described, Mounting((0.0, 0.0, 0.0), 0.4))
-    sheet = urdf_sheet(there, job=Job(problem, Mounting((0.0, 0.0, 0.0), 0.4), "here"))
+    sheet = urdf_sheet(Placement(problem, there, Mounting((0.0, 0.0, 0.0), 0.4)))
     model = pinocchio.buildModelFromUrdf(str(robot("panda")))
     places = [model.joints[model.getJointId(joint.name)].idx_q for joint in sheet.joints]
     assert [joint.lower for joint in sheet.joints] == pytest.approx(model.lowerPositionLimit[places], abs=1e-12)
@@ -211,7 +212,7 @@ def test_efforts_and_speeds_that_the_cycle_exceeds_are_stated() -> None:
     problem = aw.Problem(task, DesignSpace(joints=3))
     arm = replace(read_urdf(robot("ur5_robot")).arm, safety_factor=1.5)
     described = replace(read_urdf(robot("ur5_robot")), arm=arm)
-    sheet = urdf_sheet(described, job=Job(problem, Mounting(), "here"))
+    sheet = urdf_sheet(Placement(problem, described, Mounting()))
     evaluation = problem.physics(stack_arms([arm]))
     torque = np.abs(evaluation.loads.torques[0]).max(axis=(0, 1))
     speed = np.abs(evaluation.loads.speeds[0]).max(axis=(0, 1))

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from armwright.cli.arm_options import parse_base, refuse
-from armwright.cli.options import load_problem
+from armwright.cli.options import load_problem, parse_base, refuse
 from armwright.cli.streams import activity, print_json, print_text
 
 
@@ -48,18 +47,15 @@ def datasheet(
         from armwright.existing.base_placement import placed
         from armwright.robot.robot_descriptions import find_urdf
         from armwright.robot.urdf_reader import read_urdf
-        from armwright.sheet.urdf_sheet import Job, urdf_sheet
+        from armwright.sheet.urdf_sheet import urdf_sheet
 
         refuse(f": expected a run folder, got {source}", design=design)
         if task is None:
             refuse(": expected a task, too; try --task TASK", space=space, base=base)
         with activity("placing the arm" if task and base is None else "writing the data sheet"):
-            described, job = read_urdf(find_urdf(source), tip, base_link), None
-            if task is not None:
-                problem = load_problem(task, space)
-                placement = placed(problem, described, seed or 0, parse_base(base))
-                described, job = placement.described, Job(problem, placement.mounting, placement.description)
-            sheet, read = urdf_sheet(described, job, price), f"{described.name}: {described.notes[0]}"
+            described = read_urdf(find_urdf(source), tip, base_link)
+            place = None if task is None else placed(load_problem(task, space), described, seed or 0, parse_base(base))
+            sheet, read = urdf_sheet(place or described, price), f"{described.name}: {described.notes[0]}"
         folder = Path(f"{Path(source).stem}-datasheet")
     files = write_datasheet(sheet, folder if out is None else out)
     if json_:

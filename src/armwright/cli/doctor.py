@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from importlib import metadata
 
 from armwright.exceptions import ArmwrightError
-from armwright.extras import EXTRAS, install_command, missing_packages
+from armwright.extras import DISTRIBUTIONS, EXTRAS, install_command, missing_packages
 from armwright.llm.configuration import configuration_path, configured_model
 from armwright.llm.model_options import ModelOptions
 from armwright.problem.problem import Problem
@@ -39,7 +39,7 @@ def examine(options: ModelOptions) -> Iterator[tuple[str, str]]:
         if missing := missing_packages(extra):
             yield MISSING, f"extra {extra}: {', '.join(missing)} not installed: {install_command(extra)}"
         else:
-            found = (f"{name} {metadata.version(name)}" for name in packages.values())
+            found = (f"{name} {metadata.version(name)}" for name in (DISTRIBUTIONS.get(one, one) for one in packages))
             yield OK, f"extra {extra}: {', '.join(found)}"
     for vendor, variables in VENDORS.items() if not missing_packages("llm") else ():
         keys = {names: next(filter(os.environ.get, names.split(" or ")), None) for names in variables}

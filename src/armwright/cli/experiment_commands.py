@@ -3,8 +3,7 @@
 import sys
 from pathlib import Path
 
-from armwright.cli.arm_options import parse_base, parse_prices
-from armwright.cli.options import select_workers
+from armwright.cli.options import parse_base, parse_prices, select_workers
 from armwright.cli.streams import activity, exit_interrupted, open_console, print_json, print_records, print_text
 from armwright.exceptions import FailureError, SettingsError
 
@@ -42,9 +41,9 @@ def experiment(
     """
     from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_files, show_outcome, show_plan
-    from armwright.experiments import outcome, plan
+    from armwright.experiments import plan
     from armwright.experiments import runner as running
-    from armwright.experiments.cells import plan_cells
+    from armwright.experiments.cells import CellOutcome, collect, plan_cells
     from armwright.experiments.tables import write_tables
     from armwright.llm.configuration import load_model_options
 
@@ -65,14 +64,14 @@ def experiment(
     placed = running.default_workers(len(due)) if is_default else select_workers(workers, scheduler)
     show_plan(console, due, len(cells) - len(due), skipped, placed)
     drawing = can_draw(console, figures)
-    failed: list[running.CellOutcome] = []
+    failed: list[CellOutcome] = []
     try:
-        outcome.write_plan(chosen, out)
+        plan.write_plan(chosen, out)
         ended = running.run_cells(due, placed, console.print)
         for number, done in enumerate(ended, start=1):
             show_outcome(console, done, number, len(due))
             failed += [done] if done.fault else []
-        found = outcome.collect(chosen, cells)
+        found = collect(chosen, cells)
         notes = notes_on_cells(skipped, failed)
         title = f"Experiment {chosen.name}"
         tables = write_tables(out, found, title, notes)
@@ -115,7 +114,7 @@ def compare(
     from armwright.cli.notes import can_draw
     from armwright.cli.show_comparisons import show_comparison, show_files
     from armwright.experiments.compare_runs import compare_summaries
-    from armwright.experiments.run_list import read_finished_runs
+    from armwright.experiments.run_record import read_finished_runs
     from armwright.experiments.tables import tables, write_tables
 
     console = open_console(json_ or csv_)

@@ -1,24 +1,9 @@
 """Options of commands, and the objects that they describe.
 
 A command is a plain function: parameters before `*` are its arguments, the others its options. Their help stands in its
-docstring, in a section for each group of `--help`: `name (METAVAR): text. Default: text.` What several commands share
-is stated here.
-"""
+docstring, in a section for each group of `--help`: `name (METAVAR): text. Default: text.` This module's docstring holds
+what several commands share:
 
-import inspect
-import os
-import re
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_origin
-
-import typer
-
-if TYPE_CHECKING:
-    from armwright.problem.problem import Problem
-    from armwright.study.workers.cluster import Workers
-
-SHARED = """
 Parameters:
     run (RUN): A run folder.
     source (RUN|ARM): A run folder, a URDF file, or a name such as ur5e (robot_descriptions; extra arms).
@@ -51,6 +36,24 @@ Output:
     figures: Make the page (report.html) and the figures of a finished run.
     json_: Print only JSON to stdout.
 """
+
+import inspect
+import math
+import os
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_origin
+
+import typer
+
+from armwright.exceptions import SettingsError
+
+if TYPE_CHECKING:
+    from armwright.problem.problem import Problem
+    from armwright.robot.mounting import Mounting
+    from armwright.study.workers.cluster import Workers
+
 _SECTION = re.compile(r"^([A-Z][\w ]*):\n((?:    .+\n)+)", re.MULTILINE)
 _PARAMETER = re.compile(r"^    (\w+)(?: \(([^)\n]+)\))?: (.+(?:\n     .+)*)", re.MULTILINE)
 
@@ -58,7 +61,7 @@ _PARAMETER = re.compile(r"^    (\w+)(?: \(([^)\n]+)\))?: (.+(?:\n     .+)*)", re
 def read_declaration(function: Callable[..., None]) -> tuple[str, inspect.Signature]:
     """Return the help of a command without its parameters, and its signature with these declared for Typer."""
     text, signature = inspect.cleandoc(function.__doc__ or "") + "\n", inspect.signature(function)
-    known = {**_read_help(SHARED), **_read_help(text)}
+    known = {**_read_help(__doc__ or ""), **_read_help(text)}
     parameters = [_declare(one, known.get(one.name, {})) for one in signature.parameters.values()]
     return _SECTION.sub("", text).strip(), signature.replace(parameters=parameters)
 
@@ -137,3 +140,46 @@ def select_workers(n_workers: int | None, scheduler: str | None) -> "Workers | N
     from armwright.study.workers.cluster import Workers
 
     return Workers(n_workers or None, scheduler) if n_workers or scheduler else None
+
+
+def parse_numbers(option: str, text: str, expected: str, *counts: int) -> list[float]:
+    """Parse finite numbers with commas, as many as one of the counts."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
+        raise SettingsError(f'{option} "{text}": expected {expected}')
+    return numbers
+
+
+def refuse(reason: str, **options: object) -> None:
+    """Raise SettingsError if one of these options is given, with the reason after its name and value."""
+    for name, value in options.items():
+        if value is not None:
+            raise SettingsError(f"--{name.replace('_', '-')} {value}{reason}")
+
+
+def parse_prices(texts: Sequence[str]) -> dict[str, float]:
+    """Parse `ur5e=28000`, each of another arm, into prices by name [USD]."""
+    prices: dict[str, float] = {}
+    for text in texts:
+        name, _, price = text.rpartition("=")
+        if name in prices:
+            raise SettingsError(f"--price: expected one price of {name}, got two")
+        try:
+            prices[name] = float(price if name else "")
+        except ValueError:
+            raise SettingsError(f'--price "{text}": expected ARM=USD, such as ur5e=28000') from None
+    return prices
+
+
+def parse_base(text: str | None) -> "Mounting | None":
+    """Parse `0.1,0,0.3` or `0.1,0,0.3,90` into a mounting; None for None."""
+    from armwright.robot.mounting import Mounting
+
+    if text is None:
+        return None
+    expected = "three numbers with commas, such as 0,0,0.5 [m], or a fourth, the turn [°]"
+    x, y, z, *yaw = parse_numbers("--base", text, expected, 3, 4)
+    return Mounting.of((x, y, z, *map(math.radians, yaw)))

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armwright.cli.arm_options import parse_numbers, refuse
+from armwright.cli.options import parse_numbers, refuse
 from armwright.cli.streams import open_console, print_json
 from armwright.cli.tables import Column, print_table
 from armwright.exceptions import SettingsError
@@ -143,9 +143,9 @@ def _subject(
     run = Path(source)
     if not run.is_dir():
         refuse(f" is for a run; {source} is an arm", design=design)
-        arm = read_urdf(find_urdf(source), tip)
-        around = None if task is None else load_task(task)
-        return MappedArm(run.stem, arm, around, conditions), Path(f"{run.stem}-reach.npz")
+        described, around = read_urdf(find_urdf(source), tip), None if task is None else load_task(task)
+        read = f"{run.stem}: {described.notes[0]}"
+        return MappedArm(run.stem, described.arm, around, conditions, read), Path(f"{run.stem}-reach.npz")
     refuse(f" is for a URDF; the run {source} has its own", tip=tip, task=task)
     _, history = read_run(run)
     member = pick(history)[0] if design is None else history.member(design)

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 
@@ -12,7 +12,7 @@ from armwright.cli.notes import payload_note
 from armwright.cli.streams import list_files
 from armwright.cli.tables import Column, print_table
 from armwright.existing.compare_arms import ArmComparison, ComparedArm
-from armwright.experiments.cells import Cell
+from armwright.experiments.cells import Cell, CellOutcome
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.tables import markdown, remarks_on, sections
 from armwright.extras import install_command, missing_packages
@@ -23,9 +23,6 @@ from armwright.robot.mounting import Mounting
 from armwright.sheet.record import NOT_MODELLED
 from armwright.study.workers.cluster import Workers
 from armwright.text import rounded
-
-if TYPE_CHECKING:
-    from armwright.experiments.runner import CellOutcome
 
 
 def show_plan(
@@ -41,7 +38,7 @@ def show_plan(
         console.print(note)
     with_model = [cell for cell in due if cell.plan.needs_a_model and cell.replay is None]
     if with_model:
-        proposals = sum(-(-cell.n_total // cell.plan.n_step) for cell in with_model)
+        proposals = sum(-(-cell.experiment.n_total // cell.plan.n_step) for cell in with_model)
         asked = {
             f"{options.model}{describe_server(options)}" for cell in with_model for options in [cell.plan.model_options]
         }
@@ -49,7 +46,7 @@ def show_plan(
         console.print(f"{len(with_model)} of them ask {models} for about {proposals:,} proposals in total")
 
 
-def notes_on_cells(skipped: Sequence[Cell], failed: "Sequence[CellOutcome]") -> list[str]:
+def notes_on_cells(skipped: Sequence[Cell], failed: Sequence[CellOutcome]) -> list[str]:
     """Return a line for each method and reason of skipped cells, and one for each failure."""
     reasons = Counter((one.plan.label, one.reason) for one in skipped)
     notes = [
@@ -59,7 +56,7 @@ def notes_on_cells(skipped: Sequence[Cell], failed: "Sequence[CellOutcome]") -> 
     return notes + [f"FAILED: {outcome.cell.description}: {outcome.fault}" for outcome in failed]
 
 
-def show_outcome(console: Console, outcome: "CellOutcome", number: int, of: int) -> None:
+def show_outcome(console: Console, outcome: CellOutcome, number: int, of: int) -> None:
     """Print the outcome of a cell."""
     if outcome.fault:
         console.print(f"[{number}/{of}] FAILED: {outcome.cell.description}: {outcome.fault}")

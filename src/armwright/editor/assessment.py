@@ -43,10 +43,8 @@ def assess(texts: Texts, files: EditedFiles) -> dict[str, Any]:
     return {
         "task": contents[0],  # as read, valid or not; None if it is not YAML
         "space": contents[1],  # likewise
-        "errors": [
-            *map(str, faults),
-            *(str(finding) for finding in findings if finding.is_proven),
-        ],  # no search can start
+        # With one of these, no search can start
+        "errors": [*map(str, faults), *(str(finding) for finding in findings if finding.is_proven)],
         "findings": [finding for finding in findings if not finding.is_proven],  # what is suspicious
         "scene": None if task is None else _scene(task, problem),
         "meaning": {} if problem is None else _meaning(problem),  # in words

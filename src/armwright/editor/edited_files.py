@@ -15,7 +15,7 @@ from string import Template
 from pydantic import BaseModel, Field
 
 from armwright.exceptions import FailureError, TaskError, UsageError
-from armwright.files import naming_write_errors, read_bytes, replace_file
+from armwright.files import decode_text, naming_write_errors, read_bytes, replace_file
 from armwright.tasks.task_template import safe_name, task_template
 
 MAX_BYTES = 256 * 1024  # a task of 3,000 targets; forms for more would be slow
@@ -57,8 +57,8 @@ class EditedFiles:
         """Return the files as they were last read or written, or the templates."""
         task, space = self._seen[self.task], self._seen[self.space]
         return Texts(
-            task=task_template(self.task) if task is None else _decode(task, self.task),
-            space=space_template(self.space) if space is None else _decode(space, self.space),
+            task=task_template(self.task) if task is None else decode_text(task, self.task, TaskError),
+            space=space_template(self.space) if space is None else decode_text(space, self.space, TaskError),
         )
 
     @property
@@ -81,7 +81,7 @@ class EditedFiles:
                     raise UsageError(f"{file} has changed on disk since it was opened")
         for file, text in given.items():
             former = self._seen[file]
-            if overwrite or former is None or text != _decode(former, file):
+            if overwrite or former is None or text != decode_text(former, file, TaskError):
                 content = _encode(text, former or b"")
                 _write(file, content)
                 self._seen[file] = content
@@ -103,16 +103,8 @@ def _read(file: Path) -> bytes | None:
     if not os.path.lexists(file):
         return None
     content = read_bytes(file, MAX_BYTES, TaskError)
-    _decode(content, file)
+    decode_text(content, file, TaskError)
     return content
-
-
-def _decode(content: bytes, file: Path) -> str:
-    """Return the text of a file as the page shows it."""
-    try:
-        return content.decode("utf-8-sig").replace("\r\n", "\n")
-    except UnicodeDecodeError as fault:
-        raise TaskError(f"{file} is not a text file in UTF-8") from fault
 
 
 def _encode(text: str, former: bytes) -> bytes:

@@ -47,6 +47,7 @@ def with_travel(arm: Arm, travel: float) -> Arm:
 class Placement:
     """An existing arm in its place on a task."""
 
+    problem: Problem  # the task, its objectives and constraints
     described: UrdfArm  # arm there, with its tool
     mounting: Mounting  # where its base link stands
     tried: int = 0  # number of places that were tried; 0 if the place was given
@@ -75,9 +76,9 @@ def placed(problem: Problem, described: UrdfArm, seed: int, mounting: Mounting |
     arm = with_tool(with_travel(described.arm, problem.space.travel), problem.task.tool)
     equipped = replace(described, arm=replace(arm, safety_factor=problem.space.safety_factor))
     if mounting is not None:
-        return Placement(mounted(equipped, mounting), mounting)
+        return Placement(problem, mounted(equipped, mounting), mounting)
     found = search_base(problem, equipped, seed)
-    return Placement(mounted(equipped, found), found, N_PLACES)
+    return Placement(problem, mounted(equipped, found), found, N_PLACES)
 
 
 def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
@@ -91,7 +92,7 @@ def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
     if needs_turning(described.arm):
         parameters.append(FloatParameter("yaw", -math.pi, math.pi, "rad"))
 
-    def evaluate(rows: Array) -> Array:
+    def losses_of(rows: Array) -> Array:
         """Return losses (N,): from 2 if a target is missed, from 1 if a constraint is violated, else by torque."""
         batch = max(1, POSTURES_AT_ONCE[problem.device] // len(problem.task.target_positions))
         losses = np.empty(len(rows))
@@ -102,19 +103,17 @@ def search_base(problem: Problem, described: UrdfArm, seed: int) -> Mounting:
         return losses
 
     encoding, rng = DesignEncoding(parameters), np.random.default_rng(derived_seed(seed, 0))
-    first: Any = rng.random((PLACES, len(parameters)))
+
+    def in_units(units: Array) -> Array:
+        return losses_of(encoding.from_units(units.T))
+
     settings: Any = {"tol": 0.0, "polish": False, "updating": "deferred", "vectorized": True}
-
-    def losses_of(units: Array) -> Array:
-        return evaluate(encoding.from_units(units.T))
-
-    settings |= {"init": first, "maxiter": GENERATIONS - 1, "rng": rng}
-    ranges = [(0.0, 1.0)] * len(parameters)
-    found: Any = differential_evolution(losses_of, ranges, **settings)
+    settings |= {"init": rng.random((PLACES, len(parameters))), "maxiter": GENERATIONS - 1, "rng": rng}
+    found: Any = differential_evolution(in_units, [(0.0, 1.0)] * len(parameters), **settings)
     chosen = encoding.from_units(found.x)
     if len(chosen) > 3:
         unturned = np.array([[*chosen[:3], 0.0]])
-        if _needs_hardly_more(float(evaluate(unturned)[0]), float(found.fun)):
+        if _needs_hardly_more(float(losses_of(unturned)[0]), float(found.fun)):
             chosen = unturned[0]
     return Mounting.of(chosen.tolist())
 

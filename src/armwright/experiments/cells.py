@@ -1,14 +1,17 @@
-"""The cells of an experiment: one run per seed, task and method."""
+"""The cells of an experiment, one run per seed, task and method, and the comparison of those that are finished."""
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from armwright.exceptions import SettingsError, TaskError, did_you_mean
+from armwright.exceptions import FailureError, SettingsError, TaskError, did_you_mean
+from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.plan import ExperimentPlan, MethodPlan
+from armwright.experiments.run_record import read_run_summary
 from armwright.llm.recording_file import shipped_recordings
+from armwright.proof.results import read_summary
 from armwright.tasks.catalogue import load_task
 
 RUNS = "runs"  # in an experiment's folder
@@ -24,15 +27,12 @@ class Cell:
     task, space: names or absolute paths. replay: a recording, or the folder of a recorded run, to replay.
     """
 
-    method: str
+    experiment: ExperimentPlan = field(hash=False)  # the same for all cells
     plan: MethodPlan
     task: str
     task_name: str
     space: str | None
     seed: int
-    n_init: int
-    n_total: int
-    robust: bool
     folder: Path
     replay: str | None = None
     reason: str = ""  # why it cannot be run; empty if it can
@@ -41,6 +41,16 @@ class Cell:
     def description(self) -> str:
         """Method, task and seed, for messages."""
         return f"{self.plan.label}, {self.task_name}, seed {self.seed}"
+
+
+@dataclass(frozen=True)
+class CellOutcome:
+    """The outcome of a cell."""
+
+    cell: Cell
+    seconds: float
+    hypervolume: float | None = None
+    fault: str = ""  # why it failed; empty if it is finished
 
 
 def plan_cells(
@@ -76,15 +86,12 @@ def plan_cells(
         method, task_folder = plan.methods[key], out.resolve() / RUNS / key / task_name / f"seed{seed}"
         replay, reason = _model_source(method, task_name, seed, folder)
         cell = Cell(
-            method=key,
+            experiment=plan,
             plan=method,
             task=task,
             task_name=task_name,
             space=space,
             seed=seed,
-            n_init=plan.n_init,
-            n_total=plan.n_total,
-            robust=plan.robust,
             folder=task_folder,
             replay=replay,
             reason=reason,
@@ -124,3 +131,22 @@ def _task(name: str, folder: Path) -> tuple[str, str]:
             raise TaskError(f"there is no file {file}, which the experiment names as a task")
         return str(file.resolve()), load_task(file).name
     return name, load_task(name).name
+
+
+def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
+    """Compare the finished cells, with the labels and in the order of the plan."""
+    records = [
+        read_run_summary(cell.folder, cell.plan.label) for cell in cells if read_summary(cell.folder) is not None
+    ]
+    if not records:
+        raise FailureError("no cell of the experiment is finished, so there is nothing to compare")
+    labels = [method.label for method in plan.methods.values()]
+    tasks = list(dict.fromkeys(cell.task_name for cell in cells))
+    against = {m.label: [plan.methods[key].label for key in m.against] for m in plan.methods.values() if m.against}
+    published = {
+        (plan.methods[key].label, task): numbers
+        for key, by_task in plan.published.items()
+        for task, numbers in by_task.items()
+    }
+    baseline = plan.methods[plan.baseline or next(iter(plan.methods))].label
+    return Comparison(records, labels, tasks, baseline, against, published, plan.published_in)

@@ -9,8 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
-from armwright.experiments.run_list import read_finished_runs
-from armwright.experiments.run_record import RunSummary
+from armwright.experiments.run_record import RunSummary, read_finished_runs
 from armwright.experiments.statistics import Interval, PairedTest, can_reject, holm, interval, paired_test
 from armwright.proof.front_gap import known_front
 

@@ -5,10 +5,11 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+import yaml
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.files import check_name
+from armwright.files import check_name, check_no_links, naming_write_errors, replace_file
 from armwright.llm.configuration import configured_model, own_addresses
 from armwright.llm.model_options import ModelOptions
 from armwright.proposers.factory import Choice, choose_proposer
@@ -16,6 +17,7 @@ from armwright.spaces.design_space import builtin_spaces
 from armwright.tasks.catalogue import builtin_names
 from armwright.yaml_documents import parse_document, read_document
 
+PLAN = "experiment.yaml"  # in the experiment's folder
 ALL_TASKS = "all"  # the tasks of `suite_tasks`, instead of a list
 MAX_SEEDS = 10_000
 Key = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,39}$"), AfterValidator(check_name)]
@@ -199,3 +201,12 @@ def with_model(plan: ExperimentPlan, options: ModelOptions) -> ExperimentPlan:
                 method = method.model_copy(update={"model_options": configured.options})
         methods[key] = method
     return plan.model_copy(update={"methods": methods})
+
+
+def write_plan(plan: ExperimentPlan, out: Path) -> None:
+    """Store the plan, with the models that were used, next to the results."""
+    text = yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True), sort_keys=False, allow_unicode=True)
+    check_no_links(out)
+    with naming_write_errors(out / PLAN):
+        out.mkdir(parents=True, exist_ok=True)
+        replace_file(out / PLAN, text.encode())

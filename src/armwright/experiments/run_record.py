@@ -1,6 +1,6 @@
-"""A finished run, read from its summary."""
+"""Finished runs: found in folders, and read from their summaries."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,7 @@ from armwright.pareto import hypervolume
 from armwright.proof.attribution import attribution_by_source
 from armwright.proof.results import read_summary
 from armwright.runs.config import FrontMethod, RunConfig, describe_method
-from armwright.runs.folder import read_config, read_run
+from armwright.runs.folder import CONFIG, read_config, read_run
 from armwright.runs.history import BBO, RANDOM, History
 
 
@@ -123,3 +123,23 @@ def read_run_summary(folder: Path, method: str | None = None) -> RunSummary:
         raise RunFolderError(f"{folder} is not finished; repeat the command that started it")
     label = method or describe_method(config)
     return RunSummary(folder, label, config.task.name, config.seed, config, summary, config.reference_point or ())
+
+
+def find_runs(folders: Iterable[Path]) -> list[Path]:
+    """Return the run folders among these folders and below them, by path; folders inside a run are not searched."""
+    runs: list[Path] = []
+    for folder in folders:
+        if not folder.exists():
+            raise RunFolderError(f"there is no {folder}")
+        if (folder / CONFIG).is_file():
+            runs.append(folder)
+        elif folder.is_dir():
+            runs += find_runs(sorted(entry for entry in folder.iterdir() if entry.is_dir()))
+    return runs
+
+
+def read_finished_runs(folders: Iterable[str | Path]) -> tuple[list[RunSummary], list[Path]]:
+    """Return the finished runs in these folders and below them, and the folders of unfinished runs."""
+    runs = list(dict.fromkeys(find_runs(map(Path, folders))))
+    unfinished = [run for run in runs if read_summary(run) is None]
+    return [read_run_summary(run) for run in runs if run not in unfinished], unfinished

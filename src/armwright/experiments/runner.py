@@ -4,12 +4,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
 from armwright.exceptions import ArmwrightError
-from armwright.experiments.cells import Cell
+from armwright.experiments.cells import Cell, CellOutcome
 from armwright.extras import missing_packages
 from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
@@ -28,16 +28,6 @@ from armwright.study.workers.cluster import MAX_LOSSES, Cluster, Finished, Worke
 from armwright.tasks.catalogue import load_task
 
 POLL = 1.0  # [s] between two checks of the cluster
-
-
-@dataclass(frozen=True)
-class CellOutcome:
-    """The outcome of a cell."""
-
-    cell: Cell
-    seconds: float
-    hypervolume: float | None = None
-    fault: str = ""  # why it failed; empty if it is finished
 
 
 def run_cell(cell: Cell) -> CellOutcome:
@@ -60,9 +50,9 @@ def _run(cell: Cell) -> RunResult:
         problem,
         proposer=plan.choose_proposer(cell.replay).proposer or "none",
         sampler=plan.sampler,
-        n_init=cell.n_init,
+        n_init=cell.experiment.n_init,
         n_step=plan.n_step,
-        n_total=cell.n_total,
+        n_total=cell.experiment.n_total,
         in_flight=plan.model_options.in_flight,
         seed=cell.seed,
         out=cell.folder,
@@ -74,7 +64,7 @@ def _problem(cell: Cell) -> Problem:
     return Problem(
         task,
         default_space(task.name) if cell.space is None else load_space(cell.space),
-        tolerance=TOLERANCE if cell.robust else 0.0,
+        tolerance=TOLERANCE if cell.experiment.robust else 0.0,
         device=resolve_device("auto", many=cell.plan.design is not None),
     )
 
@@ -82,13 +72,14 @@ def _problem(cell: Cell) -> Problem:
 def is_finished(cell: Cell) -> bool:
     """Return whether a cell is finished with the same settings; a front search is asked again each time."""
     plan, summary = cell.plan, read_summary(cell.folder)
-    if summary is None or plan.design is not None or summary["n_trials"] < cell.n_init + cell.n_total:
+    n_init, n_total = cell.experiment.n_init, cell.experiment.n_total
+    if summary is None or plan.design is not None or summary["n_trials"] < n_init + n_total:
         return False
     try:
         problem = _problem(cell)
         proposer, sampler = plan.choose_proposer(cell.replay).proposer, sampler_for(problem, plan.sampler)
         in_flight = plan.model_options.in_flight
-        method = study_method(proposer, sampler, cell.n_init, plan.n_step, cell.n_total, in_flight)
+        method = study_method(proposer, sampler, n_init, plan.n_step, n_total, in_flight)
         check_same_run(cell.folder, read_config(cell.folder), run_config(problem, method, cell.seed))
     except ArmwrightError:
         return False  # `run_cell` reports it

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from armwright.arrays import Array
 from armwright.robot.arm import Arm
-from armwright.robot.urdf_reader import UrdfArm
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.task import Task
 
@@ -15,19 +14,10 @@ class MappedArm:
     """An arm whose reach is mapped, and the task around it."""
 
     title: str
-    arm: Arm | UrdfArm
+    arm: Arm
     task: Task | None = None  # whose obstacles and targets are drawn
     conditions: str = ""  # that usable poses satisfy, in words
-
-    @property
-    def body(self) -> Arm:
-        """The arm itself."""
-        return self.arm.arm if isinstance(self.arm, UrdfArm) else self.arm
-
-    @property
-    def read(self) -> str:
-        """The tip and the joints that were read from a URDF; empty for a design."""
-        return f"{self.title}: {self.arm.notes[0]}" if isinstance(self.arm, UrdfArm) else ""
+    read: str = ""  # the tip and the joints that were read from a URDF; empty for a design
 
     @property
     def targets(self) -> Array | None:

@@ -57,7 +57,7 @@ def _draw(found: ReachMap, around: MappedArm) -> Figure:
         rows.append((around.conditions, found.usable))
     figure = Figure(figsize=(2 * PANEL + 0.8, PANEL * len(rows) + 0.9), layout="constrained")
     axes: Any = figure.subplots(len(rows), 2, squeeze=False)
-    slices = (_vertical(found, around.body), _horizontal(found, around))
+    slices = (_vertical(found, around.arm), _horizontal(found, around))
     image: Any = None
     for row, (name, coverage) in enumerate(rows):
         for column, plane in enumerate(slices):
@@ -109,7 +109,7 @@ def _draw_slice(axes: Any, found: ReachMap, coverage: PoseCoverage, plane: _Slic
     axes.imshow(np.where(covered, 1.0, np.nan), cmap=ListedColormap([POSITION_ONLY]), **options)
     image = axes.imshow(np.where(shares > 0.0, 100.0 * shares, np.nan), cmap=COLOURS, vmin=0.0, vmax=100.0, **options)
     _draw_obstacles(axes, found, plane, around.obstacles, extent)
-    base = around.body.base
+    base = around.arm.base
     axes.plot(base[plane.right], base[plane.up], marker="s", markersize=6, color=FRONT)
     if around.targets is not None:
         beside = np.abs(around.targets[:, plane.across] - plane.place(found)) <= found.spacing

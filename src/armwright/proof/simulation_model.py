@@ -16,16 +16,7 @@ from armwright.exceptions import ArmError
 from armwright.problem.scene import Scene
 from armwright.robot.arm import GRAVITY, Arm, Joint
 from armwright.robot.collision_pairs import joined_by_column, joined_by_motors, joined_by_tip
-from armwright.robot.link_geometry import (
-    Segment,
-    moving_joints,
-    number,
-    numbers,
-    segments,
-    tip_position,
-    tip_rpy,
-    to_xml,
-)
+from armwright.robot.link_geometry import Segment, moving_joints, segments, tip_position, tip_rpy
 from armwright.robot.mjcf import (
     COMPILER,
     add_column,
@@ -36,6 +27,7 @@ from armwright.robot.mjcf import (
     add_tool,
     joint_attributes,
 )
+from armwright.robot.xml_text import number, numbers, to_xml
 from armwright.tasks.obstacles import Obstacle, Solid
 from armwright.tasks.tip_rules import Solids
 

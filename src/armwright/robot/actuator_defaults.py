@@ -31,11 +31,10 @@ class KindDefaults:
     continuous: float = 0.25  # continuous torque / τ
 
 
-_GEARED = KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.1), 100.0, 4.0, 0.05, 2.5, 0.24)
 DEFAULTS: Mapping[ActuatorKind, KindDefaults] = {
     "servo": KindDefaults(0.047, 0.025, 0.09, 0.0, math.radians(0.5), 40.0, 4.6, None, 1.6, 0.2, True),
     "coreless servo": KindDefaults(0.016, 0.025, 0.09, 0.0, math.radians(0.25), 40.0, 4.6, None, 1.6, 0.2, True),
-    "geared drive": _GEARED,
+    "geared drive": KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.1), 100.0, 4.0, 0.05, 2.5, 0.24),
     "quasi-direct-drive": KindDefaults(0.007, 0.02, 0.045, 0.3, math.radians(0.2), 100.0, 1.6, 0.05, 1.0, 0.05),
     "harmonic": KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.005), 190.0, 4.0, 0.05, 2.5, 0.24),
 }

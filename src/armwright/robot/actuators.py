@@ -122,16 +122,10 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
     @property
     def body_shape(self) -> ActuatorShape | None:
-        """The shape about its shaft; None if a dimension is missing."""
-        shape = self._default_body()
-        if shape is None or self.shaft_offset is None:
-            return shape
-        return replace(shape, shaft_offset=self.shaft_offset)
+        """The shape about its shaft; None if a dimension is missing.
 
-    def _default_body(self) -> ActuatorShape | None:
-        """Return the shape with the default offset of its shaft: none from the axis of a cylinder.
-
-        The shaft of a box is as far from the near end as from the sides, as that of servos.
+        By default the shaft is the axis of a cylinder, and as far from the near end of a box as from the sides, as that
+        of servos.
         """
         if self.width is None or self.height is None or self.depth is None:
             return None
@@ -139,9 +133,10 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         shape, shaft_edge = default_shape(self.kind, **edges)
         length = edges.pop(self.shaft_edge or shaft_edge)
         short, long = sorted(edges.values())
-        if (self.shape or shape) == "cylinder":
-            return ActuatorShape("cylinder", length, long, long)
-        return ActuatorShape("box", length, long, short, (long - short) / 2)
+        shape = self.shape or shape
+        short = long if shape == "cylinder" else short
+        offset = (long - short) / 2 if self.shaft_offset is None else self.shaft_offset
+        return ActuatorShape(shape, length, long, short, offset)
 
     def completed(self) -> "ActuatorRecord":
         """Return the record with the defaults of its kind in place of missing numbers.
@@ -220,7 +215,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             values["voltage_max"] = max(volts, values.get("voltage_max", volts))
         if self.stall_torque is None:
             values["peak_torque"] = rated
-        if (body := self._default_body()) is not None:
+        if (body := self.body_shape) is not None:
             values["shaft_offset"] = body.shaft_offset
         return {name: value for name, value in values.items() if getattr(self, name) is None}
 

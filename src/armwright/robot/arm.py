@@ -175,12 +175,9 @@ class Link:
         """The centre of the total mass, from this joint [m]."""
         if self.end_mass == 0.0:
             return self.com
-        (x, y, z), (u, v, w), total = self.com, self.end_mass_position, self.total_mass
-        return (
-            (self.mass * x + self.end_mass * u) / total,
-            (self.mass * y + self.end_mass * v) / total,
-            (self.mass * z + self.end_mass * w) / total,
-        )
+        both = zip(self.com, self.end_mass_position, strict=True)
+        x, y, z = ((self.mass * own + self.end_mass * carried) / self.total_mass for own, carried in both)
+        return x, y, z
 
     @property
     def end_mass_position(self) -> Vector:

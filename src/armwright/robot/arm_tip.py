@@ -22,9 +22,8 @@ ACROSS = 0.5  # largest cosine of the angle between the axes of a jaw and of the
 FEWEST = 3  # joints of an arm before a joint that is a jaw by its motion
 GRIPPER = re.compile(r"jaw|finger|( |_|joint)grip(per)?(_?joint)?\d*$", re.IGNORECASE)  # in names of link and joint
 FRAMES = re.compile(r"(^|[_/])(tool\d*|tcp|tip|eef?|end_?effector|flange|frame)(_|$)", re.IGNORECASE)  # of a tool
-OTHERS = re.compile(
-    "jaw|finger|camera|optical|depth|imu|sensor|collision|_sc$", re.IGNORECASE
-)  # in names of other links
+# In names of other links
+OTHERS = re.compile("jaw|finger|camera|optical|depth|imu|sensor|collision|_sc$", re.IGNORECASE)
 
 
 def find_tip(base: str, joints: Mapping[str, Sequence[UrdfJoint]], where: str) -> str:
@@ -54,8 +53,8 @@ class _Tree:
     def __init__(self, base: str, joints: Mapping[str, Sequence[UrdfJoint]], where: str) -> None:
         self._joints, self._where = joints, where
         self._deepest: dict[str, int] = {}  # independent joints of the longest chain beyond each link
+        # What is fixed to each link: 1 for a frame of a tool, -1 for one of something else, how far, its name
         self.frames: dict[str, tuple[int, int, str]] = {}
-        """What is fixed to each link: 1 for a frame of a tool, -1 for one of something else, how far, its name."""
         links = [base]
         for link in links:
             links += [joint.child for joint in joints[link]]

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Literal
 
+from armwright.arrays import Array
+
 Axis = Literal["x", "y", "z"]
 Vector = tuple[float, float, float]
 
@@ -10,6 +12,12 @@ AXES: tuple[Axis, ...] = ("x", "y", "z")
 
 
 ROUNDING = 1e-8  # largest error of a direction whose file writes right angles with nine decimals
+
+
+def as_vector(values: Array) -> Vector:
+    """Return the three values of an array."""
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 def unit_vector(axis: Axis | Vector) -> Vector:

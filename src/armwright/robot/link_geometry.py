@@ -1,9 +1,8 @@
-"""What the file formats share: bodies and limits of an arm, colours, and numbers as text."""
+"""Bodies and limits of an arm, as the file formats state them."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -14,17 +13,7 @@ from armwright.robot.link_inertia import point_inertia, tube_inertia
 from armwright.robot.motor_body import MotorBody
 from armwright.rotations import rpy_from_rotation
 
-COLOURS = {
-    "link": "0.75 0.75 0.78 1",
-    "joint_x": "0.84 0.37 0.00 1",
-    "joint_y": "0.00 0.45 0.70 1",
-    "joint_z": "0.00 0.62 0.45 1",
-}
 MARKER_SCALE = 1.4  # radius of a joint's sphere, relative to its link
-
-# MuJoCo refuses a moving body without mass and raises smaller values to these.
-MIN_INERTIA = {"boundmass": "1e-12", "boundinertia": "1e-14"}  # [kg], [kg m²]
-MUJOCO_COMPILER = {"fusestatic": "false", "discardvisual": "false", **MIN_INERTIA}
 
 # A moving joint must state both. Without an actuator they only have to be large enough.
 DEFAULT_EFFORT = 100.0  # [N m] or [N]
@@ -155,19 +144,3 @@ def body_rpy(body: MotorBody) -> Vector:
     if body.shape == "box":
         return (0.0, 0.0, 0.0)
     return rpy_along(unit_vector(body.axis))
-
-
-def number(value: float) -> str:
-    """Format a number with ten digits."""
-    return f"{value:.10g}"
-
-
-def numbers(values: Iterable[float]) -> str:
-    """Format numbers with ten digits each, separated by spaces."""
-    return " ".join(number(value) for value in values)
-
-
-def to_xml(root: ElementTree.Element) -> str:
-    """Return the XML of the whole file, indented."""
-    ElementTree.indent(root)
-    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

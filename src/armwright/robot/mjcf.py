@@ -3,26 +3,10 @@
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element, SubElement
 
+from armwright.robot import link_geometry as geometry
 from armwright.robot.arm import GRAVITY, Arm, Column, Joint, Link
-from armwright.robot.link_geometry import (
-    COLOURS,
-    MIN_INERTIA,
-    Segment,
-    body_rpy,
-    inertia_moments,
-    marker_radius,
-    midpoint,
-    moving_joints,
-    number,
-    numbers,
-    rpy_along,
-    segments,
-    tip_position,
-    tip_rpy,
-    to_xml,
-    tool_moments,
-)
 from armwright.robot.motor_body import MotorBody
+from armwright.robot.xml_text import COLOURS, MIN_INERTIA, number, numbers, to_xml
 
 TYPES = {"revolute": "hinge", "prismatic": "slide"}  # a fixed joint is a body without a joint
 # XYZ: roll, pitch and yaw about fixed axes, as in a URDF.
@@ -53,7 +37,7 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     body = SubElement(add_scene(root, arm), "body", name="base", pos=numbers(arm.base))
     if arm.column is not None:
         add_column(body, arm.column)
-    for segment in segments(arm):
+    for segment in geometry.segments(arm):
         if segment.joint.body is not None:
             add_motor(body, segment, segment.joint.body, segment.motor_name)
         body = SubElement(body, "body", name=segment.name, pos=numbers(segment.position))
@@ -63,7 +47,7 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     add_tip(body, arm)
     add_tool(body, arm)
     actuators = SubElement(root, "actuator")
-    for n, joint in moving_joints(arm):
+    for n, joint in geometry.moving_joints(arm):
         if (coupling := joint.coupling) is not None:
             law = {
                 "joint2": f"joint_{coupling.leader + 1}",
@@ -103,17 +87,17 @@ def _add_link(body: Element, joint: Joint, link: Link) -> None:
     add_inertial(body, link)
     if link.length > 0.0:
         cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}
-        euler = numbers(rpy_along(link.offset))
-        SubElement(body, "geom", {**cylinder, "pos": numbers(midpoint(link)), "euler": euler, "material": "link"})
-    marker = {"type": "sphere", "size": number(marker_radius(link)), "material": f"joint_{joint.nearest_axis}"}
+        place = {"pos": numbers(geometry.midpoint(link)), "euler": numbers(geometry.rpy_along(link.offset))}
+        SubElement(body, "geom", {**cylinder, **place, "material": "link"})
+    marker = {"type": "sphere", "size": number(geometry.marker_radius(link)), "material": f"joint_{joint.nearest_axis}"}
     SubElement(body, "geom", marker)
 
 
 def add_inertial(body: Element, link: Link) -> None:
     """Add mass and inertia of a link."""
-    euler = numbers(rpy_along(link.offset))
+    euler = numbers(geometry.rpy_along(link.offset))
     inertial = {"pos": numbers(link.total_com), "mass": number(link.total_mass)}
-    moments = list(inertia_moments(link).values())
+    moments = list(geometry.inertia_moments(link).values())
     if link.end_mass == 0.0:
         inertial |= {"euler": euler, "diaginertia": " ".join(moments[:3])}
     else:
@@ -122,13 +106,14 @@ def add_inertial(body: Element, link: Link) -> None:
 
 
 def add_motor(
-    carrier: Element, segment: Segment, body: MotorBody, name: str, attributes: Mapping[str, str] | None = None
+    carrier: Element, segment: geometry.Segment, body: MotorBody, name: str, attributes: Mapping[str, str] | None = None
 ) -> None:
     """Add the body of an actuator to the link that carries it, with further attributes of its geometry."""
     element = SubElement(carrier, "body", name=name, pos=numbers(segment.position))
     x, y, z = body.size
     size = (x / 2, y / 2, z / 2) if body.shape == "box" else (body.radius, body.length / 2)
-    solid = {"type": body.shape, "size": numbers(size), "pos": numbers(body.centre), "euler": numbers(body_rpy(body))}
+    place = {"pos": numbers(body.centre), "euler": numbers(geometry.body_rpy(body))}
+    solid = {"type": body.shape, "size": numbers(size), **place}
     SubElement(element, "geom", {**solid, "material": f"joint_{segment.joint.nearest_axis}", **(attributes or {})})
 
 
@@ -141,8 +126,8 @@ def add_column(base: Element, column: Column, attributes: Mapping[str, str] | No
 
 def add_tip(body: Element, arm: Arm) -> None:
     """Add the site `tip` to the last link."""
-    rpy = tip_rpy(arm)
-    tip = {"name": "tip", "pos": numbers(tip_position(arm)), "size": number(arm.links[-1].radius), "rgba": TIP_COLOUR}
+    rpy, size = geometry.tip_rpy(arm), number(arm.links[-1].radius)
+    tip = {"name": "tip", "pos": numbers(geometry.tip_position(arm)), "size": size, "rgba": TIP_COLOUR}
     if any(rpy):
         tip["euler"] = numbers(rpy)
     SubElement(body, "site", tip)
@@ -154,4 +139,4 @@ def add_tool(body: Element, arm: Arm) -> None:
         return
     tool = SubElement(body, "body", name="tool", pos=numbers(arm.links[-1].offset))
     inertial = {"pos": numbers(arm.tool.com), "mass": number(arm.tool.mass)}
-    SubElement(tool, "inertial", inertial | {"fullinertia": " ".join(tool_moments(arm).values())})
+    SubElement(tool, "inertial", inertial | {"fullinertia": " ".join(geometry.tool_moments(arm).values())})

@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.robot.arm import Arm, Link, Tensor
-from armwright.robot.axes import Vector, axis_along
+from armwright.robot.axes import Vector, as_vector, axis_along
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.rotations import rotation_about
 
@@ -46,11 +46,9 @@ def needs_turning(arm: Arm) -> bool:
 
 def mounted(described: UrdfArm, mounting: Mounting) -> UrdfArm:
     """Return an arm whose base link was at the origin with the base link elsewhere."""
-    arm = (
-        turned(described.arm, rotation_about(np.array([0.0, 0.0, 1.0]), mounting.yaw))
-        if mounting.yaw
-        else described.arm
-    )
+    arm = described.arm
+    if mounting.yaw:
+        arm = turned(arm, rotation_about(np.array([0.0, 0.0, 1.0]), mounting.yaw))
     x, y, z = (at + shift for at, shift in zip(arm.base, mounting.position, strict=True))
     return replace(described, arm=replace(arm, base=(x, y, z)))
 
@@ -59,11 +57,10 @@ def turned(arm: Arm, rotation: Array) -> Arm:
     """Return an arm turned about the origin with its base, its joint values unchanged; rotation: (3, 3)."""
 
     def vector(v: Vector) -> Vector:
-        x, y, z = (rotation @ v).tolist()
-        return x, y, z
+        return as_vector(rotation @ v)
 
     def tensor(rows: Tensor) -> Tensor:
-        x, y, z = map(tuple, (rotation @ rows @ rotation.T).tolist())
+        x, y, z = map(as_vector, rotation @ rows @ rotation.T)
         return x, y, z
 
     def link(each: Link) -> Link:

@@ -44,14 +44,9 @@ def _download(name: str) -> Path:
         raise ArmError(
             f'there is no file {name}, and robot_descriptions has no URDF "{name}".{did_you_mean(name, names)}'
         )
-    return _import_description(module, name)
-
-
-def _import_description(module: str, name: str) -> Path:
-    """Return the URDF file of a description; importing it downloads what is missing."""
     git: Any = import_module("git")  # comes with robot_descriptions
     try:
-        description = import_module(f"robot_descriptions.{module}")
+        description = import_module(f"robot_descriptions.{module}")  # which downloads what is missing
         path = import_module("robot_descriptions._xacro").get_urdf_path(description)
     except (ImportError, OSError, ValueError, RuntimeError, git.GitError) as fault:
         raise FailureError(

@@ -3,8 +3,9 @@
 from xml.etree.ElementTree import Element, SubElement
 
 from armwright.robot.arm import Arm, Joint
-from armwright.robot.link_geometry import home_posture, joint_limits, moving_joints, number, to_xml
+from armwright.robot.link_geometry import home_posture, joint_limits, moving_joints
 from armwright.robot.urdf_writer import urdf_tree
+from armwright.robot.xml_text import number, to_xml
 
 MOCK = "mock_components/GenericSystem"
 

@@ -2,28 +2,10 @@
 
 from xml.etree.ElementTree import Element, SubElement
 
+from armwright.robot import link_geometry as geometry
 from armwright.robot.arm import Arm, Joint, Vector
-from armwright.robot.link_geometry import (
-    COLOURS,
-    MUJOCO_COMPILER,
-    TENSOR_INDICES,
-    Segment,
-    body_rpy,
-    inertia_moments,
-    inertia_rpy,
-    joint_limits,
-    marker_radius,
-    midpoint,
-    number,
-    numbers,
-    rpy_along,
-    segments,
-    tip_position,
-    tip_rpy,
-    to_xml,
-    tool_moments,
-)
 from armwright.robot.motor_body import MotorBody
+from armwright.robot.xml_text import COLOURS, MUJOCO_COMPILER, number, numbers, to_xml
 
 FIXED = Joint("fixed", "z")
 ORIGIN = (0.0, 0.0, 0.0)
@@ -64,9 +46,9 @@ def urdf_tree(arm: Arm, name: str) -> Element:
     _add_joint(robot, "world_to_base", "world", "base", arm.base)
     if arm.column is not None:
         cylinder = {"radius": number(arm.column.radius), "length": number(arm.column.length)}
-        _add_solid(_add_massless(robot, "column"), "link", arm.column.middle, ORIGIN, "cylinder", cylinder)
-        _add_joint(robot, "column_joint", "base", "column", ORIGIN)
-    for segment in segments(arm):
+        column = _add_fixed(robot, "column", "base", ORIGIN)
+        _add_solid(column, "link", arm.column.middle, ORIGIN, "cylinder", cylinder)
+    for segment in geometry.segments(arm):
         if segment.joint.body is not None:
             _add_motor(robot, segment, segment.joint.body)
         _add_link(robot, segment)
@@ -74,10 +56,10 @@ def urdf_tree(arm: Arm, name: str) -> Element:
         _add_joint(robot, name, segment.parent, segment.name, segment.position, joint=segment.joint)
     SubElement(robot, "link", name="tip")
     last = f"link_{len(arm.links)}"
-    _add_joint(robot, "tip_joint", last, "tip", tip_position(arm), tip_rpy(arm))
+    _add_joint(robot, "tip_joint", last, "tip", geometry.tip_position(arm), geometry.tip_rpy(arm))
     if arm.tool.mass > 0.0:
         tool = SubElement(robot, "link", name="tool")
-        _add_inertial(tool, arm.tool.com, ORIGIN, arm.tool.mass, tool_moments(arm))
+        _add_inertial(tool, arm.tool.com, ORIGIN, arm.tool.mass, geometry.tool_moments(arm))
         _add_joint(robot, "tool_joint", last, "tool", arm.links[-1].offset)
     return robot
 
@@ -91,7 +73,7 @@ def _add_joint(
     _add_origin(element, xyz, rpy)
     if joint.kind != "fixed":
         SubElement(element, "axis", xyz=numbers(joint.direction))
-        SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
+        SubElement(element, "limit", {key: number(value) for key, value in geometry.joint_limits(joint).items()})
     if (coupling := joint.coupling) is not None:
         law = {"multiplier": number(coupling.factor), "offset": number(coupling.offset)}
         SubElement(element, "mimic", {"joint": f"joint_{coupling.leader + 1}", **law})
@@ -108,28 +90,29 @@ def _add_inertial(element: Element, com: Vector, rpy: Vector, mass: float, momen
     SubElement(inertial, "inertia", moments)
 
 
-def _add_link(robot: Element, segment: Segment) -> None:
+def _add_link(robot: Element, segment: geometry.Segment) -> None:
     link = segment.link
     element = SubElement(robot, "link", name=segment.name)
     # Also written for a mass of 0; without it, MuJoCo assumes the density of water and scikit-robot 1 g.
     if not link.without_mass:
-        _add_inertial(element, link.total_com, inertia_rpy(link), link.total_mass, inertia_moments(link))
+        moments = geometry.inertia_moments(link)
+        _add_inertial(element, link.total_com, geometry.inertia_rpy(link), link.total_mass, moments)
     if link.length > 0.0:
         cylinder = {"radius": number(link.radius), "length": number(link.length)}
-        _add_solid(element, "link", midpoint(link), rpy_along(link.offset), "cylinder", cylinder)
+        _add_solid(element, "link", geometry.midpoint(link), geometry.rpy_along(link.offset), "cylinder", cylinder)
     marker = SubElement(element, "visual")  # a coloured sphere that shows the joint and its axis
     _add_origin(marker, ORIGIN, ORIGIN)
-    SubElement(SubElement(marker, "geometry"), "sphere", radius=number(marker_radius(link)))
+    SubElement(SubElement(marker, "geometry"), "sphere", radius=number(geometry.marker_radius(link)))
     SubElement(marker, "material", name=f"joint_{segment.joint.nearest_axis}")
 
 
-def _add_motor(robot: Element, segment: Segment, body: MotorBody) -> None:
+def _add_motor(robot: Element, segment: geometry.Segment, body: MotorBody) -> None:
     """Add the link of an actuator's body; its mass is a part of the link that carries it."""
     dimensions = {"radius": number(body.radius), "length": number(body.length)}
     dimensions = {"size": numbers(body.size)} if body.shape == "box" else dimensions
-    element = _add_massless(robot, segment.motor_name)
-    _add_solid(element, f"joint_{segment.joint.nearest_axis}", body.centre, body_rpy(body), body.shape, dimensions)
-    _add_joint(robot, f"{segment.motor_name}_joint", segment.parent, segment.motor_name, segment.position)
+    motor = _add_fixed(robot, segment.motor_name, segment.parent, segment.position)
+    material = f"joint_{segment.joint.nearest_axis}"
+    _add_solid(motor, material, body.centre, geometry.body_rpy(body), body.shape, dimensions)
 
 
 def _add_solid(
@@ -144,9 +127,11 @@ def _add_solid(
             SubElement(body, "material", name=material)
 
 
-def _add_massless(robot: Element, name: str) -> Element:
+def _add_fixed(robot: Element, name: str, parent: str, position: Vector) -> Element:
+    """Add a massless link that is fixed to another one, and return it."""
     element = SubElement(robot, "link", name=name)
     inertial = SubElement(element, "inertial")
     SubElement(inertial, "mass", value="0")
-    SubElement(inertial, "inertia", dict.fromkeys(TENSOR_INDICES, "0"))
+    SubElement(inertial, "inertia", dict.fromkeys(geometry.TENSOR_INDICES, "0"))
+    _add_joint(robot, f"{name}_joint", parent, name, position)
     return element

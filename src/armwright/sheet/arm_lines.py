@@ -6,7 +6,8 @@ from armwright.arrays import Array
 from armwright.kinematics.arms.forward import link_lines
 from armwright.kinematics.reach.reach_outline import reach_outline
 from armwright.problem.over_reach import reach_lines
-from armwright.robot.arm import Arm, Vector
+from armwright.robot.arm import Arm
+from armwright.robot.axes import as_vector
 from armwright.robot.link_geometry import home_posture
 from armwright.sheet.record import Drawing, LinkLine
 
@@ -43,15 +44,10 @@ def _drawing(arm: Arm, targets: Array) -> Drawing:
         base=arm.base,
         is_at_zero=not any(q),
         links=tuple(
-            (n, _vector(start), _vector(end)) for n, (start, end) in zip(numbers, link_lines(arm, q), strict=True)
+            (n, as_vector(start), as_vector(end)) for n, (start, end) in zip(numbers, link_lines(arm, q), strict=True)
         ),
         column=None if arm.column is None else arm.column.length,
-        targets=tuple(map(_vector, targets)),
+        targets=tuple(map(as_vector, targets)),
         side=reach_outline(arm, SIDE),
         top=reach_outline(arm, TOP),
     )
-
-
-def _vector(values: Array) -> Vector:
-    x, y, z = values.tolist()
-    return x, y, z

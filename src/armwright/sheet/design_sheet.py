@@ -59,7 +59,7 @@ def sheet_of(history: History, member: FrontMember, facts: Facts, verdict: Mappi
         objectives={one.name: (finite_or_none(value), one.unit) for one, value in objectives},
         payload=payload or None,
         facts={**reach_facts(arm, lines["over_reach"][-1]), **facts},
-        joints=joint_lines(arm, evaluation),
+        joints=tuple(joint_lines(arm, evaluation)),
         masses=mass_lines(arm),
         parts=parts,
         assumptions=_assumptions(history, member, payload, [part.part for part in parts if part.price is None]),

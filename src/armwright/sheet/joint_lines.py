@@ -1,6 +1,6 @@
 """What a task needs of each joint of an arm and of its drive."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -19,12 +19,11 @@ from armwright.sheet.record import JointLine
 ACROSS = ("tilting_moment", "bearing_utilisation")  # of any joint, whatever drives it
 
 
-def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[str] = ()) -> tuple[JointLine, ...]:
-    """Return a line for each moving joint, named joint_1, joint_2 and so on by default.
+def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[str] = ()) -> Iterator[JointLine]:
+    """Yield a line for each moving joint, named joint_1, joint_2 and so on by default.
 
     The evaluation is that of this arm alone in the task; None without a task.
     """
-    lines: list[JointLine] = []
     moving = [j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"]
     need = {} if evaluation is None else _needs(evaluation)
     labels = names or [f"joint_{j + 1}" for j in moving]
@@ -36,7 +35,7 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
         drive = "" if joint.actuator is None else joint.actuator.name
         if joint.coupling is not None:
             drive = f"that of {labels[moving.index(joint.coupling.leader)]}"
-        line = JointLine(
+        yield JointLine(
             number=j + 1,
             name=labels[k],
             kind=joint.kind,
@@ -50,8 +49,6 @@ def joint_lines(arm: Arm, evaluation: Evaluation | None = None, names: Sequence[
             body="" if joint.body is None else _describe_body(joint.body),
             **{key: finite_or_none(values[j]) for key, values in need.items() if not joint.coupling or key in ACROSS},
         )
-        lines.append(line)
-    return tuple(lines)
 
 
 def _describe_body(body: MotorBody) -> str:

@@ -40,8 +40,8 @@ class JointLine:
     unused: tuple[float, float] | None = None  # the parts of the range below and above
     torque: float | None = None  # the largest torque at rest at the targets, and along the cycle
     peak_torque: float | None = None  # the peak of its actuator, at the joint
+    # The largest use of it; along a cycle, of the torque that is available at the speed
     peak_utilisation: float | None = None
-    """The largest use of it; along a cycle, of the torque that is available at the speed."""
     speed_utilisation: float | None = None  # the largest use of the speed along the cycle
     thermal_utilisation: float | None = None  # the use of the continuous torque over the cycle
     tilting_moment: float | None = None  # the largest moment across its axis at the targets and along the cycle
@@ -87,8 +87,8 @@ class Drawing:
 
     base: tuple[float, float, float]  # the position of the first joint
     is_at_zero: bool  # whether all joints are at 0; if not, some are at the limit nearest to it
+    # Start and end of each link and of the tool, with the number of the link; 0 for the tool
     links: tuple[tuple[int, tuple[float, float, float], tuple[float, float, float]], ...]
-    """Start and end of each link and of the tool, with the number of the link; 0 for the tool."""
     column: float | None  # the length of the column below the base; None without one
     targets: tuple[tuple[float, float, float], ...]  # the targets of the task
     side: Outline  # the outline of the reach in x and z
@@ -108,17 +108,17 @@ class DataSheet:
     masses: tuple[MassLine, ...]  # the parts of the mass, which sum up to it; none if it is not known
     over_reach: tuple[ReachLine, ...]  # payload and errors over the reach
     drawing: Drawing  # the drawing
+    # The position of its base link on the task, or of a design's first joint
     base_position: tuple[float, float, float] | None = None
-    """The position of its base link on the task, or of a design's first joint."""
     base_yaw: float | None = None  # the turn of its base link about the vertical
     role: str = ""  # why the design is recommended, such as `knee, least price`; empty if it is not
     status: str = ""  # the verdict of the simulation
     survival: str = ""  # which perturbations it holds
     violated: tuple[str, ...] = ()  # the constraints that it violates, or why its evaluation failed
+    # What the run evaluated, by name with the unit
     objectives: Mapping[str, tuple[float | None, str]] = field(default_factory=dict[str, tuple[float | None, str]])
-    """What the run evaluated, by name with the unit."""
     payload: float | None = None  # the largest payload of the task; None without one
     parts: tuple[Part, ...] = ()  # the parts list
+    # What the values assume, by what they are about
     assumptions: Mapping[str, str] = field(default_factory=dict[str, str])
-    """What the values assume, by what they are about."""
     not_modelled: str = NOT_MODELLED  # what neither mass nor price include

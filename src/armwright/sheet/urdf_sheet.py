@@ -1,18 +1,17 @@
 """The data sheet of an arm that exists, from its URDF."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from armwright.exceptions import SettingsError
+from armwright.existing.base_placement import Placement
 from armwright.existing.existing_arm import ExistingArm
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.facts import VOLTAGE, Fact, Facts, fact_of, mass_fact, reach_facts
 from armwright.problem.objectives import QUANTITIES
-from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
-from armwright.robot.mounting import Mounting
 from armwright.robot.urdf_reader import UrdfArm
 from armwright.sheet.arm_lines import ASSUMED, arm_lines
 from armwright.sheet.joint_lines import joint_lines
@@ -23,17 +22,8 @@ NO_TASK = "an arm without a task"
 NO_PRICE = "a URDF states no price; try --price"
 
 
-@dataclass(frozen=True)
-class Job:
-    """The task of an existing arm."""
-
-    problem: Problem  # the task, its objectives and constraints
-    mounting: Mounting  # where the base link stands
-    place: str  # the same in words, and why there
-
-
-def urdf_sheet(described: UrdfArm, job: Job | None = None, price: float | None = None) -> DataSheet:
-    """Return the data sheet of an existing arm; with a job, in its place and with the tool of the task.
+def urdf_sheet(subject: UrdfArm | Placement, price: float | None = None) -> DataSheet:
+    """Return the data sheet of an existing arm, as read or in its place on a task.
 
     The price [USD] is as stated.
 
@@ -42,34 +32,35 @@ def urdf_sheet(described: UrdfArm, job: Job | None = None, price: float | None =
     """
     if price is not None and not 0.0 <= price < np.inf:
         raise SettingsError(f"price: expected a finite number of at least 0 USD, got {price:g}")
+    described, place = (subject, None) if isinstance(subject, UrdfArm) else (subject.described, subject)
     arm = described.arm
     existing, payload, targets = None, 0.0, np.zeros((0, 3))
-    if job is None:
+    if place is None:
         arm = replace(arm, safety_factor=SAFETY_FACTOR)
     else:
-        existing = ExistingArm(job.problem, job.problem.physics(stack_arms([arm])), price)
-        payload, targets = float(job.problem.task.payloads.max()), existing.evaluation.targets
+        existing = ExistingArm(place.problem, place.problem.physics(stack_arms([arm])), price)
+        payload, targets = float(place.problem.task.payloads.max()), existing.evaluation.targets
     lines = arm_lines(arm, payload, targets)
     masses = [None if link.without_mass else link.total_mass for link in arm.links]
     lines["links"] = tuple(replace(line, mass=masses[line.number - 1]) for line in lines["links"])
-    assumptions = _assumptions(described, arm.safety_factor, job)
+    assumptions = _assumptions(described, arm.safety_factor, place)
     if existing is not None and existing.undecided:
         assumptions["constraints"] = f"unknown whether it meets {', '.join(existing.undecided)}"
     if price is not None:
         assumptions["price"] = "as stated by the user"
     return DataSheet(
-        name=described.name if job is None else f"{described.name} on {job.problem.task.name}",
+        name=described.name if place is None else f"{described.name} on {place.problem.task.name}",
         design=None,
         joint_letters="",
         facts={**_facts(arm, existing, price), **reach_facts(arm, lines["over_reach"][-1])},
-        joints=joint_lines(arm, None if existing is None else existing.evaluation, described.joints),
+        joints=tuple(joint_lines(arm, existing and existing.evaluation, described.joints)),
         masses=_masses(arm),
         assumptions=assumptions,
         not_modelled="",
         **lines,
         **({} if existing is None else _on_task(existing)),
-        base_position=None if job is None else job.mounting.position,
-        base_yaw=None if job is None else job.mounting.yaw,
+        base_position=None if place is None else place.mounting.position,
+        base_yaw=None if place is None else place.mounting.yaw,
     )
 
 
@@ -103,9 +94,9 @@ def _facts(arm: Arm, existing: ExistingArm | None, price: float | None) -> Facts
     return facts | {"mass": mass_fact(arm)}
 
 
-def _assumptions(described: UrdfArm, safety_factor: float, job: Job | None) -> dict[str, str]:
+def _assumptions(described: UrdfArm, safety_factor: float, place: Placement | None) -> dict[str, str]:
     """Return what the values assume, by what they are about."""
-    found = {} if job is None else {"place": job.place}
+    found = {} if place is None else {"place": place.description}
     found |= {
         "reach": ASSUMED["reach"],
         "over the reach": f"{ASSUMED['over the reach']}; the payload is a point at the tip",

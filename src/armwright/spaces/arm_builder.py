@@ -41,9 +41,8 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 _KINDS = {"revolute": 0, "prismatic": PRISMATIC, "fixed": FIXED}
 _ABSENT = -1  # no joint in this slot of a module
-_PLANS = np.full(
-    (len(MODULES), 2), _ABSENT
-)  # local motions of each module's joints; a single joint is in the last slot
+# Local motions of each module's joints; a single joint is in the last slot
+_PLANS = np.full((len(MODULES), 2), _ABSENT)
 for _row, _module in zip(_PLANS, MODULES.values(), strict=True):
     for _slot, (_kind, _axis) in enumerate(_module.joints, start=2 - len(_module.joints)):
         _row[_slot] = _KINDS[_kind] + (0 if _kind == "fixed" else AXES.index(_axis))

@@ -26,23 +26,17 @@ BUILT_IN = {
 }  # fmt: skip
 
 
-class CustomParameter(
-    BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True, title="Parameter"
-):
+class CustomParameter(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A custom parameter: a range of numbers, or choices."""
 
-    range: Ordered[float] | None = None
-    """Smallest and largest value."""
-    choices: tuple[Annotated[str, Field(pattern=CHOICE)], ...] = ()
-    """Names to choose from, instead of a range."""
+    range: Ordered[float] | None = None  # smallest and largest value
+    choices: tuple[Annotated[str, Field(pattern=CHOICE)], ...] = ()  # names to choose from, instead of a range
+    # Scale on which values of the range are drawn; log for gains and other values that span decades
     scale: Literal["linear", "log"] = "linear"
-    """Scale on which values of the range are drawn; log for gains and other values that span decades."""
-    integer: bool = False
-    """Whether values are whole numbers."""
+    integer: bool = False  # whether values are whole numbers
+    # joint: one value for each joint module that moves, with the numbers of the modules added to the name
     per: Literal["joint"] | None = None
-    """joint: one value for each joint module that moves, with the numbers of the modules added to the name."""
-    unit: str = Field(default="", pattern=UNIT)
-    """Unit of the range."""
+    unit: str = Field(default="", pattern=UNIT)  # unit of the range
 
     @model_validator(mode="after")
     def _check_values(self) -> Self:

@@ -10,14 +10,7 @@ from functools import lru_cache
 
 from armwright.exceptions import did_you_mean
 from armwright.spaces.joint_modules import MODULES
-from armwright.spaces.parameters import (
-    GRID_DIGITS,
-    GRID_ERROR,
-    CategoricalParameter,
-    FloatParameter,
-    Parameter,
-    Range,
-)
+from armwright.spaces.parameters import GRID_DIGITS, GRID_ERROR, CategoricalParameter, FloatParameter, Parameter, Range
 from armwright.spaces.space_schema import MAX_LENGTH, Restriction, SpaceSchema
 
 GRID_KINDS = ("origin", "link", "stroke", "limit")

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from armwright.robot.arm import AXES, Axis, JointKind, Vector
+from armwright.robot.axes import as_vector
 from armwright.robot.motor_body import MotorBody
 
 JointType = Literal["R", "P", "Y", "O", "X", "T", "S", "F"]
@@ -93,8 +94,7 @@ def mounted_vector(vector: Vector, mount: Mount) -> Vector:
     """Return a vector of the base frame in world axes."""
     row, rotated = tuple(MOUNTS).index(mount), np.zeros(3)
     rotated[WORLD_AXES[row]] = SIGNS[row] * vector
-    x, y, z = rotated.tolist()
-    return x, y, z
+    return as_vector(rotated)
 
 
 def mounted_body(body: MotorBody, mount: Mount) -> MotorBody:

@@ -41,14 +41,14 @@ def _check_tubes(tubes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, f
 class LinkSection(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """The round sections that links may have, and their material."""
 
+    # Outer diameter and wall of each tube [m]; a solid bar if the wall is half the diameter
     tubes: Annotated[tuple[tuple[float, float], ...], AfterValidator(_check_tubes)] = Field(
         default=((0.03, 0.015),), min_length=1, max_length=MAX_TUBES
     )
-    """Outer diameter and wall of each tube [m]; a solid bar if the wall is half the diameter."""
+    # True if each link has a tube of its own, the parameters tube_j; else the parameter tube is that of all links
     per_link: bool = True
-    """True if each link has a tube of its own, the parameters tube_j; else the parameter tube is that of all links."""
+    # A name, or a record. None: masses as in `mass`, stiffness unknown
     material: Annotated[Material | None, BeforeValidator(resolve_material)] = None
-    """A name, or a record. None: masses as in `mass`, stiffness unknown."""
 
     @property
     def options(self) -> tuple[LinkTube, ...]:

@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.robot.arm import Arm, MountedTool, Vector
+from armwright.robot.arm import Arm, MountedTool
+from armwright.robot.axes import Vector, as_vector
 from armwright.rotations import rotation_from_rpy
 from armwright.spaces.joint_modules import DIRECTIONS, MOUNTS, Mount, mounted_vector
 from armwright.tasks.tip_rules import tip_solids
@@ -54,5 +55,4 @@ def _mounted(tool: Tool, frame: Array, start: Array) -> MountedTool:
 
 
 def _vector(values: Array) -> Vector:
-    x, y, z = (values + 0.0).tolist()  # no -0.0
-    return (x, y, z)
+    return as_vector(values + 0.0)  # no -0.0
