@@ -60,7 +60,7 @@ def cycle_model(arm: Arm, task: Task) -> CycleModel:
     Examples:
         >>> import armwright as aw
         >>> task, space = aw.load_task("desk-sorting"), aw.load_space("desk-sorting")
-        >>> model = aw.cycle_model(space.arm(space.sample(1, 0)[0]), task)
+        >>> model = aw.cycle_model(space.arm(space.sample(1, 1)[0]), task)
         >>> model.trajectory.q.shape[0] == len(model.trajectory.time)
         True
     """
