@@ -97,8 +97,8 @@ def test_more_candidates_lose_no_design_that_three_make_feasible(monkeypatch: py
     matrix = given.space.matrix(front.designs)
     rng = np.random.default_rng(0)
     lengths = [i for i, parameter in enumerate(given.space.parameters) if isinstance(parameter, FloatParameter)]
-    rows = matrix[rng.integers(len(matrix), size=40)]
-    rows[:, lengths] += 0.01 * rng.normal(size=(40, len(lengths)))
+    rows = matrix[rng.integers(len(matrix), size=20)]
+    rows[:, lengths] += 0.01 * rng.normal(size=(20, len(lengths)))
     feasible: list[NDArray[np.bool_]] = []
     for count in (3, 6, 12, CANDIDATES):
         monkeypatch.setattr(cycle_path, "CANDIDATES", count)
