@@ -164,7 +164,8 @@ def test_feasible_designs_hold_as_designed() -> None:
     problem = Problem(aw.load_task("dispensing"), default_space("dispensing"))
     known = known_front(problem)
     assert known is not None
-    pairs = zip(known.designs, problem.evaluate(known.designs), strict=True)
+    designs = known.designs[::2]
+    pairs = zip(designs, problem.evaluate(designs), strict=True)
     trials = [FinishedTrial(n, FRONT_SEARCH, design, **vars(outcome)) for n, (design, outcome) in enumerate(pairs)]
     history = History(problem, trials, 0, known.reference_point)
     survival = front_survival(history, verify_front(history))

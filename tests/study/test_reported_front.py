@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright import DesignSpace, Problem, StudyResult, Task, find_front
+from armwright import DesignSpace, FrontRun, Problem, Task, find_front
 from armwright.exceptions import TaskError
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem.reduction import reduced
@@ -56,13 +56,13 @@ def test_no_reported_design_is_worse_than_itself_without_an_idle_joint() -> None
 
 
 @pytest.fixture(scope="module")
-def fine() -> StudyResult:
+def fine() -> FrontRun:
     return find_front(problem(resolution={"worst_error": 1e-9, "price": 1e-9}), evaluations=EVALUATIONS, seed=0)
 
 
 @pytest.mark.parametrize("resolution", [{"worst_error": 0.05, "price": 30.0}, {"price": 200.0}])
 def test_reported_designs_differ_by_the_resolution(
-    resolution: dict[str, float], fine: StudyResult, tmp_path: Path
+    resolution: dict[str, float], fine: FrontRun, tmp_path: Path
 ) -> None:
     run = find_front(problem(resolution=resolution), evaluations=EVALUATIONS, seed=0, out=tmp_path)
     assert len(run.history) < len(fine.history)
