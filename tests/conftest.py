@@ -10,10 +10,12 @@ import signal
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+import httpcore2
 import mujoco  # noqa: F401  # its first import starts a process, which no test is to be blamed for
 import pytest
 from hypothesis import HealthCheck, settings
@@ -31,6 +33,7 @@ settings.load_profile("tests")
 SLOW_FOLDERS = frozenset({"torture", "fuzz"})
 SLOW_FIXTURES = frozenset({"browser", "guide", "shell"})
 _homes = count()
+_certificates = cache(httpcore2.default_ssl_context)  # reading them takes longer than most requests
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -53,8 +56,9 @@ def _own_home(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
 
 
 @pytest.fixture
-def chat_server() -> Iterator[ChatServer]:
+def chat_server(monkeypatch: pytest.MonkeyPatch) -> Iterator[ChatServer]:
     """Yield a local OpenAI-compatible server with scripted answers."""
+    monkeypatch.setattr(httpcore2, "default_ssl_context", _certificates)
     with ChatServer() as server:
         yield server
 

@@ -61,10 +61,10 @@ def dump_document(content: Mapping[str, Any]) -> str:
 
 
 # libyaml, if PyYAML was built with it, is five times as fast.
-_Loader: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+SAFE_LOADER: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 
 
-class _DocumentLoader(_Loader):
+class _DocumentLoader(SAFE_LOADER):
     """Safe YAML without features that let a small file fill the memory or take hours.
 
     Refused are aliases, tags (PyYAML fails at an invalid `!!int`) and numbers in base 60 (quadratic time).

@@ -57,6 +57,10 @@ values = st.recursive(
 )
 
 
+def read_yaml(text: str) -> Any:
+    return yaml.load(text, Loader=yaml.CSafeLoader)  # five times as fast as SafeLoader
+
+
 def edited(*edits: Edit, text: str = TEXT) -> str:
     return edit_text(text, edits, "task.yaml")
 
@@ -70,16 +74,16 @@ def changed_lines(before: str, after: str) -> tuple[list[str], list[str]]:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_an_edit_leaves_other_keys_as_written(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
-    for key in yaml.safe_load(text):
+    content = read_yaml(text)
+    for key, value in content.items():
         removed = edit_text(text, [Edit(path=(key,), remove=True)], path.name)
         lines = iter(text.splitlines())
         assert all(line in lines for line in removed.splitlines())  # in order
-        assert yaml.safe_load(removed) == {k: v for k, v in yaml.safe_load(text).items() if k != key} or removed == ""
-    for key, value in yaml.safe_load(text).items():
+        assert read_yaml(removed) == {k: v for k, v in content.items() if k != key} or removed == ""
         if value and isinstance(value, (list, dict)):
             inner: Any = next(iter(range(len(value)) if isinstance(value, list) else value))
             once = edit_text(text, [Edit(path=(key, inner), value=value[inner])], path.name)
-            assert yaml.safe_load(once) == yaml.safe_load(text)
+            assert read_yaml(once) == content
             assert once.count("#") == text.count("#")
 
 

@@ -13,6 +13,7 @@ import pytest
 
 import armwright as aw
 from armwright.exceptions import ArmError, FailureError, MissingExtraError, RunFolderError, SettingsError, TaskError
+from armwright.existing import base_placement
 from armwright.existing.base_placement import placed
 from armwright.existing.compare_arms import (
     EXISTING_ARMS,
@@ -63,6 +64,12 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
+def short_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few bases are tried."""
+    monkeypatch.setattr(base_placement, "GENERATIONS", 5)
+
+
+@pytest.fixture
 def history(run: Path) -> History:
     return read_run(run)[1]
 
@@ -88,7 +95,7 @@ def test_exported_design_compared_as_existing_arm_keeps_its_values(run: Path, hi
 
 
 def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compared: ArmComparison) -> None:
-    """No other of 1000 positions that reaches all targets needs clearly less torque; equal seeds give equal bases."""
+    """No other of 1000 positions that reaches all targets needs clearly less torque."""
     rng = np.random.default_rng(5)
     for arm, file in zip(compared.arms, (UR5, PANDA), strict=True):
         x, y, z = arm.base
@@ -105,8 +112,12 @@ def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compa
         torque = 40 * np.linalg.norm(evaluation.joint_torques, axis=2).sum(axis=1)
         assert arm.value("unreached_targets") == 0
         assert arm.value("torque") <= 1.01 * torque[missed == 0.0].min()  # type: ignore[operator]
-    assert compare_arms(TASK, [PANDA], space=SPACE).arms[0].base == compared.arms[1].base
-    assert compare_arms(TASK, [PANDA], space=SPACE, seed=1).arms[0].base != compared.arms[1].base
+
+
+@pytest.mark.usefixtures("short_search")
+def test_equal_seeds_give_equal_bases() -> None:
+    first, again, other = (compare_arms(TASK, [PANDA], space=SPACE, seed=seed).arms[0].base for seed in (0, 0, 1))
+    assert first == again != other
 
 
 def test_base_search_prefers_positions_that_meet_the_constraints() -> None:
@@ -221,6 +232,7 @@ def table(tab: Tab) -> dict[str, dict[str, str]]:
     return {row[0]: dict(zip(heads, row, strict=True)) for row in rows}
 
 
+@pytest.mark.usefixtures("short_search")
 def test_arm_of_unknown_mass_has_no_torque_and_is_not_compared(run: Path, history: History, tmp_path: Path) -> None:
     """One link without a mass leaves all masses, torques and payloads open, but neither reach nor speeds."""
     file, cycle = tmp_path / "light.urdf", {"time": 2.0, "steps": [{"to": 1}, {"to": 2}]}
@@ -402,6 +414,7 @@ def test_arm_names_without_network_or_package_are_refused(tmp_path: Path, monkey
         find_urdf("panda")
 
 
+@pytest.mark.usefixtures("short_search")
 def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder: Path) -> None:
     Path("task.yaml").write_text(json.dumps(TASK.model_dump(mode="json", exclude_none=True)), encoding="utf-8")
     done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run, "--no-figures", "--price", "panda=15000")

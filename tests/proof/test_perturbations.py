@@ -1,6 +1,7 @@
 """Perturbed designs: what changes of the arm, its supply, its motors or its payload leave of limits and geometry."""
 
 import re
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,18 @@ def history_of(desk: Desk) -> History:
     ).history
 
 
+@cache
+def nominal_desk() -> Desk:
+    return Desk()
+
+
+@cache
+def stated_desk() -> Desk:
+    """The desk with motors of which no value is assumed."""
+    return Desk(space=stated(factor=1.0))
+
+
+@cache
 def survival_of(desk: Desk) -> Survival:
     return evaluate_survival(history_of(desk), [0], {})[0]
 
@@ -65,7 +78,7 @@ def reserve_of(changed: Desk, desk: Desk) -> float:
 
 
 def test_a_changed_payload_leaves_what_a_task_with_it_leaves() -> None:
-    desk = Desk()
+    desk = nominal_desk()
     found = survival_of(desk)
     heavier = Desk(payload=DESK["payload"] | {"mass": 1.1 * DESK["payload"]["mass"]})
     assert perturbation(found, HEAVIER).reserve == pytest.approx(reserve_of(heavier, desk), rel=STEADY)
@@ -82,13 +95,13 @@ def test_less_voltage_leaves_what_motors_rated_for_it_leave() -> None:
     """A servo without a corner speed: torque and speed fall with the voltage."""
     weak = stated("stall_torque", "speed", factor=VOLTAGE_SHARE)
     weak["actuators"][0]["peak_torque"] = None
-    full, weaker = Desk(space=stated(factor=1.0)), Desk(space=weak)
+    full, weaker = stated_desk(), Desk(space=weak)
     found = perturbation(survival_of(full), SUPPLY)
     assert found.reserve == pytest.approx(reserve_of(weaker, full), rel=STEADY)
 
 
 def test_assumed_values_are_apart_and_leave_what_motors_with_them_leave() -> None:
-    desk = Desk()
+    desk = nominal_desk()
     found = survival_of(desk)
     assert found.assumed is not None
     assert (found.assumed.name, ASSUMED in {one.name for one in found.perturbations}) == (ASSUMED, False)
@@ -131,11 +144,11 @@ def test_a_design_that_reaches_a_limit_does_not_hold_and_names_it() -> None:
     assert not found.holds
     assert f"{HEAVIER} (reserve {heavier.reserve:.2f} (" in found.verdict
     assert " of joint " in heavier.text
-    assert survival_of(Desk()).holds
+    assert survival_of(nominal_desk()).holds
 
 
 def test_a_load_across_an_axis_beyond_what_the_maker_allows_names_joint_and_motion() -> None:
-    desk = Desk()
+    desk = nominal_desk()
     allowed = 0.9 * float(desk.evaluation.bearing_loads[..., 0].max())
     motor = stated(factor=1.0)
     motor["actuators"][0] |= {"tilting_limit": allowed, "axial_limit": None, "radial_limit": None}

@@ -12,6 +12,7 @@ import pinocchio
 import pytest
 
 import armwright as aw
+from armwright.existing import base_placement
 from armwright.existing.base_placement import Placement
 from armwright.kinematics.arms.arm_arrays import stack_arms
 from armwright.problem.drive_quantities import (
@@ -226,7 +227,8 @@ def test_efforts_and_speeds_that_the_cycle_exceeds_are_stated() -> None:
     assert fastest == f"a speed of its file (along the cycle it needs {(speed / speeds).max():.0%})"
 
 
-def test_command_places_an_existing_arm_on_a_task(tmp_path: Path) -> None:
+def test_command_places_an_existing_arm_on_a_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(base_placement, "GENERATIONS", 5)  # which is enough to report a place
     for place, options in (
         ("the best of 1,500 places", ()), ("base at (-0.2, 0, 0) m, turned by 30°", ("--base", "-0.2,0,0,30")),
     ):  # fmt: skip

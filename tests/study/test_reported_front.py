@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright import DesignSpace, Problem, Task, find_front
+from armwright import DesignSpace, FrontRun, Problem, Task, find_front
 from armwright.exceptions import TaskError
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem.reduction import reduced
@@ -15,6 +15,7 @@ from armwright.runs.folder import read_config
 from armwright.study.front.reported_front import reported_front
 from tests.support.arms import LIGHT
 
+EVALUATIONS = 600
 SPACE = {
     "name": "plane",
     "joints": [2, 5],
@@ -54,16 +55,20 @@ def test_no_reported_design_is_worse_than_itself_without_an_idle_joint() -> None
     assert hypervolume(front.values, (1.0, 1000.0)) > hypervolume(values, (1.0, 1000.0))
 
 
+@pytest.fixture(scope="module")
+def fine() -> FrontRun:
+    return find_front(problem(resolution={"worst_error": 1e-9, "price": 1e-9}), evaluations=EVALUATIONS, seed=0)
+
+
 @pytest.mark.parametrize("resolution", [{"worst_error": 0.05, "price": 30.0}, {"price": 200.0}])
-def test_reported_designs_differ_by_the_resolution(resolution: dict[str, float], tmp_path: Path) -> None:
-    run, fine = (
-        find_front(problem(resolution=stated), evaluations=1500, seed=0, out=tmp_path / name)
-        for name, stated in (("coarse", resolution), ("fine", {"worst_error": 1e-9, "price": 1e-9}))
-    )
+def test_reported_designs_differ_by_the_resolution(
+    resolution: dict[str, float], fine: FrontRun, tmp_path: Path
+) -> None:
+    run = find_front(problem(resolution=resolution), evaluations=EVALUATIONS, seed=0, out=tmp_path)
     assert len(run.history) < len(fine.history)
     assert run.history.values.min(axis=0).tolist() == fine.history.values.min(axis=0).tolist()
     assert run.summary["hypervolume"]["final"] == pytest.approx(fine.summary["hypervolume"]["final"])
-    config = read_config(tmp_path / "coarse")
+    config = read_config(tmp_path)
     assert dict(config.task.resolution) == resolution
     assert RunConfig.model_validate(config.model_dump(mode="json")) == config
 

@@ -15,7 +15,7 @@ from ruamel.yaml.representer import RoundTripRepresenter
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
 from armwright.exceptions import TaskError
-from armwright.yaml_documents import load_document
+from armwright.yaml_documents import SAFE_LOADER, load_document
 
 MAX_DEPTH = 12
 
@@ -66,7 +66,7 @@ def _edited(text: str, edit: Edit, where: str) -> str:
 
 def _extent(text: str, key: str, where: str) -> tuple[int, int]:
     """Return the first line of a key of the root, and the line after its value; comments below it are not its."""
-    root: Any = cast("Any", yaml).compose(text, Loader=yaml.SafeLoader)
+    root: Any = cast("Any", yaml).compose(text, Loader=SAFE_LOADER)
     if root is not None and (not isinstance(root, yaml.MappingNode) or root.flow_style):
         raise TaskError(f"{where}: expected keys and values, one a line")
     lines = text.splitlines()

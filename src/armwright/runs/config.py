@@ -2,8 +2,7 @@
 
 import platform
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -190,10 +189,16 @@ def versions(evaluator: Evaluator | None = None) -> dict[str, str]:
     found = {"python": platform.python_version()}
     if evaluator is not None and evaluator.version:
         found["evaluator"] = evaluator.version
-    for package in PACKAGES:
-        with suppress(metadata.PackageNotFoundError):  # an extra
-            found[package] = metadata.version(package)
-    return found
+    return found | {package: version for package in PACKAGES if (version := _installed_version(package))}
+
+
+@cache
+def _installed_version(package: str) -> str:
+    """Return the version of a package; empty if it is not installed, as that of an extra."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def check_same_run(path: Path, stored: RunConfig, requested: RunConfig) -> None:
