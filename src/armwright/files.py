@@ -1,6 +1,7 @@
 """Atomic replacement of files that follows no links, CSV, and names that any file system accepts."""
 
 import csv
+import hashlib
 import io
 import os
 import re
@@ -8,7 +9,7 @@ import secrets
 import shutil
 import stat
 from collections.abc import Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import FileIO
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -66,6 +67,17 @@ def read_records(file: BinaryIO, path: Path) -> Iterator[bytes]:
             raise RunFolderError(f"{path}: expected at most {limit // 1024**2:,} MiB of {of}; restore the file")
         if line.endswith(b"\n"):
             yield line[:-1]
+
+
+def digest(files: Iterable[Path]) -> bytes:
+    """Return the sha256 of files, with their folders' names; those that no reader of records takes are ignored."""
+    found = hashlib.sha256()
+    for path in files:
+        with suppress(OSError), path.open("rb") as file:
+            if os.fstat(file.fileno()).st_size <= MAX_RECORDS:
+                name = os.fsencode("/".join(path.parts[-2:]))
+                found.update(name + hashlib.file_digest(file, "sha256").digest())
+    return found.digest()
 
 
 def replace_file(target: Path, content: bytes, mode: int = 0o666) -> None:
