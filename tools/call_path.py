@@ -2,7 +2,7 @@
 
     python tools/call_path.py RUN
 
-Imports do not count.
+Imports do not count. The page of RUN is made before: what it shows is computed once, when a run ends.
 """
 
 import sys
@@ -24,7 +24,7 @@ def modules_called(run: Path) -> list[str]:
         if event == "call" and frame.f_code.co_filename.startswith(str(PACKAGE)) and frame.f_code.co_name != "<module>":
             called.add(frame.f_code.co_filename)
 
-    write_report(run)  # imports
+    write_report(run)
     sys.setprofile(note)
     try:
         write_report(run)

@@ -28,39 +28,12 @@ SEGMENT = -2  # shape of the axis of a link; its `half` is half the way from its
 
 
 @cache
-def convex_math(precision: Precision) -> SimpleNamespace:
-    """Return the functions in this precision."""
-    base, simplex, solid = frame_math(precision), simplex_math(precision), solid_math(precision)
-    Solids, signed_distance = solid.Solids, solid.signed_distance
+def _axis_math(precision: Precision) -> SimpleNamespace:
+    """Return the functions of separating axes in this precision."""
+    base, Solids = frame_math(precision), solid_math(precision).Solids
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
-    Simplex, nearest_point = simplex.Simplex, simplex.nearest_point
     zero, one = real(0.0), real(1.0)
-    tiny = real(1e-12)  # square of a length or sine that counts as 0
-    accuracy = real(ACCURACY)
-
-    @wp.func
-    def support(shape: int, half: Vector3, n: Vector3):
-        """Return the point of a body that is farthest along n, in the body's frame."""
-        p = Vector3(wp.where(n[0] >= zero, half[0], -half[0]), wp.where(n[1] >= zero, half[1], -half[1]), zero)
-        if shape == wp.static(CYLINDER):
-            across = wp.sqrt(n[0] * n[0] + n[1] * n[1])
-            scale = half[0] / wp.max(across, tiny)
-            p = Vector3(scale * n[0], scale * n[1], zero)
-        p[2] = wp.where(n[2] >= zero, half[2], -half[2])
-        if shape == wp.static(SEGMENT):
-            p = wp.where(wp.dot(n, half) >= zero, half, -half)
-        return p
-
-    @wp.func
-    def farthest(shape: int, half: Vector3, corners: wp.array2d(dtype=Vector3), o: int, n: Vector3):
-        """Return the point of a body, or the corner of mesh o, that is farthest along n, in its frame."""
-        if shape != wp.static(MESH):
-            return support(shape, half, n)
-        p = corners[o, 0]
-        for i in range(1, corners.shape[1]):
-            if wp.dot(corners[o, i] - p, n) > zero:
-                p = corners[o, i]
-        return p
+    tiny = real(1e-12)  # square of a length that counts as 0
 
     @wp.func
     def extent(shape: int, half: Vector3, n: Vector3):
@@ -131,6 +104,46 @@ def convex_math(precision: Precision) -> SimpleNamespace:
             if found > best:
                 n, best = -m, found
         return n, best
+
+    return SimpleNamespace(extent=extent, best_axis=best_axis, best_face=best_face)
+
+
+@cache
+def convex_math(precision: Precision) -> SimpleNamespace:
+    """Return the functions in this precision."""
+    base, axes = frame_math(precision), _axis_math(precision)
+    simplex, solid = simplex_math(precision), solid_math(precision)
+    extent, best_axis, best_face = axes.extent, axes.best_axis, axes.best_face
+    Solids, signed_distance = solid.Solids, solid.signed_distance
+    real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
+    Simplex, nearest_point = simplex.Simplex, simplex.nearest_point
+    zero, one = real(0.0), real(1.0)
+    tiny = real(1e-12)  # square of a sine that counts as 0
+    accuracy = real(ACCURACY)
+
+    @wp.func
+    def support(shape: int, half: Vector3, n: Vector3):
+        """Return the point of a body that is farthest along n, in the body's frame."""
+        p = Vector3(wp.where(n[0] >= zero, half[0], -half[0]), wp.where(n[1] >= zero, half[1], -half[1]), zero)
+        if shape == wp.static(CYLINDER):
+            across = wp.sqrt(n[0] * n[0] + n[1] * n[1])
+            scale = half[0] / wp.max(across, tiny)
+            p = Vector3(scale * n[0], scale * n[1], zero)
+        p[2] = wp.where(n[2] >= zero, half[2], -half[2])
+        if shape == wp.static(SEGMENT):
+            p = wp.where(wp.dot(n, half) >= zero, half, -half)
+        return p
+
+    @wp.func
+    def farthest(shape: int, half: Vector3, corners: wp.array2d(dtype=Vector3), o: int, n: Vector3):
+        """Return the point of a body, or the corner of mesh o, that is farthest along n, in its frame."""
+        if shape != wp.static(MESH):
+            return support(shape, half, n)
+        p = corners[o, 0]
+        for i in range(1, corners.shape[1]):
+            if wp.dot(corners[o, i] - p, n) > zero:
+                p = corners[o, i]
+        return p
 
     @wp.func
     def separation(
