@@ -9,8 +9,6 @@ import secrets
 import shutil
 import stat
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from collections.abc import Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from contextlib import contextmanager, suppress
 from io import FileIO
 from pathlib import Path
@@ -81,7 +79,6 @@ def read_records(file: BinaryIO, path: Path) -> Iterator[bytes]:
             yield line[:-1]
 
 
-<<<<<<< HEAD
 def read_log(path: Path, parse: Callable[[bytes, int], T], way_out: str) -> tuple[list[T], int]:
     """Return the records of a file that grows line by line, and its length [bytes] without a truncated last line.
 
@@ -113,7 +110,8 @@ def _first_error(fault: Exception) -> str:
         return str(fault)
     first = fault.errors(include_url=False, include_context=False, include_input=False)[0]
     return f"{'.'.join(map(str, first['loc']))}: {first['msg'].removeprefix('Value error, ')}".removeprefix(": ")
-=======
+
+
 def digest(files: Iterable[Path]) -> bytes:
     """Return the sha256 of files, with their folders' names; those that no reader of records takes are ignored."""
     found = hashlib.sha256()
@@ -123,7 +121,6 @@ def digest(files: Iterable[Path]) -> bytes:
                 name = os.fsencode("/".join(path.parts[-2:]))
                 found.update(name + hashlib.file_digest(file, "sha256").digest())
     return found.digest()
->>>>>>> page
 
 
 def replace_file(target: Path, content: bytes, mode: int = 0o666) -> None:

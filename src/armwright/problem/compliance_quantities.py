@@ -13,7 +13,6 @@ from armwright.kinematics.reach.compliance import (
     unit_payload,
 )
 from armwright.kinematics.reach.payload_limits import payload_limits, torques_by_payload
-from armwright.problem import arm_quantities  # noqa: F401  # which are registered before these
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import quantity
 from armwright.tasks.moments import MAX_MASS

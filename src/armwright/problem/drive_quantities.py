@@ -6,7 +6,6 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.kinematics.arms.bearings import bearing_limits
 from armwright.kinematics.cycle.drive_limits import torque_speed_utilisation
-from armwright.problem import compliance_quantities  # noqa: F401  # which are registered before these
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Need, quantity
 
