@@ -1,4 +1,4 @@
-"""Optional dependencies (extras), such as `pip install "armwright[live]"`.
+"""Optional dependencies (extras), such as `pip install "armwright[edit]"`.
 
 A module may import a package of an extra like any other: the command or the public name that needs the module names
 the extra (`naming_extras`).
@@ -14,9 +14,9 @@ from armwright.exceptions import MissingExtraError
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     "arms": {"robot_descriptions": "robot_descriptions", "xacrodoc": "xacrodoc"},
     "distributed": {"cryptography": "cryptography", "distributed": "distributed"},
+    "edit": {"ruamel.yaml": "ruamel.yaml", "starlette": "starlette", "uvicorn": "uvicorn"},
     "figures": {"matplotlib": "matplotlib"},
     "gp": {"greenlet": "greenlet", "torch": "torch"},
-    "live": {"ruamel.yaml": "ruamel.yaml", "starlette": "starlette", "uvicorn": "uvicorn"},
     "llm": {
         "anthropic": "anthropic",
         "google.genai": "google-genai",
