@@ -69,7 +69,7 @@ audit: .venv/.audit  ## known faults of all that may be installed, extras includ
 	@touch $@
 
 .venv/.test: .venv/.run
-	$(PIP) --editable '.[figures,live,llm,studies]' --group test
+	$(PIP) --editable '.[figures,edit,llm,studies]' --group test
 	@touch $@
 
 .venv/.check: .venv/.run

@@ -31,7 +31,6 @@ SHORT = ("--n-init", "3", "--n-step", "3", "--n-total", "3", "--no-figures", "--
 HOW = ("--evaluation-timeout", "60", "--workers", "2")
 COMMANDS: dict[str, tuple[str, ...]] = {  # all that start processes, which one function does
     "workers with a timeout": ("optimize", "target-1", *SHORT, "--evaluator", "{there}/ev.py:reach", *HOW),
-    "live page": ("optimize", "target-1", *SHORT, "--live"),
 }
 
 

@@ -91,24 +91,6 @@ def infeasible_report(folder: Path, page: Page, file: Path) -> None:
     page.screenshot(path=file)
 
 
-def live_report(folder: Path, page: Page, file: Path) -> None:
-    """Show a run in progress."""
-    command = [Path(sys.executable).with_name("armwright"), "optimize", "target-3", "--n-total", "2000", "--live"]
-    with subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8"
-    ) as study:
-        assert study.stdout is not None
-        address = next(found[0] for line in study.stdout if (found := re.search(r"http://\S+", line)))
-        page.set_viewport_size({"width": 900, "height": 760})
-        page.emulate_media(color_scheme="light")
-        page.goto(address)
-        page.locator("#iteration-value", has_text=re.compile("1[2-9]\\d|[2-9]\\d\\d")).wait_for()
-        page.screenshot(path=file)
-        page.locator("#stop").click()
-        page.goto("about:blank")
-        study.kill()
-
-
 def tutorial(folder: Path, page: Page, file: Path) -> None:
     """Show the report of the tutorial's second search."""
     text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
@@ -228,7 +210,6 @@ PICTURES: dict[str, Shot] = {
     "page-infeasible.png": infeasible_report,
     "page-six-axes.png": six_axes,
     "page-comparison.png": comparison,
-    "page-live.png": live_report,
     "editor.png": editor,
     "tutorial.png": tutorial,
     "example-shelf.png": arm_of(

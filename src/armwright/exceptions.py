@@ -10,7 +10,6 @@
     │   │   └── UnknownQuantityError  a quantity that task and arms leave open
     │   ├── RunConflictError    the run folder holds a run with other settings
     │   └── MissingExtraError   an optional dependency that is not installed
-    ├── StoppedError            a study ended on request                    (exit code 130, as after Ctrl-C)
     └── FailureError            something failed during the work            (exit code 1)
         ├── RunFolderError      a run folder that cannot be written, or whose content is damaged
         ├── ModelError          a language model that cannot be used
@@ -25,7 +24,6 @@ answers is escaped, so that it cannot break the line or control a terminal.
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from pathlib import Path
 
 MAX_MESSAGE = 3000  # characters
 
@@ -130,15 +128,6 @@ class EvaluatorError(FailureError):
 
 class ClusterError(FailureError):
     """A Dask cluster does not answer, was lost, or has other versions than this process."""
-
-
-class StoppedError(ArmwrightError):
-    """A study ended on request."""
-
-    exit_code = 130
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(f"stopped on request; every finished trial is in {folder}/, and the same command resumes")
 
 
 def _line(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Optional dependencies (extras), such as `pip install "armwright[live]"`.
+"""Optional dependencies (extras), such as `pip install "armwright[edit]"`.
 
 A module may import a package of an extra like any other: the command or the public name that needs the module names
 the extra (`naming_extras`).
@@ -14,9 +14,9 @@ from armwright.exceptions import MissingExtraError
 EXTRAS: Mapping[str, Sequence[str]] = {
     "arms": ("robot_descriptions", "xacrodoc"),
     "distributed": ("cryptography", "distributed"),
+    "edit": ("ruamel.yaml", "starlette", "uvicorn"),
     "figures": ("matplotlib",),
     "gp": ("greenlet", "torch"),
-    "live": ("ruamel.yaml", "starlette", "uvicorn"),
     "llm": ("anthropic", "google.genai", "openai", "pydantic_ai"),
     "studies": ("cloudpickle", "jinja2", "optuna", "threadpoolctl"),
 }

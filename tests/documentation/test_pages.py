@@ -41,7 +41,6 @@ NOT_RUN = {
     r"armwright .*--model .*": "needs a model; test_llm.py and test_draft.py run such against a server of their own",
     r"armwright .*--proposer replay:.*": "needs a run that a model was asked in; test_replay.py makes one",
     r"armwright .*--proposer manual:.*": "waits for people; test_manual.py answers",
-    r"armwright (optimize|report) .*--live.*": "serves until nobody looks on; test_live.py looks on",
     r"armwright edit .*": "serves until Ctrl-C; tests/editor follows its page",
     r"armwright compare-arms .* ur5e panda .*": "robot_descriptions fetches these arms from a network",
     r"armwright optimize .*--scheduler .*|dask .*": "needs a cluster on other machines; test_dask.py starts one",

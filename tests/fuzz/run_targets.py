@@ -36,9 +36,7 @@ def a_run() -> Path:
         proposer = llm_proposer(server.url, memory="chat", origin="scripted")
         aw.optimize(a_problem(), proposer=proposer, n_init=3, n_step=2, n_total=4, out=there)
     write_report(there)
-    control = {"stop": True}
-    for name, content in (("existing_arms.json", [EXISTING]), ("control.json", control)):
-        (there / name).write_text(json.dumps(content), encoding="utf-8")
+    (there / "existing_arms.json").write_text(json.dumps([EXISTING]), encoding="utf-8")
     return there
 
 
@@ -61,8 +59,7 @@ def of_run(name: str) -> Callable[[bytes], None]:
         try:
             looked_at(there)
         finally:
-            for changed_file in (name, "control.json", "status.json"):
-                shutil.copyfile(a_run() / changed_file, there / changed_file)
+            shutil.copyfile(a_run() / name, there / name)
 
     return run
 
@@ -75,17 +72,14 @@ def looked_at(there: Path) -> None:
     from armwright.proof.export import export_design
     from armwright.proof.selection import pick_from
     from armwright.proposers.replay import ReplayProposer
-    from armwright.runs.control import Channel, read_control, read_status
 
     any_of(
         (
             lambda: pick_from(there, holds=True),
             lambda: export_design(there, None, "urdf"),
-            lambda: RunContent(there).packed(with_files=True),
+            lambda: RunContent(there).packed(),
             lambda: markdown(compare_runs(there), "runs", notes=()),
             lambda: replayed(ReplayProposer(there)),
-            lambda: (read_control(there), read_status(there)),
-            lambda: Channel(there).begin(0),
         )
     )
 

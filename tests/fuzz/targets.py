@@ -20,7 +20,7 @@ TARGETS: dict[str, Target] = {
         f"run {name}": Target(inputs, name.rpartition(".")[2], seed_of_run(name), of_run(name))
         for inputs, names in (
             (1_000, ("config.yaml", "trials.jsonl", "transcripts.jsonl", "summary.json")),
-            (500, ("existing_arms.json", "control.json", "status.json")),
+            (500, ("existing_arms.json",)),
         )
         for name in names
     },

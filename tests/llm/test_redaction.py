@@ -152,7 +152,7 @@ def test_keys_are_hidden_when_the_first_call_fails(chat_server: ChatServer, in_f
 
 @pytest.mark.slow
 def test_keys_are_not_on_a_command_line(chat_server: ChatServer, in_folder: Path) -> None:
-    """As every user of the machine sees them: of the study, and of the server of its page."""
+    """As every user of the machine sees them: of the study."""
     seen: set[str] = set()
 
     def answer(_request: Request) -> Answer:
@@ -162,11 +162,10 @@ def test_keys_are_not_on_a_command_line(chat_server: ChatServer, in_folder: Path
         return json.dumps(GOOD_DESIGN)
 
     chat_server.answer = answer
-    how = (*model_of("openai", chat_server, answer="one-step"), "--no-figures", "--live", "--out", "run")
+    how = (*model_of("openai", chat_server, answer="one-step"), "--no-figures", "--out", "run")
     done = run_alone(chat_server, "optimize", "target-1", *SHORT, *how)
     assert done.returncode == 0, done.stderr
     own = [command for command in seen if str(in_folder) in command or "optimize target-1" in command]
-    assert any("armwright report --live" in command for command in own)
     assert any("armwright optimize" in command for command in own)
     assert sent_key(chat_server) in KEYS
     no_key_in(" ".join(seen))

@@ -15,9 +15,10 @@ import pytest
 
 import armwright as aw
 from armwright import extras
+from armwright.editor.edited_files import EditedFiles
+from armwright.editor.server import serve_editor
 from armwright.exceptions import MissingExtraError, UsageError
 from armwright.extras import DISTRIBUTIONS, EXTRAS, missing_packages, naming_extras
-from armwright.page.live_server import serve, start_server
 from armwright.robot.robot_descriptions import find_urdf
 from tests import ROOT
 from tests.support.extras import NEEDS_GP
@@ -72,8 +73,7 @@ ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
     "arms": ("arms", "robot_descriptions", lambda: find_urdf("ur5e")),
     "distributed": ("distributed", "distributed", lambda: aw.Workers(2)),
     "gp": ("gp", "torch", lambda: aw.optimize(aw.Problem(aw.load_task("target-1")), sampler="gp")),
-    "page": ("live", "uvicorn", lambda: serve(Path("run"), print)),
-    "page of a run": ("live", "starlette", lambda: start_server(Path("run"))),
+    "editor": ("edit", "uvicorn", lambda: serve_editor(EditedFiles(Path("task.yaml")), print)),
     "model": ("llm", "pydantic_ai", lambda: aw.LlmProposer("openai-chat:gpt-4o")),
     "model of a study": ("llm", "openai", lambda: aw.StudyLlmProposer("openai-chat:gpt-4o", "two numbers")),
     "draft": ("llm", "openai", lambda: aw.draft("reach a shelf", "openai-chat:gpt-4o")),
@@ -98,11 +98,11 @@ def test_missing_package_names_its_install_command(asked: str, monkeypatch: pyte
 
 
 def test_incompatible_version_is_reported() -> None:
-    with pytest.raises(MissingExtraError) as fault, naming_extras("the page", "live"):
+    with pytest.raises(MissingExtraError) as fault, naming_extras("the page", "edit"):
         from json import no_such_name  # type: ignore[attr-defined] # noqa: F401
     words = str(fault.value)
     assert words.startswith("the page needs another version of json (cannot import name 'no_such_name'")
-    assert words.endswith(': pip install "armwright[live]"')
+    assert words.endswith(': pip install "armwright[edit]"')
     assert "\n" not in words
 
 

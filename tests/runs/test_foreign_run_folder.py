@@ -22,7 +22,6 @@ from armwright.proof.cycle_faults import describe_path
 from armwright.proof.design_record import read_records
 from armwright.proof.results import read_summary
 from armwright.proof.selection import pick_from
-from armwright.runs.control import read_control, read_status
 from armwright.runs.folder import RunFolder, is_held, read_run
 from armwright.sheet.design_sheet import design_sheet
 from tests import ROOT
@@ -36,8 +35,6 @@ READERS: dict[str, Callable[[Path], object]] = {
     "summary.json": read_summary,
     "existing_arms.json": lambda run: read_existing_arms(run, 2),
     "simulation.json": lambda run: design_sheet(run, 0),
-    "control.json": read_control,
-    "status.json": read_status,
 }
 
 
@@ -203,7 +200,6 @@ def test_a_lock_that_is_a_link_leaves_its_target_as_it_is(run: Path, tmp_path: P
     with pytest.raises(RunFolderError, match="is a link"), RunFolder(run):
         pass
     assert mode(target) == 0o644
-    assert json.loads((run / "status.json").read_text(encoding="utf-8"))["doing"] == "finished"
 
 
 @pytest.mark.parametrize("entry", [[], [[[0.0]]], [[[0.0] * 5] * 2]])

@@ -42,7 +42,7 @@ def folder(run: StudyResult) -> Path:
 def test_run_folder_has_the_documented_files(run: StudyResult) -> None:
     names = {path.name for path in folder(run).iterdir()} - {".lock"}
     results = {"trials.csv", "front.csv", "summary.json", "designs"}
-    assert names == {"config.yaml", "trials.jsonl", "status.json", *results}
+    assert names == {"config.yaml", "trials.jsonl", *results}
 
 
 def test_trials_are_one_json_line_each(run: StudyResult) -> None:

@@ -12,15 +12,13 @@ from typing import Any
 import pytest
 
 import armwright as aw
-from armwright.exceptions import ClusterError, EvaluatorError, SettingsError, StoppedError
+from armwright.exceptions import ClusterError, EvaluatorError, SettingsError
 from armwright.experiments.cells import plan_cells
 from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.runner import _outcome_of
 from armwright.problem.objective import Objective
-from armwright.runs.control import stop_study
 from armwright.study.workers.cluster import Finished
 from tests.support.command_line import start
-from tests.support.controlled_runs import after
 from tests.support.dask_processes import (
     TASK,
     Bench,
@@ -142,18 +140,6 @@ def test_evaluator_is_shipped_to_workers_and_designs_evaluated_once(
     assert bench.counts.total() == 35 - found.summary["duplicates"]
     for trial in found.trials[:5]:
         assert trial.values == (sum(trial.design.links), 1.0 + trial.design.origin[2])
-
-
-def test_stop_lets_designs_in_flight_finish(tmp_path: Path, shell: ShellCluster, bench: Bench) -> None:
-    shell.only(2)
-    out = tmp_path / "run"
-
-    with pytest.raises(StoppedError):
-        aw.optimize(bench.problem(), **SHORT, out=out, workers=on(shell), watch=after(2, lambda: stop_study(out)))
-    assert 3 <= len(trials(out)) == bench.counts.total() < N_TRIALS
-    aw.optimize(bench.problem(), **SHORT, out=out, workers=on(shell))
-    assert numbers(out) == list(range(N_TRIALS))
-    assert set(bench.counts.values()) == {1}
 
 
 # --- what is killed ---------------------------------------------------------------------------------------------------

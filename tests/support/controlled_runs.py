@@ -8,7 +8,6 @@ from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.proposers.proposer import Proposer
-from armwright.runs.control import Status, read_status
 from armwright.study.front.search_budget import SearchProgress
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
@@ -64,9 +63,3 @@ def interrupt_at(evaluations: int) -> Callable[[SearchProgress], None]:
             interrupt()
 
     return watch
-
-
-def status(folder: Path) -> Status:
-    there = read_status(folder)
-    assert there is not None
-    return there

@@ -11,7 +11,7 @@ from typing import Any
 
 from armwright.editor.edited_files import EditedFiles
 from armwright.editor.server import serve_editor
-from tests.support.live_server import Served, ask, running
+from tests.support.server import Served, ask, running
 
 
 @dataclass(frozen=True)

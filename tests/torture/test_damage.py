@@ -34,7 +34,6 @@ def short(folder: Path, **settings: Any) -> StudyResult:
 def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("intact") / "run"
     short(folder)
-    (folder / "control.json").write_text('{"stop": false}', encoding="utf-8")
     return folder
 
 
@@ -64,7 +63,7 @@ Damage = Callable[[bytes, random.Random], bytes]
 DAMAGE: tuple[Damage, ...] = (cut, spoilt, doubled)
 # Whether a run cannot be resumed without them.
 FILES = {
-    "trials.jsonl": True, "config.yaml": True, "status.json": False, "control.json": False, "summary.json": False,
+    "trials.jsonl": True, "config.yaml": True, "summary.json": False,
     "trials.csv": False, "front.csv": False, ".lock": False,
 }  # fmt: skip
 

@@ -46,7 +46,7 @@ def init(
 
 
 def edit(task: Path, *, space: Path | None = None, port: int = 0, open_: bool = False) -> None:
-    """Draw TASK and its design space in the browser, check them, and design arms (extra live).
+    """Draw TASK and its design space in the browser, check them, and design arms (extra edit).
 
     Ctrl-C ends it, with a search that it has started.
 

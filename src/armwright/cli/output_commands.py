@@ -2,9 +2,6 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from armwright.cli.streams import activity, open_console, print_csv, print_json, print_text
 from armwright.exceptions import FailureError, SettingsError
@@ -76,31 +73,14 @@ def export(run: Path, *, design: int | None = None, format_: str = "urdf", out: 
     out.write_text(text, encoding="utf-8")
 
 
-def report(
-    runs: list[Path],
-    *,
-    live: bool = False,
-    port: int = 0,
-    follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
-) -> None:
+def report(runs: list[Path]) -> None:
     """Write report.html into each RUN: one file for any browser, without a network.
 
     Parameters:
         runs (RUN...): Run folders.
-        live: Serve the live page of RUN until Ctrl-C instead (extra live).
-        port: Port to listen on; 0: any free port.
     """
-    from armwright.page.live_server import serve
     from armwright.page.page import write_report
-    from armwright.runs.folder import read_config
 
-    if live:
-        if len(runs) > 1:
-            raise SettingsError(f"--live: expected one run folder, got {len(runs)}")
-        if not follow:
-            read_config(runs[0])  # report a folder without a run at once
-        serve(runs[0], print_text, port, sys.stdin.buffer if follow else None)
-        return
     for run in runs:
         with activity(f"writing the page of {run}"):
             written = write_report(run)

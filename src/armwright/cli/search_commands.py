@@ -12,7 +12,6 @@ import typer
 from armwright.cli.options import load_problem, select_workers
 from armwright.cli.signals import interruptible
 from armwright.cli.streams import activity, exit_interrupted, open_console, print_error, print_json, print_text
-from armwright.exceptions import StoppedError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -115,7 +114,6 @@ def optimize(
     allow_failures: bool = False,
     out: Path | None = None,
     figures: bool = True,
-    live: bool = False,
     json_: bool = False,
 ) -> None:
     """Search designs for TASK by black-box trials and proposals.
@@ -150,7 +148,6 @@ def optimize(
 
     Output:
         out: Run folder. Default: runs/TASK-seedSEED.
-        live: Serve the page of the run on 127.0.0.1 while it runs (extra live).
         json_: Print only summary.json to stdout.
     """
     from armwright.cli.notes import can_draw, design_note
@@ -182,10 +179,6 @@ def optimize(
     if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
         console.print(note, soft_wrap=True)  # it holds a command
     _begin(console, problem, space, folder)
-    if live:
-        from armwright.page.live_server import start_server
-
-        console.print(f"live: {start_server(folder)}")
     try:
         with interruptible(), study_progress(console) as watch:
             run = run_study(
@@ -209,7 +202,7 @@ def optimize(
         if figures and not finished_before:
             console.print("drawing the page and the figures")
         drawn = _draw(folder, drawing) if figures else []
-    except (KeyboardInterrupt, StoppedError):
+    except KeyboardInterrupt:
         exit_interrupted(console, f"every finished trial is in {folder}/" if folder.exists() else "nothing was started")
     if json_:
         print_json({"folder": folder, **run.summary})

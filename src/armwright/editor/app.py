@@ -1,4 +1,4 @@
-"""The editor's HTTP application. Needs the extra `live`.
+"""The editor's HTTP application. Needs the extra `edit`.
 
 /           the page, without data
 /opened     the texts of both files, and the lists to choose from
@@ -8,13 +8,13 @@
 /design     POST: write both files and search designs
 /stop       POST: end the search
 /job        the state of the search
-/run/       the live page of the search, without data
-/run/...    its data
+/SECRET     report.html of the search; only /job tells this address, as a browser opens a page without the key
 
 All but the two pages need the server's key (request_guard.py). What changes anything must come from the page itself.
 """
 
 import asyncio
+import secrets
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from importlib import resources
@@ -24,18 +24,18 @@ from pydantic import BaseModel, Field
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, PlainTextResponse, Response
-from starlette.routing import Mount, Route, Router
+from starlette.responses import FileResponse, HTMLResponse, Response
+from starlette.routing import Route
 
 from armwright.editor.assessment import assess
 from armwright.editor.choices import choices
 from armwright.editor.design_run import DesignRun, next_folder
 from armwright.editor.edited_files import MAX_BYTES, EditedFiles, Texts
+from armwright.editor.request_guard import post_route, to_response
 from armwright.editor.yaml_edits import Edit, edit_text
 from armwright.exceptions import TaskError
 from armwright.page.assembly import SHARED, PageSource, assemble
-from armwright.page.live_app import LivePage, show_shell
-from armwright.page.request_guard import post_route, to_response
+from armwright.proof.results import REPORT
 from armwright.tasks.points_file import parse_points
 from armwright.tasks.task import Task
 from armwright.yaml_documents import parse_document
@@ -43,7 +43,6 @@ from armwright.yaml_documents import parse_document
 MAX_BODY = 4 * MAX_BYTES  # [bytes]; two texts, their quotes escaped
 MAX_EDITS = 10_000
 MIN_SECONDS, MAX_SECONDS = 5.0, 24 * 3600.0
-SHELLS = ("/", "/run/")
 PAGE = PageSource(
     template="editor.html",
     main="editor.js",
@@ -83,21 +82,20 @@ class StopBody(BaseModel, frozen=True, extra="forbid"):
     """Nothing."""
 
 
-def editor_app(files: EditedFiles) -> Starlette:
-    """Return the editor's application, to be guarded."""
-    editor = Editor(files)
-    return Starlette(routes=editor.routes(), lifespan=editor.lifespan)
-
-
 class Editor:
     """The editor's requests."""
 
     def __init__(self, files: EditedFiles) -> None:
         self._files = files
         self._job: DesignRun | None = None
-        self._live: Router | None = None
+        self._report = f"/{secrets.token_urlsafe(24)}"
+        self.open_paths = ("/", self._report)  # they need no key
 
-    def routes(self) -> list[Route | Mount]:
+    def app(self) -> Starlette:
+        """Return the application, to be guarded."""
+        return Starlette(routes=self.routes(), lifespan=self.lifespan)
+
+    def routes(self) -> list[Route]:
         """Return the routes of the application."""
         return [
             Route("/", self.page),
@@ -108,8 +106,7 @@ class Editor:
             post_route("/save", TextsBody, self.save, MAX_BODY),
             post_route("/design", DesignBody, self.design, MAX_BODY),
             post_route("/stop", StopBody, self.stop),
-            Route("/run/", show_shell),
-            Mount("/run", app=self.run),
+            Route(self._report, self.report),
         ]
 
     @asynccontextmanager
@@ -128,12 +125,12 @@ class Editor:
         return to_response({"files": names, **dict(files.texts()), **state})
 
     async def job(self, request: Request) -> Response:
-        return to_response(None if self._job is None else self._job.status())
+        return to_response(None if self._job is None else {**self._job.status(), "report": self._report})
 
-    async def run(self, scope: Any, receive: Any, send: Any) -> None:
-        """Answer the requests of the live page."""
-        app = self._live or PlainTextResponse("no search has been started", 404)
-        await app(scope, receive, send)
+    async def report(self, request: Request) -> Response:
+        if self._job is None or not (page := self._job.folder / REPORT).is_file():
+            raise HTTPException(404, "there is no report")
+        return FileResponse(page)
 
     def assess(self, body: AssessBody) -> dict[str, Any]:
         files = self._files
@@ -155,7 +152,6 @@ class Editor:
         name = parse_document(body.task, Task, TaskError, self._files.task).name
         self._files.save(body, body.overwrite)
         self._job = DesignRun(self._files.task, self._files.space, body.seconds, next_folder(name))
-        self._live = Router(LivePage(self._job.folder).routes())
         return self._job.status()
 
     def stop(self, body: StopBody) -> None:

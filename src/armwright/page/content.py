@@ -1,6 +1,6 @@
 """The content of the page: a run, and what is kept beside it, packed as bytes for the page's script.
 
-report.html embeds these bytes; the live server sends them whenever they change.
+report.html embeds these bytes.
 """
 
 from collections.abc import Mapping
@@ -16,11 +16,9 @@ from armwright.existing.compare_arms import read_existing_arms
 from armwright.files import MAX_DERIVED, read_text, replace_surrogates
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.pictures.style import EXISTING, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
-from armwright.proof.design_record import DESIGNS, DesignRecord, design_name, read_records
+from armwright.proof.design_record import DESIGNS, design_name, read_records
 from armwright.proof.results import COMMAND, read_summary
 from armwright.proof.shown_run import Arrays, show_run, shown_facts
-from armwright.robot.mjcf import to_mjcf
-from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.config import FrontMethod, Method
 from armwright.runs.folder import read_run
 from armwright.sheet.record import NOT_MODELLED
@@ -31,9 +29,9 @@ COLOURS = {"missed": MISSED, "target": TARGET, "joint": JOINT, "obstacle": OBSTA
 
 
 class RunContent:
-    """A run folder as the page shows it; records of designs are taken from what the page showed of it earlier."""
+    """A run folder as the page shows it."""
 
-    def __init__(self, folder: Path, earlier: "RunContent | None" = None) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.config, self.history = read_run(folder)
         self.study: Method | None = None if isinstance(self.config.method, FrontMethod) else self.config.method
@@ -41,22 +39,18 @@ class RunContent:
         # A summary of another kind of run does not belong to this one.
         self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
         self.calls = Transcript(folder / TRANSCRIPTS, read_only=True).calls
-        known: dict[int, DesignRecord] = {}
-        if earlier is not None and self.summary is None:  # those of a finished run are its results
-            before, now = earlier.history.trials, self.history.trials
-            known = {n: one for n, one in earlier.records.items() if before[n : n + 1] == now[n : n + 1]}
         recommended = [self.history.member(one["design"]).number for one in (self.summary or {}).get("recommended", ())]
         numbers = dict.fromkeys([*(member.number for member in self.history.front), *recommended])
-        known |= read_records(folder, self.history, [number for number in numbers if number not in known])
-        self.records = {number: known[number] for number in numbers}
+        self.records = read_records(folder, self.history, list(numbers))
 
-    def packed(self, with_files: bool = False) -> bytes:
-        """Pack the run; with the files of its front for a page without a server, if it has ended."""
+    def packed(self) -> bytes:
+        """Pack the run; with the files of its front if it has ended."""
         shown = show_run(self.config, self.history, self.summary, self.records)
-        holds_files = with_files and self.summary is not None
         head = {
             **shown.head,
-            "files": {number: _files(self.folder, number) for number in self.records} if holds_files else {},
+            "files": {number: _files(self.folder, number) for number in self.records}
+            if self.summary is not None
+            else {},
             "folder": replace_surrogates(self.folder.resolve().name),
             "command": _command(self.folder),
             "calls": [asdict(call) for call in self.calls],
@@ -71,14 +65,6 @@ class RunContent:
             "joint_labels": JOINT_LABEL,
         }
         return pack(head, shown.arrays)
-
-    def file(self, number: int, kind: str) -> str | None:
-        """Return a design as text for simulators, urdf or mjcf; None for other kinds."""
-        is_stored = self.summary is not None and number in self.records
-        if is_stored and kind in (stored := _files(self.folder, number)):
-            return stored[kind]
-        name, arm = f"{self.history.problem.task.name}-{number}", self.history.member(number).arm
-        return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}.get(kind)
 
 
 def _command(folder: Path) -> str:

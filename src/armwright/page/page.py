@@ -32,7 +32,7 @@ def write_report(folder: str | Path) -> Path:
     content = RunContent(folder)
     if not len(content.history):
         raise RunFolderError(f"{folder} has no finished trial yet, so there is nothing to report")
-    data = base64.b64encode(zlib.compress(content.packed(with_files=True), 6)).decode()
+    data = base64.b64encode(zlib.compress(content.packed(), 6)).decode()
     holder = f'<script type="text/plain" id="content">{data}</script>'
     title = f"{folder.resolve().name}: armwright"
     page = assemble(PAGE, title, connects=False, values={"data": holder}).encode(errors="replace")  # lone surrogates

@@ -3,7 +3,6 @@
     config.yaml        everything needed to repeat the run
     trials.jsonl       one line per finished trial, written before the next begins
     transcripts.jsonl  every call to a language model (llm/transcript.py)
-    control.json, status.json  channel between a running study and its watchers (control.py)
     search.npz         state of a direct search (study/front/direct_search.py)
     trials.csv, front.csv, summary.json, shown.npz, designs/NNNN/ (results.py), and figures/ (pictures/figures.py)
 
@@ -26,7 +25,6 @@ from armwright.exceptions import RunConflictError, RunFolderError
 from armwright.files import check_no_links, is_part, naming_write_errors, open_to_append, read_text, replace_file
 from armwright.problem.evaluators import Evaluator
 from armwright.runs.config import Method, RunConfig, check_same_run, versions
-from armwright.runs.control import CHANNEL_FILES
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial, trial_line
 from armwright.runs.trials_file import TRIALS, count_trials, read_trials
@@ -40,7 +38,7 @@ MAX_CONFIG = 4 * MAX_BYTES  # [bytes]; a task and a space with all their default
 KEPT = ". What was written before is safe; free room or give another --out DIR, and run the same command again"
 SEARCH = "search.npz"
 REACH_MAPS = "reach-maps"
-BEFORE_TRIALS = {LOCK, CONFIG, TRIALS, "transcripts.jsonl", *CHANNEL_FILES}
+BEFORE_TRIALS = {LOCK, CONFIG, TRIALS, "transcripts.jsonl"}
 
 
 class RunFolder:
@@ -177,7 +175,7 @@ def is_held(folder: Path) -> bool:
 
     try:
         lock = os.open(folder / LOCK, os.O_RDONLY | os.O_NONBLOCK)  # a pipe has no writer
-    except PermissionError:  # another user's run, whose status.json is all that is known of it
+    except PermissionError:  # another user's run
         return True
     except OSError:
         return False

@@ -7,13 +7,12 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
-from armwright.exceptions import ModelError, StoppedError
+from armwright.exceptions import ModelError
 from armwright.problem.problem import Problem
 from armwright.proof.results import complete_summary, discard_results, summarize, write_results
 from armwright.proof.verification import verify_front
 from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
-from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM
 from armwright.runs.trial import FinishedTrial
@@ -29,7 +28,7 @@ from armwright.study.settings import EvaluationOptions
 from armwright.study.workers.dask_backend import DaskBackend
 from armwright.study.workers.evaluation_backend import Evaluated, LocalBackend
 
-POLL_SECONDS = 0.1  # between two checks for requests of the watcher while the study waits
+POLL_SECONDS = 0.1  # of one wait for a result; Ctrl-C takes effect between two
 
 
 @dataclass
@@ -68,7 +67,6 @@ class Study:
         self._sampler = sampler
         self._folder = folder
         self._watch = watch
-        self._channel = Channel(None if folder is None else folder.path)
         self._record = Record(problem, config, folder, evaluation.allow_failures)
         self._requests: ProposalRequests | None = None
         if proposer is not None:
@@ -88,22 +86,14 @@ class Study:
     def run(self, verify: bool) -> StudyResult:
         """Run the trials that are left, and write the results."""
         resumed = self._n_finished
-        try:
-            if self._proposer is not None:
-                self._proposer.open(None if self._folder is None else self._folder.path)
-            if resumed < self._method.n_trials:
-                self._search()
-            result = self._finish(resumed, verify)
-        except BaseException as end:
-            is_deliberate = isinstance(end, (KeyboardInterrupt, StoppedError))
-            self._channel.report("stopped", self._n_finished, None if is_deliberate else str(end) or type(end).__name__)
-            raise
-        self._channel.finish(self._n_finished)
-        return result
+        if self._proposer is not None:
+            self._proposer.open(None if self._folder is None else self._folder.path)
+        if resumed < self._method.n_trials:
+            self._search()
+        return self._finish(resumed, verify)
 
     def _search(self) -> None:
         first = self._n_finished
-        self._channel.begin(first)
         self._check_model()
         if self._folder is not None:
             discard_results(self._folder.path)  # those of fewer trials
@@ -131,7 +121,6 @@ class Study:
         forecast = self._proposer.forecast(self._problem, n_due)
         if forecast:
             self._report_beginning(forecast)
-        self._channel.report("asking", self._n_finished)
         try:
             if note := self._proposer.check():
                 self._report_beginning(note)
@@ -143,7 +132,6 @@ class Study:
                 self._requests.stop(fault.final)
                 consequence = "no requests are made in this session"
             self._report_beginning(f"{fault}; {consequence}")
-            self._channel.report("evaluating", self._n_finished, str(fault))
 
     def _new_schedule(self) -> Schedule:
         if self._proposer is None or self._requests is None:
@@ -157,22 +145,16 @@ class Study:
         )
 
     def _wait_for_start(self, number: int) -> None:
-        """Take results until trial `number` may start; StoppedError if the watcher ended the session."""
+        """Take results until trial `number` may start."""
         self._take_results(0.0)
         while not self._may_start(number):
             self._take_results(POLL_SECONDS)
-        self._channel.report("evaluating", number)
 
     def _may_start(self, number: int) -> bool:
-        """Return whether the watcher allows one more trial and a worker is free for it.
+        """Return whether a worker is free for one more trial.
 
         The first counted trial waits for all random ones, on which it depends.
         """
-        if self._channel.control().stop:
-            if self._pending:
-                return False
-            assert self._folder is not None
-            raise StoppedError(self._folder.path)
         if self._pending and number == self._method.n_init:
             return False
         return sum(not pending.is_evaluated for pending in self._pending.values()) < self._backend.capacity
@@ -181,7 +163,6 @@ class Study:
         """Choose the design of a trial and start its evaluation; a duplicate takes the values of the first."""
         started = time.perf_counter()
         slot = self._screened(self._schedule.next(number), number)
-        self._channel.report("evaluating", number, None if slot is None else slot.fault_message)
         proposed = time.perf_counter()
         optuna_trial, design, source = self._choose_design(number, slot)
         sampled = time.perf_counter()
@@ -269,7 +250,6 @@ class Study:
 
     def _report_request(self, number: int) -> None:
         assert self._proposer is not None
-        self._channel.report("asking", number)
         self._report("proposing", number, self._proposer.name, note=self._proposer.announce(number))
 
     def _report(self, doing: Activity, number: int, source: str = "", **about: Any) -> None:

@@ -25,11 +25,6 @@ class ProposalSlot:
     note: str = ""  # message for the user
     screened: ScreenedOut | None = None  # the proposal, if the surrogate expects too little of it to evaluate it
 
-    @property
-    def fault_message(self) -> str | None:
-        """Reason for a missing design: empty if there is a design, None if the reason was reported before."""
-        return "" if self.proposal is not None or self.screened is not None else self.note or None
-
     def fields(self, number: int) -> dict[str, Any]:
         """Return the fields of trial `number`, which takes the slot."""
         proposal = self.proposal

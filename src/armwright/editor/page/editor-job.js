@@ -2,7 +2,7 @@
 
 import { ask, complain, design, opened } from "./editor-document.js";
 import { $, duration } from "./format.js";
-import { request, withKey } from "./key.js";
+import { request } from "./key.js";
 
 const EVERY = 500; // [ms] between two questions
 const LEAST = 5; // [s] of a budget
@@ -12,7 +12,6 @@ export function openJob() {
   $("budget").addEventListener("keydown", (event) => {
     if (event.key === "Enter") start();
   });
-  $("job-page").href = withKey("run/");
   $("job-stop").addEventListener("click", () => ask("stop", {}).catch((fault) => complain(fault.message)));
   look();
 }
@@ -48,6 +47,7 @@ async function look() {
   $("job-progress").max = job.seconds;
   $("job-progress").value = job.elapsed;
   $("job-stop").hidden = !job.running;
+  $("job-page").href = job.report;
   $("job-page").hidden = job.running || job.exit_code !== 0;
   $("run").disabled = job.running;
   const output = $("job-output"), isAtEnd = output.scrollHeight - output.scrollTop - output.clientHeight < 40;

@@ -14,7 +14,7 @@ export function openCurve(shownContent) {
   onTheme(drawCurve);
 }
 
-export function drawCurve() {
+function drawCurve() {
   $("curve-box").querySelector("h2").textContent =
     content.head.is_study ? "Hypervolume by source" : "Hypervolume";
   const search = content.head.result.search;

@@ -6,16 +6,13 @@ import { $, element, markRows, metres, millimetres, number, quantity, save } fro
 
 const AT_LIMIT = 1e-3; // rad or m
 const ONLY_FRONT = "Torques are stated of the designs of the front";
-const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv", datasheet: "text/html" };
-const ENDINGS = { urdf: "urdf", mjcf: "xml", csv: "csv", datasheet: "datasheet.html" };
+const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv" };
+const ENDINGS = { urdf: "urdf", mjcf: "xml", csv: "csv" };
 
 let content = null;
-let fetchFile = null; // where a server has what the page lacks
 
-// fetched: (design, format) => Promise of a text, with a live server.
-export function openDesign(shownContent, fetched) {
+export function openDesign(shownContent) {
   content = shownContent;
-  fetchFile = fetched;
   for (const button of document.querySelectorAll(".download")) {
     button.addEventListener("click", () => downloadOf(state.design, button.dataset.format));
   }
@@ -54,7 +51,7 @@ function at(arm, q, j) {
   return q[j] <= arm.lower[j] + AT_LIMIT ? "lower" : "";
 }
 
-export function drawDesign() {
+function drawDesign() {
   const i = state.design;
   $("design-box").hidden = i === null;
   if (i === null) return;
@@ -78,9 +75,8 @@ export function drawDesign() {
   $("design-summary").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${describeRecommended(i)}${feasible}${iteration}${motors}${tubes}${supply}${describeIdle(i, posed)}`;
   drawLinks(arm);
   drawPostures(arm, posed);
-  const hasFiles = head.files[i] !== undefined || fetchFile !== null;
+  const hasFiles = head.files[i] !== undefined;
   for (const button of document.querySelectorAll(".download")) {
-    button.hidden = button.dataset.format === "datasheet" && !hasServer();
     button.disabled = button.dataset.format !== "csv" && !hasFiles;
     button.title = button.disabled ? "Files are available for the designs of the front" : `Download #${i} as ${button.textContent}`;
   }
@@ -91,7 +87,7 @@ export function drawDesign() {
   const lines = head.cycle ? ` Cycle: ${head.cycle}.` : "";
   const cases = head.cases ? ` Objectives are the worst of the nominal task and ${head.cases}; everything else is of the nominal task.` : "";
   const ignored = head.ignored_errors ? ` In this task, ${head.ignored_errors}.` : "";
-  const sheet = hasServer() ? "" : ` Data sheet: armwright datasheet ${head.folder} --design ${i}`;
+  const sheet = ` Data sheet: armwright datasheet ${head.folder} --design ${i}`;
   $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${ignored}${loads} ${head.masses}.${describeAssumed(i)}${solids}${lines}${boxes}${sheet}`;
 }
 
@@ -194,20 +190,10 @@ export function showRow(row) {
   else if (end > box.scrollTop + box.clientHeight) box.scrollTop = end - box.clientHeight;
 }
 
-// Whether a server writes what this page does not hold.
-export const hasServer = () => fetchFile !== null;
-
 // Saves a design as a file.
-export async function downloadOf(i, format) {
+export function downloadOf(i, format) {
   const name = `${content.head.config.task.name}-${i}.${ENDINGS[format]}`;
-  if (format === "csv") save(name, asCsv(i), TYPES.csv);
-  else {
-    try {
-      save(name, content.head.files[i]?.[format] ?? (await fetchFile(i, format)), TYPES[format]);
-    } catch (fault) {
-      $("design-note").textContent = `The download failed: ${fault.message}.`;
-    }
-  }
+  save(name, format === "csv" ? asCsv(i) : content.head.files[i][format], TYPES[format]);
 }
 
 function asCsv(i) {

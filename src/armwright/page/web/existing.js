@@ -14,7 +14,7 @@ export function openExisting(shownContent) {
   listen((changed) => { if (changed.has("design")) mark(); });
 }
 
-export function drawExisting() {
+function drawExisting() {
   const { existing_arms: arms, quantities, recommended } = content.head, shown = JSON.stringify([arms, recommended]);
   $("existing-box").hidden = !arms.length;
   if (!arms.length || shown === drawn) return;

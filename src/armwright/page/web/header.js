@@ -18,7 +18,7 @@ export function openHeader(shownContent) {
 
 const fact = (name, value, paint) => element("li", {}, paint ? dot(paint) : null, `${name} `, element("b", {}, value));
 
-export function drawHeader() {
+function drawHeader() {
   const { head } = content, { result } = head, facts = [], research = isForEngineers(head) ? [] : facts;
   $("title").textContent = `${head.config.task.name}: ${head.method}, seed ${head.config.seed}`;
   $("description").textContent = head.config.task.description;
@@ -62,6 +62,5 @@ export function drawConfiguration() {
   walk("", head.config);
   $("configuration-box").hidden = false;
   $("configuration").replaceChildren(element("p", { class: "note" }, `Run folder ${head.folder}. ${head.masses}.`), list);
-  const how = $("content") ? "This file works without a network." : "Live page; report.html in the run folder shows the same without a server.";
-  $("footer").textContent = `Made by armwright ${head.config.versions.armwright ?? ""} from the run folder ${head.folder}. ${how}`;
+  $("footer").textContent = `Made by armwright ${head.config.versions.armwright ?? ""} from the run folder ${head.folder}. This file works without a network.`;
 }

@@ -22,7 +22,7 @@ export function openLoads(shownContent) {
   drawLoads();
 }
 
-export function drawLoads() {
+function drawLoads() {
   const known = content.head.recommended.filter((one) => one.loads !== null);
   $("loads-box").hidden = !known.length;
   if (!known.length) return;

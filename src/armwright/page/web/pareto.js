@@ -50,10 +50,6 @@ export function openPareto(shownContent) {
   onTheme(draw);
 }
 
-export function growPareto() {
-  if (content.objectives.length > 1) draw();
-}
-
 // Returns whether errors on the front are so small that only a logarithmic axis separates its designs.
 function isPrecise() {
   const reference = content.head.reference_point;

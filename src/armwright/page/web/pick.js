@@ -26,7 +26,7 @@ export function openPick(shownContent) {
   drawPick();
 }
 
-export function drawPick() {
+function drawPick() {
   $("pick-holds").parentElement.hidden = content.head.result.verdict === null;
 }
 

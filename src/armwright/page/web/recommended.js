@@ -1,7 +1,7 @@
 // The designs to build, or why there is none: what an engineer reads first.
 
 import { snapshot } from "./arm.js";
-import { downloadOf, hasServer } from "./design.js";
+import { downloadOf } from "./design.js";
 import { listen, set, state } from "./state.js";
 import { $, element, markRows, millimetres, onTheme, plural, quantity, why } from "./format.js";
 
@@ -29,7 +29,7 @@ export function arrange(head) {
   $("curve-box").classList.add("wide");
 }
 
-export function drawRecommended() {
+function drawRecommended() {
   const { recommended, nothing } = content.head;
   $("recommended-box").hidden = !recommended.length && nothing === null;
   $("nothing").hidden = nothing === null;
@@ -57,10 +57,10 @@ function card(one) {
     ...survives(survival),
     ...(one.path ? [element("p", { class: "note" }, `Worst along its cycle: ${one.path}.`)] : []),
     element("p", { class: "buttons" }, element("button", { type: "button", onclick: show }, "Show"),
-      ...downloads().map(([format, text]) => element("button", { type: "button", onclick: () => downloadOf(design, format) }, text))));
+      ...DOWNLOADS.map(([format, text]) => element("button", { type: "button", onclick: () => downloadOf(design, format) }, text))));
 }
 
-const downloads = () => [["urdf", "URDF"], ["mjcf", "MJCF"], ...(hasServer() ? [["datasheet", "Data sheet"]] : [])];
+const DOWNLOADS = [["urdf", "URDF"], ["mjcf", "MJCF"]];
 
 // What an engineer asks, as far as it is known, and the objectives: label, text, explanation.
 function rows({ design, facts }) {

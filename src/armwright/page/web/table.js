@@ -62,7 +62,7 @@ export function show(numbers) {
   drawTable();
 }
 
-export function drawTable() {
+function drawTable() {
   const all = columns(), by = all.find((column) => column.key === sorted.key), { front } = content.head;
   const rows = only === null ? [...front] : only.filter((i) => front.includes(i));
   if (by) {

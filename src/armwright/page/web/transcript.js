@@ -14,7 +14,7 @@ export function openTranscript(shownContent) {
   drawTranscript();
 }
 
-export function drawTranscript() {
+function drawTranscript() {
   const all = $("all-calls").checked, proposed = Object.keys(content.proposals).length;
   $("transcript-box").hidden = proposed === 0 && content.calls.length === 0;
   $("all-calls").parentElement.hidden = content.calls.length === 0;

@@ -1,31 +1,16 @@
-"""Serve the live page of a finished run from a thread, and send requests to it."""
+"""A local server in a thread, and requests to it."""
 
 import http.client
-import json
-import queue
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
 import uvicorn
 
-import armwright as aw
-from armwright.page import live_server as live
 from tests.support.command_line import PATIENCE
-
-
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, int, str]]:
-    """A finished run on a server: its folder, the server's port and key."""
-    folder = tmp_path_factory.mktemp("served") / "run"
-    aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=folder)
-    with served_run(folder) as address:
-        yield folder, *port_and_key(address)
 
 
 @dataclass(frozen=True)
@@ -41,14 +26,6 @@ class Served:
     @property
     def key(self) -> str:
         return port_and_key(self.address)[1]
-
-
-@contextmanager
-def served_run(folder: Path, port: int = 0) -> Iterator[str]:
-    """Serve the live page of a run folder until the end of the block; its address."""
-    addresses: queue.Queue[str] = queue.Queue()
-    with running(partial(live.serve, folder, addresses.put, port=port)):
-        yield addresses.get()
 
 
 @contextmanager
@@ -90,10 +67,3 @@ def ask(port: int, method: str, path: str, body: bytes | None = None, **headers:
     found = response.status, response.read()
     connection.close()
     return found
-
-
-def post_control(port: int, key: str, content: object = None, **headers: str) -> int:
-    """What the server says to a POST that is right but for these headers."""
-    right = {"Origin": f"http://127.0.0.1:{port}", "Content_Type": "application/json", "X_Armwright_Key": key}
-    body = content if isinstance(content, bytes) else json.dumps(content or {"action": "stop"}).encode()
-    return ask(port, "POST", "/control", body, **{k: v for k, v in (right | headers).items() if v})[0]

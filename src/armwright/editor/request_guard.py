@@ -1,4 +1,4 @@
-"""What the local servers refuse, and the headers of all their responses.
+"""What the editor's server refuses, and the headers of all their responses.
 
 Other users of this machine can connect to a port, but do not know the key of its server. It is in the fragment of the
 address that the terminal shows, which browsers do not send. The page (page/key.js) keeps it in the storage of its tab,
@@ -7,7 +7,6 @@ which belongs to one port, and sends it as a header. A cookie would reach the se
 
 import asyncio
 import secrets
-import time
 from collections.abc import Callable, Collection
 from typing import Any, TypeVar
 
@@ -38,16 +37,15 @@ HEADERS = {
 class Guard:
     """Refuse requests for other hosts and without the key, and add the security headers to every response.
 
-    `shells` are the paths of pages, which hold no data and need no key. `hosts` are the Host headers that name
-    this server; others are refused (DNS rebinding).
+    `open_paths` need no key: a page without data, and an address that nobody can guess. `hosts` are the Host
+    headers that name this server; others are refused (DNS rebinding).
     """
 
-    def __init__(self, app: Any, key: str, shells: Collection[str], hosts: Collection[str]) -> None:
+    def __init__(self, app: Any, key: str, open_paths: Collection[str], hosts: Collection[str]) -> None:
         self._app = app
         self._key = key.encode()
-        self._shells = shells
+        self._open_paths = open_paths
         self._hosts = hosts
-        self.latest: float | None = None  # when a page last asked for data [s of the monotonic clock]
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         async def send_with_headers(message: Any) -> None:
@@ -68,10 +66,9 @@ class Guard:
         hosts = headers.getlist("host")
         if len(hosts) != 1 or hosts[0].lower() not in self._hosts:  # with two, a proxy might use the other one
             return PlainTextResponse("unknown host; use the address that the server printed", 421)
-        if scope["path"] in self._shells:
+        if scope["path"] in self._open_paths:
             return None
         if secrets.compare_digest(headers.get(KEY_HEADER, "").encode(), self._key):
-            self.latest = time.monotonic()
             return None
         return PlainTextResponse("the key is missing or wrong; use the address that the server printed", 403)
 

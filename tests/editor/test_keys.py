@@ -1,72 +1,53 @@
-"""The keys of the local servers: pages of other users, other tabs and later servers do not get at data."""
+"""The key of the editor's server: pages of other users, other tabs and later servers do not get at data."""
 
 import base64
 import http.server
-import shutil
 import signal
 import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Request, expect
-from starlette.routing import Mount, Route
+from starlette.routing import Route
 
-from armwright.editor.app import SHELLS, Editor
+from armwright.editor.app import Editor
 from armwright.editor.edited_files import EditedFiles
-from armwright.page.live_app import LivePage, live_app
 from tests.support.browser import Tab
 from tests.support.command_line import PATIENCE, start
-from tests.support.editor import served_editor
-from tests.support.live_server import Served, ask, port_and_key, served, served_run
-
-__all__ = ["served"]  # a fixture
+from tests.support.editor import ServedEditor, served_editor
+from tests.support.server import ask, port_and_key
 
 TASK = "name: secret-cell\ntargets:\n  - [0.3, 0.2, 0.1]\n"
-MARK = "secret"  # in the names of the task and of the run folder
+MARK = "secret"  # in the name of the task
 
 
-@dataclass(frozen=True)
-class Server(Served):
-    """A server of a page and its routes."""
-
-    kind: str  # "live" or "editor"
-    routes: tuple[Route, ...]  # with their whole paths
-    shells: tuple[str, ...]  # those that need no key
+def routes(server: ServedEditor) -> list[Route]:
+    """Those with addresses that are the same for each server."""
+    made = Editor(EditedFiles(server.task))
+    return [one for one in made.routes() if one.path == "/" or one.path not in made.open_paths]
 
 
 @contextmanager
-def a_server(kind: str, folder: Path, run: Path, port: int = 0) -> Iterator[Server]:
-    if kind == "live":
-        with served_run(run, port) as address:
-            routes = tuple(one for one in live_app(run).routes if isinstance(one, Route))
-            yield Server(address, kind, routes, ("/",))
-    else:
-        task = folder / "secret-cell.yaml"
-        task.write_text(TASK, encoding="utf-8")
-        with served_editor(task, port) as editor:
-            mine = Editor(EditedFiles(task)).routes()
-            assert [one.path for one in mine if isinstance(one, Mount)] == ["/run"]
-            live = [Route(f"/run{one.path}", one.endpoint, methods=one.methods) for one in LivePage(run).routes()]
-            yield Server(editor.address, kind, (*(one for one in mine if isinstance(one, Route)), *live), SHELLS)
+def a_server(folder: Path, port: int = 0) -> Iterator[ServedEditor]:
+    task = folder / "secret-cell.yaml"
+    task.write_text(TASK, encoding="utf-8")
+    with served_editor(task, port) as editor:
+        yield editor
 
 
-@pytest.fixture(params=["live", "editor"])
-def server(request: pytest.FixtureRequest, served: tuple[Path, int, str], in_folder: Path) -> Iterator[Server]:
-    run = Path(shutil.copytree(served[0], in_folder / "secret-run"))
-    with a_server(request.param, in_folder, run) as begun:
+@pytest.fixture
+def server(in_folder: Path) -> Iterator[ServedEditor]:
+    with a_server(in_folder) as begun:
         yield begun
 
 
-def test_every_address_but_the_shell_needs_the_key(server: Server) -> None:
-    paths = {route.path for route in server.routes}
-    assert paths > set(server.shells)
+def test_every_address_but_the_shell_needs_the_key(server: ServedEditor) -> None:
     origin = {"Origin": f"http://127.0.0.1:{server.port}", "Content_Type": "application/json"}
-    for route in server.routes:
+    for route in routes(server):
         for method in route.methods or ():
             wrong = (
                 {},
@@ -79,7 +60,7 @@ def test_every_address_but_the_shell_needs_the_key(server: Server) -> None:
             for query in ("", f"?key={server.key}"):
                 for headers in wrong:
                     status, body = ask(server.port, method, route.path + query, None, **origin, **headers)
-                    if route.path in server.shells:
+                    if route.path == "/":
                         assert status == 200
                         assert MARK.encode() not in body
                         assert server.key.encode() not in body
@@ -89,13 +70,12 @@ def test_every_address_but_the_shell_needs_the_key(server: Server) -> None:
         assert ask(server.port, "GET", path)[0] == 403
 
 
-def test_only_the_page_itself_is_served(server: Server, tmp_path: Path) -> None:
+def test_only_the_page_itself_is_served(server: ServedEditor, tmp_path: Path) -> None:
     """With DNS rebinding, the browser considers page and server one site."""
     own = f"127.0.0.1:{server.port}"
     right = {"Origin": f"http://{own}", "Content_Type": "application/json", "X_Armwright_Key": server.key}
     before = files(tmp_path)
-    # Without a search, the editor has no page of a run.
-    posts = [r.path for r in server.routes if "POST" in (r.methods or ()) and not r.path.startswith("/run/")]
+    posts = [r.path for r in routes(server) if "POST" in (r.methods or ())]
     foreign = ("null", "http://evil.example", f"http://localhost:{server.port}", f"https://{own}")
     hosts = ("evil.example", f"evil.example:{server.port}", "127.0.0.1", f"127.0.0.1:{server.port + 1}")
     assert posts
@@ -115,10 +95,10 @@ def test_only_the_page_itself_is_served(server: Server, tmp_path: Path) -> None:
     assert files(tmp_path) == before
 
 
-def test_no_websocket_is_opened(server: Server) -> None:
+def test_no_websocket_is_opened(server: ServedEditor) -> None:
     own = (f"127.0.0.1:{server.port}", f"http://127.0.0.1:{server.port}")
     for host, origin in (own, ("evil.example", own[1]), (own[0], "http://evil.example"), (own[0], "null")):
-        for path in {route.path for route in server.routes}:
+        for path in {route.path for route in routes(server)}:
             for key in ("", f"X-Armwright-Key: {server.key}\r\n"):
                 handshake = (
                     f"GET {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: {origin}\r\nConnection: Upgrade\r\n{key}"
@@ -130,17 +110,15 @@ def test_no_websocket_is_opened(server: Server) -> None:
                     status = int(connection.recv(64).split()[1])
                 assert status == 421 if host != own[0] else status in (200, 403, 404, 405)
                 if host == own[0] and not key:
-                    assert status == (200 if path in server.shells else 403)
+                    assert status == (200 if path == "/" else 403)
 
 
-def test_headers_of_proxies_change_nothing(server: Server) -> None:
-    path = "/control" if server.kind == "live" else "/stop"
+def test_headers_of_proxies_change_nothing(server: ServedEditor) -> None:
     right = {"Content_Type": "application/json", "X_Armwright_Key": server.key}
-    body = b'{"action": "stop"}' if server.kind == "live" else b"{}"
     forged = {"X_Forwarded_Proto": "https", "X_Forwarded_For": "192.0.2.1", "Forwarded": "proto=https"}
     own = f"127.0.0.1:{server.port}"
-    assert ask(server.port, "POST", path, body, Origin=f"http://{own}", **right, **forged)[0] == 204
-    assert ask(server.port, "POST", path, body, Origin=f"https://{own}", **right, **forged)[0] == 403
+    assert ask(server.port, "POST", "/stop", b"{}", Origin=f"http://{own}", **right, **forged)[0] == 204
+    assert ask(server.port, "POST", "/stop", b"{}", Origin=f"https://{own}", **right, **forged)[0] == 403
 
 
 def files(folder: Path) -> dict[Path, bytes]:
@@ -153,14 +131,12 @@ def history(tab: Tab) -> list[str]:
     return [entry["url"] for entry in session.send("Page.getNavigationHistory")["entries"]]
 
 
-def wait(tab: Tab, server: Server) -> None:
+def wait(tab: Tab, server: ServedEditor) -> None:
     tab.page.locator("#loading").wait_for(state="hidden")
-    expect(tab.page).to_have_title(
-        "secret-run: armwright, live" if server.kind == "live" else "secret-cell.yaml: armwright"
-    )
+    expect(tab.page).to_have_title("secret-cell.yaml: armwright")
 
 
-def test_the_key_leaves_the_address_and_stays_in_the_tab(server: Server, browser: Browser) -> None:
+def test_the_key_leaves_the_address_and_stays_in_the_tab(server: ServedEditor, browser: Browser) -> None:
     tab = Tab(browser)
     requests: list[Request] = []
     tab.page.on("request", lambda request: requests.append(request))
@@ -191,24 +167,18 @@ def test_the_key_leaves_the_address_and_stays_in_the_tab(server: Server, browser
     tab.close()
 
 
-@pytest.mark.parametrize("kind", ["live", "editor"])
-def test_a_page_of_an_earlier_server_says_so(
-    served: tuple[Path, int, str], in_folder: Path, browser: Browser, kind: str
-) -> None:
+def test_a_page_of_an_earlier_server_says_so(in_folder: Path, browser: Browser) -> None:
     tab = Tab(browser)
-    with a_server(kind, in_folder, served[0]) as first:
+    with a_server(in_folder) as first:
         tab.page.goto(first.address)
         tab.page.locator("#loading").wait_for(state="hidden")
         port = first.port
-    with a_server(kind, in_folder, served[0], port) as second:
+    with a_server(in_folder, port) as second:
         sentence = (
             "this tab has the key of another server, such as an earlier one; open the address that the terminal shows"
         )
-        if kind == "live":  # it looks for its server by itself
-            expect(tab.page.locator("#refusal")).to_contain_text(sentence)
-        else:
-            tab.page.get_by_role("button", name="Add ground", exact=True).click()
-            expect(tab.page.locator("#fault")).to_contain_text(sentence)
+        tab.page.get_by_role("button", name="Add ground", exact=True).click()
+        expect(tab.page.locator("#fault")).to_contain_text(sentence)
         tab.page.reload()
         expect(tab.page.locator("#loading")).to_contain_text(f"This page cannot be shown: {sentence}")
         tab.page.goto(second.address)
@@ -275,7 +245,7 @@ STEAL = """async ([home, paths, posts]) => {
 
 
 def test_a_page_on_another_port_gets_neither_key_nor_data(
-    server: Server, browser: Browser, tmp_path: Path, neighbour: tuple[str, list[dict[str, str]]]
+    server: ServedEditor, browser: Browser, tmp_path: Path, neighbour: tuple[str, list[dict[str, str]]]
 ) -> None:
     """Ports share cookies, so only what belongs to an origin can be kept from the servers of other users."""
     address, got = neighbour
@@ -286,7 +256,7 @@ def test_a_page_on_another_port_gets_neither_key_nor_data(
     other.goto(address)
     before = files(tmp_path)
     home = f"http://127.0.0.1:{server.port}/"
-    paths, posts = ([r.path[1:] for r in server.routes if method in (r.methods or ())] for method in ("GET", "POST"))
+    paths, posts = ([r.path[1:] for r in routes(server) if method in (r.methods or ())] for method in ("GET", "POST"))
     stolen: list[Any] = other.evaluate(STEAL, [home, paths, posts])
     # The user leaves our page for the other one, in the same tab and from a link.
     tab.page.on("dialog", lambda dialog: dialog.accept())
@@ -307,9 +277,8 @@ def test_a_page_on_another_port_gets_neither_key_nor_data(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["report", "edit"])
-def test_no_log_holds_the_key(served: tuple[Path, int, str], in_folder: Path, command: str) -> None:
-    with start(*(["report", "--live", served[0]] if command == "report" else ["edit", "secret-cell.yaml"])) as process:
+def test_no_log_holds_the_key(in_folder: Path) -> None:
+    with start("edit", "secret-cell.yaml") as process:
         assert process.stdout is not None
         port, key = port_and_key(process.stdout.readline().strip())
         for headers in ({}, {"X_Armwright_Key": key}, {"Upgrade": "websocket", "Connection": "Upgrade"}):

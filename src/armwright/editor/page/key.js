@@ -22,9 +22,6 @@ export function openKey() {
   if (sessionStorage.getItem(KEY) === null) throw new Error(`this tab has no key; ${WHERE}`);
 }
 
-// The address of another page of this server, for a tab of its own.
-export const withKey = (path) => `${path}#key=${sessionStorage.getItem(KEY)}`;
-
 // Asks the server; an error has the status of a refusal.
 export async function request(path, options = {}) {
   const key = encodeURIComponent(sessionStorage.getItem(KEY)); // as it is, unless it is none of ours
