@@ -364,17 +364,10 @@ def evaluate_arrays(
 
     def solve(initial: ArrayLike | None, updates: int = UPDATES, restarts: int = 0) -> Postures:
         return solve_postures(
-            arrays,
-            targets,
-            updates,
-            initial_q=initial,
-            payload=scene.payload,
-            target_arrays=scene.target_arrays,
-            restarts=restarts,
-            precision=arrays.precision,
-            device=device,
+            arrays, targets, updates, initial_q=initial, payload=scene.payload, target_arrays=scene.target_arrays,
+            restarts=restarts, precision=arrays.precision, device=device,
             motions=None if scene.plan is None else arrays.general_motions,
-        )
+        )  # fmt: skip
 
     restarts = scene.target_arrays.restarts
     if scene.plan is not None and arrays.couplings is not None:
