@@ -94,14 +94,15 @@ import sys
 import warp as wp
 from armwright.kinematics.contact.clearance_kernels import clearance_kernels
 from armwright.kinematics.cycle.drive_kernels import drive_kernels
-from armwright.kinematics.cycle.bearing_kernels import bearing_kernels
 from armwright.kinematics.cycle.branch_kernels import branch_kernels
+from armwright.kinematics.cycle.choice_kernels import choice_kernels
 from armwright.kinematics.cycle.dynamics_kernels import dynamics_kernels
 from armwright.kinematics.ik.ik_kernels import ik_kernels
+from armwright.kinematics.cycle.load_kernels import load_kernels
 from armwright.kinematics.cycle.path_kernels import path_kernels
 variants = [ik_kernels("float32", 1, motions, "position") for motions in ("revolute", "any")]
 variants += [ik_kernels("float32", 1, "any", "pose"), path_kernels(), branch_kernels()]
-variants += [dynamics_kernels(), bearing_kernels(), drive_kernels(), clearance_kernels("float32")]
+variants += [choice_kernels(), dynamics_kernels(), load_kernels(), drive_kernels(), clearance_kernels("float32")]
 kernels = [value for variant in variants for value in vars(variant).values() if isinstance(value, wp.Kernel)]
 modules = {kernel.module.name: kernel.module for kernel in kernels}
 print(len(modules), file=open(sys.argv[1] + "/count", "w"))

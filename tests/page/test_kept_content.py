@@ -125,6 +125,16 @@ def test_page_is_made_again_after_a_change(change: str, run: Path, computed: lis
     assert write_report(run).read_bytes() == found
 
 
+def test_page_of_a_stranger_that_states_its_sum_does_not_stay(run: Path, computed: list[Path]) -> None:
+    ours = (run / "report.html").read_bytes()
+    for mine, other in ((b"<body", b"<body onload='steal()'"), (b"<script>", b"<script>steal();"), (b"'none'", b"*")):
+        forged = ours.rpartition(page.MARK)[0].replace(mine, other)
+        sum_ = page._sum(page._origin(run), forged)  # pyright: ignore[reportPrivateUsage]
+        (run / "report.html").write_bytes(forged + page.MARK + sum_)
+        assert write_report(run).read_bytes() == ours
+    assert computed == [run] * 3
+
+
 def test_page_is_made_again_for_a_renamed_folder(run: Path, computed: list[Path]) -> None:
     renamed = run.rename(run.with_name("renamed"))
     assert "<title>renamed: armwright" in write_report(renamed).read_text(encoding="utf-8")

@@ -13,7 +13,6 @@ from rich.console import Console
 from rich.text import Text
 
 from armwright.cli.signals import INTERRUPTED
-from armwright.files import to_csv
 
 WIDE = 1000  # [characters]
 _own: dict[int, TextIO] = {}  # our copies of stdout (1) and stderr (2)
@@ -86,6 +85,8 @@ def print_json(content: Any) -> None:
 
 def print_csv(rows: Iterable[Mapping[str, Any]]) -> None:
     """Print records as CSV with a header to stdout."""
+    from armwright.files import to_csv  # imports pydantic
+
     print_text(to_csv(rows), end="")
 
 

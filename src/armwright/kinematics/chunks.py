@@ -10,7 +10,7 @@ from armwright.exceptions import FailureError
 from armwright.kinematics.devices import Device, cores
 
 # Samples of paths per chunk: per thread on the CPU, per launch on a GPU.
-SAMPLES: dict[Device, int] = {"cpu": 2**12, "cuda": 2**20}
+SAMPLES: dict[Device, int] = {"cpu": 2**16, "cuda": 2**20}
 
 
 def in_chunks(solve: Callable[[slice], None], n: int, size: int, device: Device) -> None:

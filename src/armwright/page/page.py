@@ -1,10 +1,12 @@
 """report.html: one file that shows a run in any browser, without a network.
 
-It ends with the sha256 of itself and all that it was made from. If that is still true, it is not made again.
+It ends with the sha256 of itself and all that it was made from. If that is still true, and all around its content is
+ours, since a stranger's folder may bring a page with its sum, it is not made again.
 """
 
 import base64
 import hashlib
+import re
 import zlib
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +21,7 @@ from armwright.proof.results import REPORT
 PAGE = PageSource("page.html", "main.js", ("page.css",), ("plotly-basic.min.js", "three.min.js"))
 PACKAGE = Path(__file__).parents[1]
 MARK = b"\n<!-- made from "  # before the sum
+_CONTENT = re.compile(rb'<script type="text/plain" id="content">([A-Za-z0-9+/=]*)</script>')
 
 
 def write_report(folder: str | Path) -> Path:
@@ -27,18 +30,23 @@ def write_report(folder: str | Path) -> Path:
     path, origin = folder / REPORT, _origin(folder)
     with suppress(ValueError):  # there is none
         page, _, stated = read_bytes(path, MAX_DERIVED, ValueError).rpartition(MARK)
-        if stated == _sum(origin, page):
+        kept = _CONTENT.search(page)
+        if kept and stated == _sum(origin, page) and page == _around(kept[1], folder):
             return path
     content = RunContent(folder)
     if not len(content.history):
         raise RunFolderError(f"{folder} has no finished trial yet, so there is nothing to report")
-    data = base64.b64encode(zlib.compress(content.packed(), 6)).decode()
-    holder = f'<script type="text/plain" id="content">{data}</script>'
-    title = f"{folder.resolve().name}: armwright"
-    page = assemble(PAGE, title, connects=False, values={"data": holder}).encode(errors="replace")  # lone surrogates
+    page = _around(base64.b64encode(zlib.compress(content.packed(), 6)), folder)
     with naming_write_errors(path, "; the trials are safe"):
         replace_file(path, page + MARK + _sum(origin, page))
     return path
+
+
+def _around(content: bytes, folder: Path) -> bytes:
+    """Return the page around its content, in base64."""
+    holder = f'<script type="text/plain" id="content">{content.decode()}</script>'
+    page = assemble(PAGE, f"{folder.resolve().name}: armwright", connects=False, values={"data": holder})
+    return page.encode(errors="replace")  # lone surrogates
 
 
 def _origin(folder: Path) -> bytes:

@@ -16,7 +16,7 @@ from armwright.kinematics.devices import Device, cores, load_kernels
 from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
 from armwright.tasks.tip_rules import Solids, TipRules
 
-MAX_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
+MAX_CHUNK: dict[Device, int] = {"cpu": 2**16, "cuda": 2**20}  # postures
 SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than they save
 
 
