@@ -167,9 +167,11 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                         column[i + 3] = Wide(turned[i])
                     for i in range(6):
                         weighted[i] = wp.cw_mul(Wide(w), column[i])
-                        for k in range(wp.static(i + 1)):
+                        for k in range(i):
                             jjt[6 * i + k] += wp.cw_mul(column[i], column[k])
                             jwjt[6 * i + k] += wp.cw_mul(weighted[i], column[k])
+                        jjt[7 * i] += wp.cw_mul(column[i], column[i])
+                        jwjt[7 * i] += wp.cw_mul(weighted[i], column[i])
                 else:
                     c1, c2, c3 = Wide(moved[0]), Wide(moved[1]), Wide(moved[2])
                     w1, w2, w3 = wp.cw_mul(Wide(w), c1), wp.cw_mul(Wide(w), c2), wp.cw_mul(Wide(w), c3)

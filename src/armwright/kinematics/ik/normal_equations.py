@@ -112,9 +112,9 @@ def normal_equations(precision: Precision, lanes: int) -> SimpleNamespace:
                 x[i] -= wp.cw_mul(ldl[6 * i + m], x[m])
         for i in range(6):
             x[i] = wp.cw_div(x[i], ldl[7 * i])
-        for step in range(6):
-            for i in range(wp.static(5 - step)):
-                x[i] -= wp.cw_mul(ldl[wp.static(6 * (5 - step)) + i], x[wp.static(5 - step)])
+        for m in range(5, 0, -1):
+            for i in range(m):
+                x[i] -= wp.cw_mul(ldl[6 * m + i], x[m])
         return (
             wp.matrix_from_rows(Lane(x[0]), Lane(x[1]), Lane(x[2])),
             wp.matrix_from_rows(Lane(x[3]), Lane(x[4]), Lane(x[5])),
