@@ -2,8 +2,9 @@
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache, partial
 
 from armwright.exceptions import FailureError
@@ -19,7 +20,7 @@ def in_chunks(solve: Callable[[slice], None], n: int, size: int, device: Device)
         _one_after_another(solve, n, size)
         return
     chunks = [slice(first, min(first + size, n)) for first in range(0, n, size)]
-    if len(chunks) == 1 or hasattr(_thread, "solves"):
+    if len(chunks) == 1 or threads() == 1:
         for chunk in chunks:
             solve(chunk)
     else:
@@ -48,6 +49,21 @@ def _one_after_another(solve: Callable[[slice], None], n: int, size: int) -> Non
 
 
 _thread = threading.local()
+
+
+def threads() -> int:
+    """Return how many threads solve the chunks that this one needs."""
+    return 1 if hasattr(_thread, "solves") else cores()
+
+
+@contextmanager
+def one_thread() -> Generator[None]:
+    """Solve all chunks in this thread, since other processes use the other cores."""
+    _thread.solves = True
+    try:
+        yield
+    finally:
+        del _thread.solves
 
 
 @cache

@@ -10,9 +10,9 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
-from armwright.kinematics.chunks import in_chunks
+from armwright.kinematics.chunks import in_chunks, threads
 from armwright.kinematics.cycle.line_following import IndexArray
-from armwright.kinematics.devices import Device, cores, load_all_kernels, resolve_device
+from armwright.kinematics.devices import Device, load_all_kernels, resolve_device
 from armwright.kinematics.ik.ik import LANES
 from armwright.pareto import LARGEST_VIOLATION, NOT_EVALUATED
 from armwright.problem.arm_quantities import orientation_error
@@ -214,7 +214,7 @@ class Problem:
             for rows in self.chunks(len(matrix)):
                 solve(rows)
         else:
-            of_thread = max(SMALLEST_CHUNK // self._n_arms, -(-len(matrix) // cores()))
+            of_thread = max(SMALLEST_CHUNK // self._n_arms, -(-len(matrix) // threads()))
             in_chunks(solve, len(matrix), max(1, min(self._chunk, of_thread)), self.device)
         nobody = Outcomes(np.empty((0, len(self.objectives))), np.empty((0, len(self.constraints))))
         found = joined([parts[first] for first in sorted(parts)]) if parts else nobody

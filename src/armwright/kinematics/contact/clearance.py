@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arms.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.arms.motor_bodies import NO_BODY, bodies_in, without_bodies
-from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.devices import Device, cores, load_kernels
+from armwright.kinematics.chunks import in_chunks, threads
+from armwright.kinematics.devices import Device, load_kernels
 from armwright.tasks.obstacles import SHAPES, Obstacle, Solid
 from armwright.tasks.tip_rules import Solids, TipRules
 
@@ -64,7 +64,7 @@ def path_clearances(
 
     size = MAX_CHUNK[device] // t
     if device == "cpu":
-        size = min(size, max(-(-n // cores()), SMALLEST_CHUNK // t))
+        size = min(size, max(-(-n // threads()), SMALLEST_CHUNK // t))
     in_chunks(measure, n, max(1, size), device)
     return distances, worst
 

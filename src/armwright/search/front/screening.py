@@ -11,6 +11,7 @@ designs for the same reason.)
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import moocore
@@ -44,14 +45,19 @@ def pays(problem: Problem) -> bool:
 class Screen:
     """Offspring of which the estimates choose; `learn` has to be called with all that is evaluated.
 
-    The problem has a cycle. `reference_point` gives the (M,) values beyond which a design now counts for nothing.
+    The problem has a cycle. `reference_point` gives the (M,) values beyond which a design now counts for nothing, and
+    `estimator` the `estimates` of designs; by default this process does.
     """
 
-    def __init__(self, problem: Problem, reference_point: Callable[[], Sequence[float]]) -> None:
+    def __init__(
+        self, problem: Problem, reference_point: Callable[[], Sequence[float]],
+        estimator: Callable[[Array, Array], Outcomes] | None = None,
+    ) -> None:  # fmt: skip
         plan, parameters = problem.scenes[0].plan, problem.space.parameters
         assert plan is not None
         dof = problem.arms(problem.space.matrix(problem.space.sample(1, 0))).dof
         self._problem = problem
+        self._estimates = estimator or partial(estimates, problem)
         self._reference_point = reference_point
         self._encoding = DesignEncoding(parameters)
         self._matrix = np.empty((0, len(parameters)))
@@ -126,7 +132,7 @@ class Screen:
         """
         if not len(matrix):
             return np.arange(0), np.arange(0)
-        found = estimates(self._problem, matrix, self._postures_near(matrix))
+        found = self._estimates(matrix, self._postures_near(matrix))
         order = np.lexsort((rng.random(len(matrix)), _ranks_behind(self._front, found.penalised)))
         if not len(self._front):
             return order[:n], order[n:]

@@ -26,6 +26,7 @@ from armwright.runs.trial import FinishedTrial
 from armwright.search.front.front_search import FrontSearch
 from armwright.search.front.screening import Screen, pays
 from armwright.search.front.variation import offspring
+from armwright.study.front.evaluation_pool import EvaluationPool
 from armwright.study.front.reference_survey import ReferenceSurvey
 from armwright.study.front.reported_front import reported_front
 from armwright.study.front.safe_search import find_safe_design
@@ -36,6 +37,7 @@ from armwright.study.progress import RunResult
 SAVE_SECONDS = 5.0
 SHORT = 1_200  # evaluations on tasks with a cycle: searches of fewer find more after a smaller first generation
 SHORT_FIRST_BATCH = 200  # random designs in that first generation
+LONG, LONG_SECONDS = 2_000, 20.0  # evaluations and [s]: searches with cycles and such budgets start other processes
 N_MEASURED, LONG_SHARE = (1, 8), 0.02  # designs that verification is timed on: more if one takes a smaller share
 
 
@@ -61,7 +63,8 @@ class DirectSearch:
         self.plan = plan
         self.watch = watch
         self.survey = ReferenceSurvey(problem, config.seed)
-        self.screen = Screen(problem, lambda: self.survey.point) if pays(problem) else None
+        self.pool = EvaluationPool(problem)
+        self.screen = Screen(problem, lambda: self.survey.point, self.pool.estimates) if pays(problem) else None
         vary = offspring if self.screen is None else self.screen.offspring
         parameters = problem.space.parameters
         self.search = FrontSearch(parameters, self._evaluate, self.survey.point, config.seed, matrix, vary)
@@ -86,6 +89,8 @@ class DirectSearch:
             self.config = self.folder.note_versions(self.config)
         state = None  # after the last complete generation: Ctrl-C may interrupt one
         try:
+            if not ended and self._is_long:
+                self.pool.start()
             saved = time.monotonic()
             while not (ended := self._end_reason(stop_at_stall)):
                 started = self.plan.elapsed
@@ -105,6 +110,7 @@ class DirectSearch:
                 self.ended_after = budget.seconds
                 state = self._state()
         finally:
+            self.pool.close()
             if state is not None:
                 self._save(state)
         self._report(0, is_ended=True)
@@ -145,6 +151,13 @@ class DirectSearch:
     def _is_exhausted(self) -> bool:
         """True if no evaluations are left in the budget."""
         return self.search.evaluations >= (self.plan.budget.evaluations or math.inf)
+
+    @property
+    def _is_long(self) -> bool:
+        """True if the search saves more time by other processes than they take to start."""
+        budget = self.plan.budget
+        is_long = (budget.evaluations or math.inf) >= LONG and (budget.seconds or math.inf) >= LONG_SECONDS
+        return is_long and self.screen is not None
 
     def _is_short(self, done: int) -> bool:
         """Return whether the budget leaves few evaluations, by the rate of those that are done."""
@@ -226,7 +239,7 @@ class DirectSearch:
                 self._report(done)
             end = done + self.chunk_size.value
             chunk, started = matrix[done : min(end, cut) if done < cut else end], self.plan.elapsed
-            outcomes = self.problem.evaluate(chunk)
+            outcomes = self.pool.evaluate(chunk)
             self.chunk_size.adapt(len(chunk), self.plan.elapsed - started)
             parts.append(outcomes.penalised)
             done += len(chunk)
