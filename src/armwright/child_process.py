@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from typing import Any
 
 
@@ -16,3 +18,10 @@ def start_module(module: str, *arguments: object, **options: Any) -> subprocess.
     path = os.pathsep.join(filter(None, sys.path))
     environment = {**os.environ, "PYTHONPATH": path, **options.pop("env", {})}
     return subprocess.Popen(command, env=environment, start_new_session=True, **options)
+
+
+def start_connected(module: str, **options: Any) -> tuple[subprocess.Popen[Any], "Connection[Any, Any]"]:
+    """Start a module whose argument is the number of a file that connects it to this process; return our end, too."""
+    ours, theirs = Pipe()
+    with theirs:
+        return start_module(module, theirs.fileno(), pass_fds=[theirs.fileno()], **options), ours

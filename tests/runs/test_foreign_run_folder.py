@@ -22,9 +22,10 @@ from armwright.proof.cycle_faults import describe_path
 from armwright.proof.design_record import read_records
 from armwright.proof.results import read_summary
 from armwright.proof.selection import pick_from
-from armwright.runs.folder import RunFolder, is_held, read_run
+from armwright.runs.folder import RunFolder, read_run
 from armwright.sheet.design_sheet import design_sheet
 from tests import ROOT
+from tests.support.run_locks import is_held
 
 HUGE = 3 * 1024**3  # [bytes] of zeros, which take no room on the disk
 MOST = 400 * 1024**2  # [bytes] of memory at once
@@ -182,14 +183,6 @@ def test_a_lock_that_somebody_opened_before_is_waited_for(run: Path, monkeypatch
     monkeypatch.undo()
     with RunFolder(run):
         assert mode(lock) == 0o600
-
-
-def test_a_lock_of_another_user_counts_as_held(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def deny(*_: object) -> int:
-        raise PermissionError
-
-    monkeypatch.setattr("armwright.runs.folder.os.open", deny)
-    assert is_held(run)
 
 
 def test_a_lock_that_is_a_link_leaves_its_target_as_it_is(run: Path, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import psutil
 
-from armwright.runs.folder import is_held
+from tests.support.run_locks import is_held
 
 LOOK_SECONDS = 0.003
 AT_START = 0.15  # of the kills

@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,10 +11,10 @@ import pytest
 from armwright.exceptions import RunFolderError
 from armwright.files import replace_folder
 from armwright.problem.problem import Problem
-from armwright.runs.folder import RunFolder, is_held
 from armwright.study.progress import Progress
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
+from tests.support.run_locks import is_held
 from tests.torture.short import (
     N_TRIALS,
     SETTINGS,
@@ -50,23 +49,6 @@ def test_one_of_two_simultaneous_processes_gets_the_folder(tmp_path: Path, whole
         assert process.returncode == 0 or "is in use by another armwright process" in said
         assert "Traceback" not in said
     is_same_run(tmp_path / "run", whole)
-
-
-def test_checking_a_lock_does_not_block_others(tmp_path: Path) -> None:
-    """A process that looks all the time, while others come and go."""
-    looking = (
-        "import sys; from pathlib import Path; from armwright.runs.folder import is_held\n"
-        "while True: is_held(Path(sys.argv[1]))"
-    )
-    looks = [subprocess.Popen([sys.executable, "-c", looking, str(tmp_path)]) for _ in range(2)]
-    try:
-        for _ in range(100):
-            with RunFolder(tmp_path):
-                pass
-    finally:
-        for process in looks:
-            process.kill()
-            process.wait()
 
 
 def move(folder: Path) -> None:

@@ -12,7 +12,6 @@ The files of the last line are derived from the finished trials and can be writt
 import errno
 import os
 import re
-import sys
 from collections.abc import Iterable
 from contextlib import ExitStack, suppress
 from io import FileIO
@@ -165,27 +164,6 @@ def _private_lock(path: Path) -> BaseFileLock:
         if not path.is_symlink():
             path.chmod(OWNER_ONLY)
     return FileLock(path, timeout=LOCK_SECONDS, mode=OWNER_ONLY)
-
-
-def is_held(folder: Path) -> bool:
-    """Return whether a process has locked a run folder for writing, here or on another machine."""
-    if sys.platform == "win32":  # a lock cannot be tested there without taking it
-        return True
-    import fcntl
-
-    try:
-        lock = os.open(folder / LOCK, os.O_RDONLY | os.O_NONBLOCK)  # a pipe has no writer
-    except PermissionError:  # another user's run
-        return True
-    except OSError:
-        return False
-    try:
-        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:
-        return True
-    finally:
-        os.close(lock)  # also releases the shared lock
-    return False
 
 
 def read_config(path: Path) -> RunConfig:

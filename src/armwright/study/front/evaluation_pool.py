@@ -10,14 +10,13 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import pairwise
-from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.child_process import start_module
+from armwright.child_process import start_connected
 from armwright.kinematics.chunks import one_thread
 from armwright.kinematics.devices import cores
 from armwright.problem.estimates import estimates
@@ -83,13 +82,9 @@ class _Other:
     """Another process; content: what it makes the problem of."""
 
     def __init__(self, content: Any) -> None:
-        self._connection, theirs = Pipe()
+        nowhere = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+        self._process, self._connection = start_connected(__name__, env={"OMP_NUM_THREADS": "1"}, **nowhere)
         self._is_ready = False
-        with theirs:
-            self._process = start_module(
-                __name__, theirs.fileno(), pass_fds=[theirs.fileno()], env={"OMP_NUM_THREADS": "1"},
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            )  # fmt: skip
         self.send(content)
 
     def is_ready(self) -> bool:

@@ -12,11 +12,10 @@ import sys
 import threading
 from contextlib import suppress
 from functools import lru_cache
-from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
-from armwright.child_process import start_module
+from armwright.child_process import start_connected
 from armwright.exceptions import EvaluatorError, SettingsError
 from armwright.kinematics.devices import find_cache
 from armwright.problem.evaluators import Measurement
@@ -97,12 +96,8 @@ class EvaluationProcess:
     def _start(self) -> None:
         self.close()
         find_cache()
-        self._connection, theirs = Pipe()
-        with theirs:
-            self._process = start_module(
-                "armwright.study.workers.evaluation_process", theirs.fileno(),
-                stdin=subprocess.PIPE, pass_fds=[theirs.fileno()],
-            )  # fmt: skip
+        module = "armwright.study.workers.evaluation_process"
+        self._process, self._connection = start_connected(module, stdin=subprocess.PIPE)
         try:
             self._connection.send((self.pickled, self.timeout))
             failure = self._connection.recv()
