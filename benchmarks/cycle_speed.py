@@ -1,6 +1,7 @@
 """Designs a second along whole cycles, beside another checkout: medians of several rounds, the two in turn.
 
-near the front   lengths of the best known front's designs off by 2 % of their range; all bodies, motors and loads
+near the front   lengths of the best known front's designs off by 2 % of their range; all bodies, motors and loads;
+                 in the processes of a direct search, if the checkout has such, as all that follows but one design
 random           designs of the same space
 one design       milliseconds of one design near the front alone, as `optimize` evaluates them; median of twelve
 robust           with `--robust`: each design and its copies
@@ -36,6 +37,7 @@ N, N_RANDOM, N_ROBUST, N_ESTIMATES, N_SINGLE = 96, 96, 6, 384, 12
 NEAR = 0.02  # of the range of a length
 HIGHER = ("near the front", "random", "robust", "estimates", "one core")  # designs a second
 WIDTH = 16
+START_SECONDS = 10.0  # for other processes
 
 
 def problem_of(job: str) -> tuple[Any, Any]:
@@ -74,41 +76,57 @@ def seconds(do: Callable[[], object]) -> float:
     return time.perf_counter() - started
 
 
+def shared(problem: Any, matrix: Any) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Return how a direct search evaluates and estimates designs, once its processes have started."""
+    from functools import partial
+
+    from armwright.problem.estimates import estimates
+
+    try:
+        from armwright.study.front.evaluation_pool import EvaluationPool
+    except ModuleNotFoundError:
+        return problem.evaluate, partial(estimates, problem)
+    pool, started = EvaluationPool(problem), time.monotonic()
+    pool.start()
+    while time.monotonic() - started < START_SECONDS:
+        pool.evaluate(matrix)
+    return pool.evaluate, pool.estimates
+
+
 class Measured:
     """The work on one job in one process."""
 
     def __init__(self, job: str) -> None:
-        from armwright.problem.estimates import estimates
         from armwright.spaces.tolerance import TOLERANCE
 
         self.problem, front = problem_of(job)
         self.near = near_front(self.problem, front, N)
         space = self.problem.space
         self.random = space.matrix(space.sample(N_RANDOM, seed=1))
-        self.robust = replace(self.problem, tolerance=TOLERANCE)
+        robust = replace(self.problem, tolerance=TOLERANCE)
+        self.evaluate, estimates = shared(self.problem, self.near[:N_SINGLE])
+        self.evaluate_robust, _ = shared(robust, self.near[:2])
         parents = near_front(self.problem, front, N_ESTIMATES)
         entry = self.problem.evaluate(parents).entry
         children = near_front(self.problem, parents, N_ESTIMATES)
-        self.estimate = lambda: estimates(self.problem, children, entry)
+        self.estimate = lambda: estimates(children, entry)
         found, exact = self.estimate().values, self.problem.evaluate(children)
         rows = (exact.violations <= 0.0).all(axis=1)
         self.correlation = float(
             np.mean([spearman(a[rows], b[rows]) for a, b in zip(found.T, exact.values.T, strict=True)])
         )
-        for problem, matrix in ((self.problem, self.random), (self.robust, self.near[:1])):
-            problem.evaluate(matrix)  # kernels
+        self.evaluate(self.random)  # kernels
 
     def round(self) -> dict[str, float]:
         """Return what one round measures."""
-        evaluate = self.problem.evaluate
         found = {
-            "near the front": N / seconds(lambda: evaluate(self.near)),
-            "random": N_RANDOM / seconds(lambda: evaluate(self.random)),
-            "robust": N_ROBUST / seconds(lambda: self.robust.evaluate(self.near[:N_ROBUST])),
+            "near the front": N / seconds(lambda: self.evaluate(self.near)),
+            "random": N_RANDOM / seconds(lambda: self.evaluate(self.random)),
+            "robust": N_ROBUST / seconds(lambda: self.evaluate_robust(self.near[:N_ROBUST])),
             "estimates": N_ESTIMATES / seconds(self.estimate),
             "rank correlation": self.correlation,
         }
-        singles = [seconds(lambda row=row: evaluate(self.near[row : row + 1])) for row in range(N_SINGLE)]  # type: ignore[misc]
+        singles = [seconds(lambda row=row: self.problem.evaluate(self.near[row : row + 1])) for row in range(N_SINGLE)]  # type: ignore[misc]
         return found | {"one design": 1e3 * statistics.median(singles)}
 
 
@@ -125,7 +143,7 @@ def serve(job: str, few: bool) -> None:
     measured = Measured(job)
     print(json.dumps("ready"), flush=True)
     for _ in sys.stdin:
-        near = {"one core": N / seconds(lambda: measured.problem.evaluate(measured.near))} if few else measured.round()
+        near = {"one core": N / seconds(lambda: measured.evaluate(measured.near))} if few else measured.round()
         print(json.dumps(near), flush=True)
 
 
