@@ -151,7 +151,7 @@ def test_outcomes_do_not_depend_on_the_number_of_threads(tolerance: float, monke
     matrix = problem.space.matrix(problem.space.sample(N if tolerance else 4 * N, seed=1))
     found: list[Outcomes] = []
     for threads in (1, 2, 3):
-        monkeypatch.setattr("armwright.problem.problem.cores", lambda n=threads: n)
+        monkeypatch.setattr("armwright.kinematics.chunks.cores", lambda n=threads: n)
         found.append(problem.evaluate(matrix))
     for other in found[1:]:
         for name in ("values", "violations", "entry", "q"):
