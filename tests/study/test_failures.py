@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import armwright as aw
+from armwright import child_process
 from armwright.exceptions import EvaluatorError
 from armwright.llm.feedback import Feedback
 from armwright.search.samplers import SAMPLERS
@@ -183,7 +184,7 @@ def test_idle_process_of_an_evaluator_ends_and_is_replaced() -> None:
         return subprocess.Popen([sys.executable, "-c", command, str(connection)], start_new_session=True, **options)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evaluation_process, "start_module", start)
+        patch.setattr(child_process, "start_module", start)
         process._start()
         assert process._process is not None
         assert process._process.wait() == evaluation_process.IDLE_EXIT

@@ -14,6 +14,7 @@ from armwright.kinematics.devices import Compilation
 from armwright.proof.results import read_summary
 from armwright.spaces.design_space import default_space
 from armwright.study.front import direct_search, time_plan
+from armwright.study.front.evaluation_pool import EvaluationPool
 from armwright.study.front.search_budget import SearchBudget, read_seconds
 from armwright.study.front.time_plan import ChunkSize, TimePlan
 from tests.support.controlled_runs import interrupt_at
@@ -113,9 +114,10 @@ def test_run_ends_on_time(clock: Clock, tmp_path: Path, seconds: float, of_a_des
 @pytest.mark.slow
 @pytest.mark.parametrize(("of_a_design", "is_short"), [(0.1, True), (0.001, False)])
 def test_cycle_search_is_short_if_time_is_short(
-    clock: Clock, tmp_path: Path, of_a_design: float, is_short: bool
+    clock: Clock, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of_a_design: float, is_short: bool
 ) -> None:
     clock.of_a_design = of_a_design
+    monkeypatch.setattr(EvaluationPool, "start", lambda _: None)  # other processes have another clock
     problem = Problem(load_task("screwing"), default_space("screwing"))
     watch = interrupt_at(300 if is_short else 500)
     with pytest.raises(KeyboardInterrupt):
