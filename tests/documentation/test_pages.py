@@ -57,7 +57,7 @@ FOLLOWED = [page for page in PAGES if commands(page) or any(block.language == "p
 BY_SECTION = ("docs/examples.md",)
 FEW = "1000"  # evaluations of a search
 RARE = {
-    "3-long-shelf": "2000",
+    "3-long-shelf": "4000",
     "5-obstacle": "2000",
     "8-stiffness": "2000",
     "feeder": "3000",

@@ -79,8 +79,7 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
     ):  # fmt: skip
         """Inverse kinematics of an arm at a group of targets.
 
-        The arrays over joints live in its registers and stack. Passing them to functions copies them, which made a
-        prototype three times slower.
+        Arrays over joints live in registers and stack; passing, and so copying, them takes three times as long.
         """
         arm, group = wp.tid()
         if wp.static(pose):
@@ -118,8 +117,6 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
                 far = square + wp.cw_mul(off, off)
             nearer = Lane(one) - at_least(far, nearest)
             nearest = wp.min(nearest, far)
-            for j in range(arms.dof):
-                kept[j] = select(nearer, q[j], kept[j])
             # dx, shortened; the pull y is taken out of dx, because J# dx + (I - J# J) y = y + J# (dx - J y).
             dx = shortened(error, square)
             if wp.static(pose):
@@ -142,6 +139,7 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
             a11, a21, a22, a31, a32, a33 = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
             b11, b21, b22, b31, b32, b33 = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
             for j in range(arms.dof):
+                kept[j] = select(nearer, q[j], kept[j])
                 motion = arms.motion[arm, j]
                 n, d, w, y_j = limit(motion, arms.lower[arm, j], arms.upper[arm, j], q[j], limit_n[j], limit_d[j])
                 limit_n[j] = n
