@@ -137,8 +137,8 @@ def arm_of(task: str, space: str, evaluations: int, at: str, drag: int = 0, zoom
 def stiffness(folder: Path, page: Page, file: Path) -> None:
     """Show the recommended arms without and with a bound for the deflection, side by side."""
     views = (
-        ("8-stiffness-unbounded-task.yaml", 0, "#design=4&target=2", "deflection unbounded: 23 mm"),
-        ("8-stiffness-task.yaml", 2, "#design=1&target=2", "deflection at most 1 mm"),
+        ("8-stiffness-unbounded-task.yaml", 0, "#design=5&target=2", "deflection unbounded: 23 mm"),
+        ("8-stiffness-task.yaml", 0, "#design=0&target=2", "deflection at most 1 mm"),
     )
     figures = ""
     for task, seed, at, caption in views:
@@ -216,7 +216,7 @@ PICTURES: dict[str, Shot] = {
         "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 4000, "#design=0&target=4", drag=90, zoom=250, seed=1
     ),
     "example-obstacles.png": arm_of(
-        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 4000, "#design=68&target=3", seed=2
+        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 4000, "#design=13&target=3", zoom=-150, seed=2
     ),
     "example-stiffness.png": stiffness,
     "compare-arms.png": existing_arms,
