@@ -41,7 +41,7 @@ class EvaluationPool:
         self._others: list[_Other] = []
 
     def start(self) -> None:
-        """Start the other processes, one per core, unless they could not evaluate what the user's code defines."""
+        """Start one process per further core, unless the problem depends on what a user's code defines."""
         problem = self._problem
         names = [objective.name for objective in problem.objectives]
         is_ours = problem.evaluator is None and all(map(OBJECTIVES.__contains__, names))
